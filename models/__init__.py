@@ -1,0 +1,1 @@
+"""Physics of overhead contact lines and pantographs; knows nothing of FMI, SSP or XML."""

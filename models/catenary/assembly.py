@@ -1,0 +1,200 @@
+"""Global matrices of a line from its mesh: K, M, C, dropper rows, loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from models.catenary.elements import (
+    NODE_DOFS,
+    beam_geometric_stiffness,
+    beam_mass,
+    beam_stiffness,
+    frames,
+    to_global,
+)
+from models.catenary.mesh import CatenaryMesh
+from models.catenary.parameters import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition, Dropper
+from models.part import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class BeamProperties:
+    """Properties of the beam elements, each of shape (n_beams,)."""
+
+    EA: FloatArray
+    EI: FloatArray
+    GJ: FloatArray
+    mass: FloatArray
+    gyration: FloatArray
+    tension: FloatArray
+    alpha: FloatArray
+    beta: FloatArray
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """Matrices of the line's beams, droppers excluded, over all degrees of freedom (fixed ones too).
+
+    Attributes
+    ----------
+    K, M, C : sparse, shape (6 n, 6 n)
+        Stiffness, mass (with clamps and droppers) and damping.
+    load : ndarray, shape (6 n,)
+        Gravity, line tensioning, and what keeps the kinks of the reference points from being stress-free.
+    """
+
+    K: sp.csc_matrix
+    M: sp.csc_matrix
+    C: sp.csc_matrix
+    load: FloatArray
+
+
+def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamProperties:
+    """Return the properties of every beam element by its component type."""
+    table = np.array([_component(definition, name) for name in COMPONENTS])
+    return BeamProperties(*table[mesh.component].T.copy())
+
+
+def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> Matrices:
+    """Assemble the line's matrices and static loads about the reference positions ``points``.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Reference positions [m].
+    """
+    properties = beam_properties(definition, mesh)
+    start, end = mesh.beams.T
+    axes, length = frames(points[start], points[end])
+    K_local = beam_stiffness(properties.EA, properties.GJ, properties.EI, length)
+    K_local += beam_geometric_stiffness(properties.tension, length)
+    K_e = to_global(K_local, axes)
+    M_e = to_global(beam_mass(properties.mass, properties.gyration, length), axes)
+    C_e = properties.alpha[:, None, None] * K_e + properties.beta[:, None, None] * M_e
+    dofs = element_dofs(mesh.beams)
+    size = NODE_DOFS * len(points)
+    M = _assembled(M_e, dofs, size) + _lumped(definition, mesh, points)
+    load = _gravity(M) + _tensioning(mesh, axes, properties.tension, size)
+    load += _kinks(K_e, axes, dofs, properties.tension > 0.0, size)
+    C = _assembled(C_e, dofs, size) + _dropper_mass_damping(definition, mesh, points)
+    return Matrices(_assembled(K_e, dofs, size), M, C, load)
+
+
+def element_dofs(nodes: IntArray) -> IntArray:
+    """Return the degrees of freedom of elements of two nodes, shape (n, 12)."""
+    return (nodes[:, :, None] * NODE_DOFS + np.arange(NODE_DOFS)).reshape(len(nodes), 2 * NODE_DOFS)
+
+
+def dropper_rows(mesh: CatenaryMesh, points: FloatArray) -> sp.csr_matrix:
+    """Return the rows b with elongation of dropper j = b_j . d, shape (n_droppers, 6 n)."""
+    lower, upper = mesh.droppers.T
+    direction = points[upper] - points[lower]
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    n = len(mesh.droppers)
+    axes = np.arange(3)
+    columns = np.hstack([lower[:, None] * NODE_DOFS + axes, upper[:, None] * NODE_DOFS + axes])
+    values = np.hstack([-direction, direction])
+    rows = np.repeat(np.arange(n), 6)
+    return sp.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(n, NODE_DOFS * len(points)))
+
+
+def dropper_lengths(mesh: CatenaryMesh, points: FloatArray) -> FloatArray:
+    """Return the distance between the ends of every dropper [m]."""
+    lower, upper = mesh.droppers.T
+    return np.linalg.norm(points[upper] - points[lower], axis=1)
+
+
+def dropper_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> FloatArray:
+    """Return the axial stiffness of every dropper, as given or EA/L [N/m]."""
+    length = dropper_lengths(mesh, points)
+    result = _stiffness(definition.dropper, length)
+    if definition.hanger is not None:
+        result[mesh.is_hanger] = _stiffness(definition.hanger, length)[mesh.is_hanger]
+    return result
+
+
+def _stiffness(dropper: Dropper, length: FloatArray) -> FloatArray:
+    if dropper.stiffness is not None:
+        return np.full_like(length, dropper.stiffness)
+    assert dropper.area is not None
+    assert dropper.youngs_modulus is not None
+    return dropper.youngs_modulus * dropper.area / length
+
+
+def _component(definition: CatenaryDefinition, name: str) -> list[float]:
+    """Return EA, EI, GJ, mass, J/A, tension, alpha, beta of a component type; zeros where the line has none."""
+    item = getattr(definition, name)
+    if item is None or name == "dropper":
+        return [0.0] * 8
+    rayleigh = definition.damping.of(name)
+    inertia = item.area**2 / (4.0 * np.pi)
+    EA = item.youngs_modulus * item.area
+    EI = getattr(item, "EI", item.youngs_modulus * inertia)
+    GJ = item.youngs_modulus / SHEAR_RATIO * 2.0 * inertia
+    tension = getattr(item, "tension", 0.0)
+    return [EA, EI, GJ, item.mass, 2.0 * inertia / item.area, tension, rayleigh.alpha, rayleigh.beta]
+
+
+def _assembled(matrices: FloatArray, dofs: IntArray, size: int) -> sp.csc_matrix:
+    rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
+    columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
+    return sp.csc_matrix((matrices.ravel(), (rows, columns)), shape=(size, size))
+
+
+def _lumped(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
+    """Mass of clamps and droppers, on the translations."""
+    size = NODE_DOFS * len(points)
+    diagonal = np.zeros((len(points), NODE_DOFS))
+    diagonal[:, :3] = mesh.clamp_mass[:, None]
+    return sp.diags(diagonal.ravel(), format="csc") + _dropper_mass(definition, mesh, points, size)
+
+
+def _dropper_mass(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, size: int) -> sp.csc_matrix:
+    """Consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions."""
+    per_length = np.full(len(mesh.droppers), definition.dropper.mass)
+    if definition.hanger is not None:
+        per_length[mesh.is_hanger] = definition.hanger.mass
+    mass = per_length * dropper_lengths(mesh, points)
+    pattern = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
+    dofs = (mesh.droppers[:, :, None] * NODE_DOFS + np.arange(3)).reshape(len(mass), 6)
+    return _assembled(mass[:, None, None] * pattern, dofs, size)
+
+
+def _dropper_mass_damping(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
+    """Return beta M of droppers and clamps (what is proportional to the droppers' stiffness is added with it)."""
+    return definition.damping.of("dropper").beta * _lumped(definition, mesh, points)
+
+
+def _gravity(M: sp.csc_matrix) -> FloatArray:
+    """Return the weights: the consistent mass times a uniform acceleration field."""
+    field = np.zeros((M.shape[0] // NODE_DOFS, NODE_DOFS))
+    field[:, 2] = -GRAVITY
+    return np.asarray(M @ field.ravel())
+
+
+def _tensioning(mesh: CatenaryMesh, axes: FloatArray, tension: FloatArray, size: int) -> FloatArray:
+    """Return the constant tension of every wire element, pulling its two nodes together [2.9]."""
+    load = np.zeros((size // NODE_DOFS, NODE_DOFS))
+    pull = tension[:, None] * axes[:, 0, :]
+    np.add.at(load[:, :3], mesh.beams[:, 0], pull)
+    np.add.at(load[:, :3], mesh.beams[:, 1], -pull)
+    return load.ravel()
+
+
+def _kinks(K_e: FloatArray, axes: FloatArray, dofs: IntArray, is_wire: np.ndarray, size: int) -> FloatArray:
+    """Return the load that makes rotations count from a straight wire, not from the chords of the mesh.
+
+    Without it the polygon through the reference points would be the wire's unbent shape.
+    """
+    rotation = np.zeros((len(axes), 12))
+    along = axes[:, 0, :]
+    for first in (3, 9):
+        rotation[:, first + 1] = -along[:, 2]
+        rotation[:, first + 2] = along[:, 1]
+    rotation[~is_wire] = 0.0
+    load = np.zeros(size)
+    np.add.at(load, dofs, np.einsum("nij,nj->ni", K_e, rotation))
+    return load

@@ -1,0 +1,274 @@
+"""Slack droppers and contacts: the few unknowns of a step that are not linear.
+
+The response of the line to dropper and contact forces is linear, so a step is one free solution of the whole line and
+then a small problem in the forces alone [1]_: with e the droppers' elastic force, f what a slack dropper must add
+to it, delta the penetrations and F the contact forces,
+
+    e = e_free - A_dd f + A_dc F,          f = max(0, -(1 - r) e),
+    delta = delta_free - A_cc F + A_cd f,  F = law(delta, delta').
+
+It is solved by Newton's method on these max-functions: each iteration is exact for its set of slack droppers and
+closed contacts, so it ends when the set repeats.
+
+References
+----------
+.. [1] P. Antunes, Co-simulation methods for multidisciplinary problems in railway dynamics (2012), equation 2.11
+   and figure 2.12, whose fixed-point iteration converges to the same solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.catenary.compliance import Columns
+from models.contact import ContactLaw, ContactParameters, NormalForce
+from models.part import FloatArray, IntArray
+
+_MAX_ITERATIONS = 60
+
+
+class LocalSolutionError(RuntimeError):
+    """Slack and contact forces of a step were not found."""
+
+
+@dataclass(frozen=True)
+class OpenContact:
+    """A strip over a wire before the contact force acts.
+
+    Attributes
+    ----------
+    pantograph, section : int
+    penetration, velocity : float
+        At the end of the step without contact force [m, m/s].
+    impact_velocity : float
+        delta'(-) of a contact that is closed already; 0 otherwise.
+    load : ndarray, shape (m,)
+        What a unit contact force does at the element's degrees of freedom ``dofs``.
+    weights : ndarray, shape (4,)
+        Powers of xi: the response is ``columns @ weights``.
+    columns : Columns
+        Response of the line to the element's four shape polynomials.
+    """
+
+    pantograph: int
+    section: int
+    penetration: float
+    velocity: float
+    impact_velocity: float
+    dofs: IntArray
+    load: FloatArray
+    weights: FloatArray
+    columns: Columns
+
+
+@dataclass(frozen=True)
+class LocalForces:
+    """Solution of the local problem.
+
+    Attributes
+    ----------
+    contact : ndarray, shape (n_contacts,)
+        Contact forces [N].
+    penetration_velocity : ndarray, shape (n_contacts,)
+        delta' at the end of the step [m/s].
+    closed : ndarray, shape (n_contacts,)
+        Whether there is penetration.
+    slack : ndarray, shape (n_slack,)
+        Indices of slack droppers.
+    compensation : ndarray, shape (n_slack,)
+        Their forces f [N].
+    dropper_force : ndarray, shape (n_droppers,)
+        Elastic force of every dropper, before compensation [N].
+    """
+
+    contact: FloatArray
+    penetration_velocity: FloatArray
+    closed: np.ndarray
+    slack: IntArray
+    compensation: FloatArray
+    dropper_force: FloatArray
+
+
+@dataclass(frozen=True)
+class LocalProblem:
+    """The parts of the local problem that do not change from step to step.
+
+    Attributes
+    ----------
+    measure : ndarray, shape (n_droppers,)
+        Dropper force per elongation [N/m].
+    unilateral : float
+        1 - r, with r the droppers' stiffness ratio in compression.
+    dropper_columns : sequence of Columns
+        Response of the line to a unit force in each dropper.
+    velocity_factor : float
+        d(velocity)/d(displacement) of the time integration, a1 [1/s].
+    """
+
+    measure: FloatArray
+    unilateral: float
+    dropper_columns: Sequence[Columns]
+    velocity_factor: float
+    law: ContactLaw
+    parameters: ContactParameters
+
+    def solve(
+        self,
+        free_force: FloatArray,
+        contacts: Sequence[OpenContact],
+        strip_compliance: FloatArray,
+        slack: IntArray,
+    ) -> LocalForces:
+        """Find slack and contact forces of a step.
+
+        Parameters
+        ----------
+        free_force : ndarray, shape (n_droppers,)
+            Elastic dropper forces of the free solution [N].
+        contacts : sequence of OpenContact
+        strip_compliance : ndarray, shape (n_contacts, n_contacts)
+            Retreat of the strips per contact force within the step [m/N]; zero for prescribed strips.
+        slack : ndarray of int
+            Droppers that were slack at the last step, as a start.
+
+        Raises
+        ------
+        LocalSolutionError
+            If the iteration does not end.
+        """
+        if not contacts and not slack.size and free_force.min(initial=0.0) >= 0.0:
+            return _nothing(free_force)
+        coupling = _Coupling(self, contacts, strip_compliance)
+        forces = np.array([_estimate(self, c) for c in contacts])
+        compensation = np.zeros(slack.size)
+        previous: tuple[bytes, bytes] | None = None
+        for _ in range(_MAX_ITERATIONS):
+            laws = coupling.laws(forces, slack, compensation)
+            new_forces, compensation = coupling.newton_step(free_force, laws, forces, slack, compensation)
+            change = np.abs(new_forces - forces).max(initial=0.0)
+            forces = new_forces
+            elastic = coupling.dropper_force(free_force, forces, slack, compensation)
+            penetration, velocity = coupling.penetration(forces, slack, compensation)
+            now_slack = np.flatnonzero(elastic < 0.0)
+            signature = (now_slack.tobytes(), (penetration > 0.0).tobytes())
+            if signature == previous and np.array_equal(now_slack, slack) and change <= 1e-10 * (1.0 + forces.max(initial=0.0)):
+                return LocalForces(forces, velocity, penetration > 0.0, slack, compensation, elastic)
+            previous = signature
+            compensation = _carried(now_slack, slack, compensation)
+            slack = now_slack
+        raise LocalSolutionError(
+            f"slack and contact forces have not settled after {_MAX_ITERATIONS} iterations "
+            f"({slack.size} slack droppers, {len(contacts)} contacts); use a smaller time step"
+        )
+
+
+class _Coupling:
+    """Compliances between the contacts and the droppers of one step."""
+
+    def __init__(self, problem: LocalProblem, contacts: Sequence[OpenContact], strip_compliance: FloatArray) -> None:
+        self.problem, self.contacts = problem, contacts
+        n = len(contacts)
+        self.contact_contact = strip_compliance.copy()
+        self.dropper_contact = np.zeros((problem.measure.size, n))
+        for j, source in enumerate(contacts):
+            index = source.columns.dropper_index
+            self.dropper_contact[index, j] = problem.measure[index] * (source.columns.dropper_stretch @ source.weights)
+            for i, target in enumerate(contacts):
+                response = source.columns.at(target.dofs) @ source.weights
+                self.contact_contact[i, j] += target.load @ response
+
+    def dropper_dropper(self, rows: IntArray, columns: IntArray) -> FloatArray:
+        """Return the compliance of droppers by slack droppers, d(-e)/df, shape (rows, columns)."""
+        result = np.zeros((self.problem.measure.size, columns.size))
+        for k, j in enumerate(columns):
+            column = self.problem.dropper_columns[j]
+            result[column.dropper_index, k] = column.dropper_stretch[:, 0]
+        return (self.problem.measure[:, None] * result)[rows]
+
+    def contact_dropper(self, slack: IntArray) -> FloatArray:
+        """Return d(delta)/df, shape (n_contacts, n_slack)."""
+        result = np.zeros((len(self.contacts), slack.size))
+        for i, contact in enumerate(self.contacts):
+            for k, j in enumerate(slack):
+                result[i, k] = contact.load @ self.problem.dropper_columns[j].at(contact.dofs)[:, 0]
+        return result
+
+    def penetration(self, forces: FloatArray, slack: IntArray, compensation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return penetrations and their velocities under given forces."""
+        change = -self.contact_contact @ forces
+        if slack.size and len(self.contacts):
+            change += self.contact_dropper(slack) @ compensation
+        free = np.array([c.penetration for c in self.contacts])
+        free_velocity = np.array([c.velocity for c in self.contacts])
+        return free + change, free_velocity + self.problem.velocity_factor * change
+
+    def dropper_force(
+        self, free: FloatArray, forces: FloatArray, slack: IntArray, compensation: FloatArray
+    ) -> FloatArray:
+        """Return the elastic dropper forces under given forces."""
+        result = free + self.dropper_contact @ forces
+        if slack.size:
+            result -= self.dropper_dropper(np.arange(free.size), slack) @ compensation
+        return result
+
+    def laws(self, forces: FloatArray, slack: IntArray, compensation: FloatArray) -> list[NormalForce]:
+        """Return the contact law and its slopes at the present penetrations."""
+        penetration, velocity = self.penetration(forces, slack, compensation)
+        return [
+            self.problem.law(float(d), float(v), c.impact_velocity or max(float(v), 0.0), self.problem.parameters)
+            for d, v, c in zip(penetration, velocity, self.contacts, strict=True)
+        ]
+
+    def newton_step(
+        self,
+        free: FloatArray,
+        laws: Sequence[NormalForce],
+        forces: FloatArray,
+        slack: IntArray,
+        compensation: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Solve the problem linearised at the present forces, for the present set of slack droppers.
+
+        Contacts: F - slope (delta(F, f) - delta) = law; droppers of the set: f + (1 - r) e(F, f) = 0.
+        """
+        n, m = len(forces), slack.size
+        system = np.eye(n + m)
+        right = np.zeros(n + m)
+        slope = np.array([a.by_penetration + self.problem.velocity_factor * a.by_velocity for a in laws])
+        if n:
+            by_contact = -self.contact_contact
+            by_slack = self.contact_dropper(slack)
+            system[:n, :n] -= slope[:, None] * by_contact
+            system[:n, n:] -= slope[:, None] * by_slack
+            value = np.array([a.force for a in laws])
+            right[:n] = value - slope * (by_contact @ forces + by_slack @ compensation)
+        if m:
+            share = self.problem.unilateral
+            system[n:, :n] += share * self.dropper_contact[slack]
+            system[n:, n:] -= share * self.dropper_dropper(slack, slack)
+            right[n:] = -share * free[slack]
+        solution = np.linalg.solve(system, right) if n + m else right
+        return solution[:n], solution[n:]
+
+
+def _estimate(problem: LocalProblem, contact: OpenContact) -> float:
+    """Return a first guess of a contact force: the law's secant over the free penetration."""
+    impact = contact.impact_velocity or max(contact.velocity, 0.0)
+    law = problem.law(contact.penetration, contact.velocity, impact, problem.parameters)
+    local = float(contact.load @ contact.columns.at(contact.dofs) @ contact.weights)
+    return law.force / (1.0 + law.by_penetration * local)
+
+
+def _carried(now: IntArray, before: IntArray, compensation: FloatArray) -> FloatArray:
+    """Return the compensation forces for a changed set, zero for those that are new."""
+    known = dict(zip(before.tolist(), compensation.tolist(), strict=True))
+    return np.array([known.get(j, 0.0) for j in now.tolist()])
+
+
+def _nothing(free_force: FloatArray) -> LocalForces:
+    empty = np.zeros(0)
+    none = np.zeros(0, dtype=np.int64)
+    return LocalForces(empty, empty, np.zeros(0, dtype=bool), none, empty, free_force)

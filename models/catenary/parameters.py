@@ -1,0 +1,491 @@
+"""Definition of an overhead contact line, as read from its file: SI, checked, frozen.
+
+A line has one or more *sections*, mechanically independent wires; each section has supports, spans and droppers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+from models import schema
+from models.definition import Quantity, Table
+from models.part import Parameter
+from models.schema import count, quantity
+
+LineType = Literal["simple", "stitched", "compound"]
+LINE_TYPES: tuple[LineType, ...] = ("simple", "stitched", "compound")
+GRAVITY = 9.81
+#: Poisson ratio 0.3: G = E / 2.6 (round solid section).
+SHEAR_RATIO = 2.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wire:
+    """A tensioned wire of round section."""
+
+    area: float = quantity("m2", "cross-section", positive=True)
+    mass: float = quantity("kg/m", "mass per length", positive=True)
+    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True)
+    tension: float = quantity("N", "tension", positive=True)
+    bending_stiffness: float | None = quantity("N.m2", "bending stiffness EI", default=None, minimum=0.0)
+
+    @property
+    def EI(self) -> float:
+        """Bending stiffness: as given, or of a solid round section, I = A^2 / (4 pi)."""
+        if self.bending_stiffness is not None:
+            return self.bending_stiffness
+        return self.youngs_modulus * self.area**2 / (4.0 * math.pi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StitchWire(Wire):
+    """A wire hung from the messenger wire on both sides of a support."""
+
+    length: float = quantity("m", "length, centred on the support", default=18.0, positive=True, tunable=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dropper:
+    """A dropper: carries tension only."""
+
+    stiffness: float | None = quantity("N/m", "axial stiffness (instead of EA/L)", default=None, minimum=1.0)
+    area: float | None = quantity("m2", "cross-section", default=None, minimum=1e-9)
+    youngs_modulus: float | None = quantity("Pa", "Young's modulus", default=None, minimum=1.0)
+    mass: float = quantity("kg/m", "mass per length", minimum=0.0)
+    compression_ratio: float = quantity(
+        "1", "stiffness in compression over that in tension", default=0.0, minimum=0.0, maximum=1.0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyArm:
+    """A steady arm: pinned at its registration end, clamped to the contact wire."""
+
+    area: float = quantity("m2", "cross-section", positive=True)
+    mass: float = quantity("kg/m", "mass per length", minimum=0.0)
+    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True)
+    length: float = quantity("m", "length", positive=True)
+    angle: float = quantity(
+        "rad", "angle to the horizontal, from the registration end; negative: falls towards the wire",
+        minimum=-1.2, maximum=1.2,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clamps:
+    """Lumped masses on the wires."""
+
+    dropper_upper: float = quantity("kg", "claw of a dropper on the wire above", default=0.0, minimum=0.0)
+    dropper_lower: float = quantity("kg", "claw of a dropper on the wire below", default=0.0, minimum=0.0)
+    steady_arm: float = quantity("kg", "clamp of a steady arm", default=0.0, minimum=0.0)
+    stitch_wire: float = quantity("kg", "clamp of a stitch wire on the messenger wire", default=0.0, minimum=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MessengerSupport:
+    """Vertical spring-damper under the messenger wire at a support; rigid roller without it."""
+
+    stiffness: float = quantity("N/m", "vertical stiffness of a support", positive=True)
+    damping: float = quantity("N.s/m", "vertical damping of a support", default=0.0, minimum=0.0)
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Damping C = alpha K + beta M of a component."""
+
+    alpha: float = quantity("s", "damping: factor of the stiffness matrix", minimum=0.0)
+    beta: float = quantity("1/s", "damping: factor of the mass matrix", minimum=0.0)
+
+
+#: Component types, each with its own stiffness, mass and damping.
+COMPONENTS = ("contact_wire", "messenger_wire", "stitch_wire", "auxiliary_wire", "steady_arm", "dropper")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damping:
+    """Damping C = alpha K + beta M, of the whole line or of a component type where it has its own."""
+
+    alpha: float = quantity("s", "damping: factor of the stiffness matrix", minimum=0.0)
+    beta: float = quantity("1/s", "damping: factor of the mass matrix", minimum=0.0)
+    contact_wire: Rayleigh | None = None
+    messenger_wire: Rayleigh | None = None
+    stitch_wire: Rayleigh | None = None
+    auxiliary_wire: Rayleigh | None = None
+    steady_arm: Rayleigh | None = None
+    dropper: Rayleigh | None = None
+
+    def of(self, component: str) -> Rayleigh:
+        """Return the damping of one of ``COMPONENTS``."""
+        own: Rayleigh | None = getattr(self, component)
+        return own if own is not None else Rayleigh(self.alpha, self.beta)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """Contact of collector strip and contact wire."""
+
+    stiffness: float = quantity("N/m", "contact stiffness (N/m^n for an exponent n)", default=20000.0, positive=True)
+    exponent: float = quantity("1", "exponent n of the penetration", default=1.0, minimum=1.0, maximum=3.0)
+    restitution: float = quantity("1", "coefficient of restitution", default=1.0, minimum=0.0, maximum=1.0)
+    wire_radius: float = quantity("m", "radius of the contact wire", default=0.0, minimum=0.0)
+    strip_radius: float = quantity("m", "radius of the collector strip", default=0.0, minimum=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """Fineness of the mesh."""
+
+    elements_between_droppers: int = count(
+        "elements of contact and messenger wire between neighbouring droppers", default=6, minimum=1, maximum=64
+    )
+
+
+@dataclass(frozen=True)
+class Span:
+    """A span: where it begins and ends, its droppers, and in a compound line the hangers of its auxiliary wire."""
+
+    start: float
+    end: float
+    droppers: tuple[float, ...]
+    hangers: tuple[float, ...] = ()
+
+    @property
+    def length(self) -> float:
+        """Distance between the supports [m]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class Support:
+    """A support of the messenger wire; with a steady arm where the contact wire is registered."""
+
+    x: float
+    stagger: float
+    has_steady_arm: bool
+
+
+@dataclass(frozen=True)
+class EndSpans:
+    """The wires' rise to their anchors: parabolas outside the registered part of the line.
+
+    Attributes
+    ----------
+    anchors, working : (float, float)
+        Where the wires end, and where they leave the working height [m].
+    rise : float
+        Height of the contact wire above its working height at the anchors [m].
+    """
+
+    anchors: tuple[float, float]
+    working: tuple[float, float]
+    rise: float
+
+    def rise_at(self, x: float) -> float:
+        """Return the height above the working height at ``x`` [m]."""
+        (start, end), (first, last) = self.anchors, self.working
+        if x < first:
+            return self.rise * ((first - x) / (first - start)) ** 2
+        if x > last:
+            return self.rise * ((x - last) / (end - last)) ** 2
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Section:
+    """One mechanically independent set of wires.
+
+    Attributes
+    ----------
+    supports : tuple of Support
+        From anchor to anchor; the first and last are the anchors of the wires.
+    spans : tuple of Span
+    ends : EndSpans
+        Where the wires rise to their anchors.
+    measured : tuple of (x, z) or empty
+        Wanted heights of the contact wire instead of nominal height minus pre-sag.
+    """
+
+    supports: tuple[Support, ...]
+    spans: tuple[Span, ...]
+    ends: EndSpans
+    measured: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """Static heights of the wires."""
+
+    contact_wire_height: float = quantity("m", "height of the contact wire at the supports", positive=True)
+    encumbrance: float = quantity("m", "messenger wire above contact wire at the supports", positive=True)
+    pre_sag: float = quantity("1", "sag of the contact wire over the span length", default=0.0, minimum=-0.01, maximum=0.01)
+    auxiliary_height: float | None = quantity(
+        "m", "auxiliary wire above the contact wire", default=None, minimum=0.01
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CatenaryDefinition:
+    """An overhead contact line.
+
+    Attributes
+    ----------
+    name : str
+    type : {"simple", "stitched", "compound"}
+    pre_sag_between : {"supports", "droppers"}
+        Whether the pre-sag parabola begins at the supports or at the first and last dropper of the span.
+    time_step : float
+        Longest internal step [s].
+    provenance : mapping
+        Dotted key -> quantity as written in the file.
+    """
+
+    name: str
+    title: str
+    type: LineType
+    profile: Profile
+    contact_wire: Wire
+    messenger_wire: Wire
+    dropper: Dropper
+    clamps: Clamps
+    damping: Damping
+    contact: Contact
+    mesh: Mesh
+    sections: tuple[Section, ...]
+    stitch_wire: StitchWire | None = None
+    auxiliary_wire: Wire | None = None
+    hanger: Dropper | None = None
+    steady_arm: SteadyArm | None = None
+    messenger_support: MessengerSupport | None = None
+    pre_sag_between: str = "supports"
+    extrapolation_order: int = count(
+        "order of the extrapolation of the strip inside a step: 0 held, 1 velocity, 2 acceleration",
+        default=2, minimum=0, maximum=2,
+    )  # fmt: skip
+    time_step: float = quantity("s", "longest internal time step", default=1e-3, positive=True, maximum=0.1)
+    provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return every tunable number of the line."""
+        return tuple(schema.parameters(self, self.provenance))
+
+    def with_values(self, values: Mapping[str, float]) -> CatenaryDefinition:
+        """Return a copy with some parameters changed.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown or a value out of its range.
+        """
+        return schema.with_values(self, values)
+
+
+def load(path: Path) -> CatenaryDefinition:
+    """Read a line's definition file.
+
+    Raises
+    ------
+    DefinitionError
+        With every mistake found in the file.
+    """
+    return read(Table.load(path))
+
+
+def read(table: Table) -> CatenaryDefinition:
+    """Read a line's definition from a parsed table; raises ``DefinitionError``."""
+    line_type = table.text("type", choices=LINE_TYPES)
+    stitch = table.table("stitch_wire")
+    auxiliary = table.table("auxiliary_wire")
+    arm = table.table("steady_arm")
+    support = table.table("messenger_support")
+    hanger = table.table("hanger")
+    profile_table = table.required_table("profile")
+    profile = schema.read(Profile, profile_table)
+    sections = (_read_section(table, has_arms=arm is not None, has_hangers=line_type == "compound"),)
+    _check_type(table, line_type, stitch, auxiliary, profile)
+    definition = CatenaryDefinition(
+        name=table.text("name"),
+        title=table.text("title", default=""),
+        type=line_type,  # type: ignore[arg-type]
+        profile=profile,
+        contact_wire=schema.read(Wire, table.required_table("contact_wire")),
+        messenger_wire=schema.read(Wire, table.required_table("messenger_wire")),
+        dropper=_read_dropper(table.required_table("dropper")),
+        clamps=schema.read(Clamps, table.table("clamps") or Table.from_dict({})),
+        damping=_read_damping(table.required_table("damping")),
+        contact=schema.read(Contact, table.table("contact") or Table.from_dict({})),
+        mesh=schema.read(Mesh, table.table("mesh") or Table.from_dict({})),
+        sections=sections,
+        stitch_wire=schema.read(StitchWire, stitch) if stitch is not None else None,
+        auxiliary_wire=schema.read(Wire, auxiliary) if auxiliary is not None else None,
+        hanger=_read_dropper(hanger) if hanger is not None else None,
+        steady_arm=schema.read(SteadyArm, arm) if arm is not None else None,
+        messenger_support=schema.read(MessengerSupport, support) if support is not None else None,
+        pre_sag_between=profile_table.text("pre_sag_between", default="supports", choices=("supports", "droppers")),
+        time_step=table.quantity("time_step", "s", default=1e-3, positive=True, maximum=0.1),
+        provenance=table.provenance,
+    )
+    table.finish()
+    return definition
+
+
+def _check_type(
+    table: Table, line_type: str, stitch: Table | None, auxiliary: Table | None, profile: Profile
+) -> None:
+    if (line_type == "stitched") != (stitch is not None):
+        table.problem("stitch_wire", "a table [stitch_wire] is needed for type 'stitched', and only for it")
+    if (line_type == "compound") != (auxiliary is not None):
+        table.problem("auxiliary_wire", "a table [auxiliary_wire] is needed for type 'compound', and only for it")
+    if (line_type == "compound") != table.has("hanger"):
+        table.problem("hanger", "a table [hanger] is needed for type 'compound', and only for it")
+    if (line_type == "compound") != (profile.auxiliary_height is not None):
+        table.problem("profile.auxiliary_height", "is needed for type 'compound', and only for it")
+
+
+def _read_dropper(table: Table) -> Dropper:
+    dropper = schema.read(Dropper, table)
+    if dropper.stiffness is None and (dropper.area is None or dropper.youngs_modulus is None):
+        table.problem("stiffness", "give either stiffness, or area and youngs_modulus")
+    return dropper
+
+
+def _read_damping(table: Table) -> Damping:
+    own = {name: table.table(name) for name in COMPONENTS}
+    return Damping(
+        alpha=table.quantity("alpha", "s", minimum=0.0),
+        beta=table.quantity("beta", "1/s", minimum=0.0),
+        **{name: schema.read(Rayleigh, t) for name, t in own.items() if t is not None},
+    )
+
+
+def _read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
+    spans_table = table.required_table("spans")
+    boundaries = _read_boundaries(spans_table)
+    droppers = _read_droppers(spans_table, boundaries, "droppers", "listed")
+    hangers = [()] * len(droppers) if not has_hangers else _read_droppers(spans_table, boundaries, "hangers", "listed_hangers")
+    free, ends = _read_ends(table.required_table("ends"), boundaries)
+    supports = _read_supports(table, boundaries, free, has_arms=has_arms)
+    spans = tuple(Span(a, b, d, h) for (a, b), d, h in zip(pairwise(boundaries), droppers, hangers, strict=True))
+    return Section(supports, spans, ends, _read_measured(table, boundaries))
+
+
+def _read_boundaries(table: Table) -> list[float]:
+    start = table.quantity("start", "m")
+    if table.has("length"):
+        length = table.quantity("length", "m", positive=True)
+        lengths = [length] * table.integer("count", minimum=1, maximum=10000)
+    else:
+        lengths = list(table.quantities("lengths", "m", positive=True))
+        if not lengths:
+            table.problem("lengths", "gives no span")
+    boundaries = [start]
+    for length in lengths:
+        boundaries.append(round(boundaries[-1] + length, 9))
+    if table.has("end"):
+        end = table.quantity("end", "m")
+        if abs(end - boundaries[-1]) > 1e-6:
+            table.problem("end", f"the spans do not add up: they end at {boundaries[-1]:g} m, not at {end:g} m")
+    return boundaries
+
+
+def _read_droppers(
+    table: Table, boundaries: Sequence[float], rule_name: str, list_name: str
+) -> list[tuple[float, ...]]:
+    rule = table.table(rule_name)
+    listed = {}
+    for entry in table.tables(list_name):
+        index = entry.integer("span", minimum=1, maximum=len(boundaries) - 1)
+        listed[index] = (entry, entry.quantities("positions", "m"))
+    if rule is None and len(listed) < len(boundaries) - 1:
+        table.problem(rule_name, f"a table [{table.key(rule_name)}] is missing, and not every span lists its own")
+    result = []
+    for index, (a, b) in enumerate(pairwise(boundaries), 1):
+        if index in listed:
+            entry, offsets = listed[index]
+        else:
+            entry, offsets = rule, (_dropper_rule(rule, b - a) if rule is not None else ())
+        _check_droppers(entry or table, index, b - a, offsets)
+        result.append(tuple(a + x for x in offsets))
+    return result
+
+
+def _dropper_rule(table: Table, length: float) -> tuple[float, ...]:
+    first = table.quantity("first", "m", positive=True)
+    if table.has("spacing"):
+        spacing = table.quantity("spacing", "m", positive=True)
+        gaps = (length - 2.0 * first) / spacing
+        if not math.isfinite(gaps) or gaps < 0.0 or abs(gaps - round(gaps)) > 1e-6:
+            table.problem("spacing", f"droppers from {first:g} m every {spacing:g} m do not fit a span of {length:g} m")
+            return ()
+        number = round(gaps) + 1
+    else:
+        number = table.integer("count", minimum=2, maximum=1000)
+        spacing = (length - 2.0 * first) / (number - 1)
+    return tuple(first + i * spacing for i in range(number))
+
+
+def _check_droppers(table: Table, index: int, length: float, offsets: Sequence[float]) -> None:
+    if any(not 0.0 < x < length for x in offsets if math.isfinite(x)):
+        outside = [f"{x:g}" for x in offsets if not 0.0 < x < length]
+        table.problem("", f"span {index} of {length:g} m: dropper at {', '.join(outside)} m lies outside it")
+    elif any(b <= a for a, b in pairwise(offsets)):
+        table.problem("", f"span {index}: droppers are not in rising order")
+
+
+def _read_ends(table: Table, boundaries: Sequence[float]) -> tuple[int, EndSpans]:
+    """Return how many spans at each end are unregistered, and the wires' rise over them."""
+    free = table.integer("spans", default=0, minimum=0, maximum=max(0, (len(boundaries) - 2) // 2))
+    rise = table.quantity("rise", "m", default=0.0, minimum=0.0, maximum=5.0)
+    last = len(boundaries) - 1
+    return free, EndSpans((boundaries[0], boundaries[-1]), (boundaries[free], boundaries[last - free]), rise)
+
+
+def _read_supports(table: Table, boundaries: Sequence[float], free: int, *, has_arms: bool) -> tuple[Support, ...]:
+    """Supports with their stagger: alternating at registered supports, straight on to the anchors."""
+    last = len(boundaries) - 1
+    registered = [max(free, 1) <= i <= last - max(free, 1) for i in range(last + 1)]
+    staggers = _read_stagger(table.required_table("stagger"), boundaries, registered)
+    return tuple(
+        Support(x, y, has_steady_arm=has_arms and ok)
+        for x, y, ok in zip(boundaries, staggers, registered, strict=True)
+    )
+
+
+def _read_stagger(table: Table, boundaries: Sequence[float], registered: Sequence[bool]) -> list[float]:
+    inner = [i for i, ok in enumerate(registered) if ok]
+    if table.has("listed"):
+        listed = table.quantities("listed", "m", length=len(inner))
+        values = dict(zip(inner, listed, strict=False))
+    else:
+        amplitude = table.quantity("amplitude", "m", minimum=0.0, maximum=1.0)
+        values = {i: amplitude * (-1.0) ** n for n, i in enumerate(inner)}
+    anchors = table.quantity("anchor", "m", default=0.0)
+    known = {0: anchors, len(boundaries) - 1: anchors} | values
+    return [_straight(known, boundaries, i) for i in range(len(boundaries))]
+
+
+def _straight(known: Mapping[int, float], x: Sequence[float], i: int) -> float:
+    """Interpolate the wire's plan position between the supports that hold it."""
+    left = max(k for k in known if k <= i)
+    right = min(k for k in known if k >= i)
+    if left == right:
+        return known[left]
+    share = (x[i] - x[left]) / (x[right] - x[left])
+    return known[left] + share * (known[right] - known[left])
+
+
+def _read_measured(table: Table, boundaries: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    measured = table.table("measured")
+    if measured is None:
+        return ()
+    x = measured.quantities("positions", "m")
+    z = measured.quantities("heights", "m", length=len(x), positive=True)
+    if any(b <= a for a, b in pairwise(x)):
+        measured.problem("positions", "are not in rising order")
+    elif x and (x[0] > boundaries[0] or x[-1] < boundaries[-1]):
+        measured.problem("positions", f"must reach from {boundaries[0]:g} m to {boundaries[-1]:g} m")
+    return tuple(zip(x, z, strict=True))

@@ -1,0 +1,203 @@
+"""A line between communication points: strips in, contact forces out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.catenary.mesh import build_mesh
+from models.catenary.model import CatenaryModel, CatenaryState, ContactResult, StripMotion
+from models.catenary.parameters import CatenaryDefinition
+from models.extrapolation import StripExtrapolation
+from models.part import FloatArray, Snapshot
+from models.time_integration import steps_within
+
+
+@dataclass(frozen=True)
+class Site:
+    """A support or dropper: its name and place along the track [m]."""
+
+    name: str
+    x: float
+
+
+@dataclass(frozen=True)
+class LineGeometry:
+    """Static geometry of a line, arrays over its supports and its droppers [m].
+
+    Attributes
+    ----------
+    support_x, support_y, support_z : ndarray, shape (n_supports,)
+        Contact wire at the supports.
+    support_messenger_z : ndarray, shape (n_supports,)
+    dropper_x, dropper_lower_y, dropper_lower_z, dropper_upper_z : ndarray, shape (n_droppers,)
+    dropper_length : ndarray, shape (n_droppers,)
+        Unstrained length.
+    """
+
+    support_x: FloatArray
+    support_y: FloatArray
+    support_z: FloatArray
+    support_messenger_z: FloatArray
+    dropper_x: FloatArray
+    dropper_lower_y: FloatArray
+    dropper_lower_z: FloatArray
+    dropper_upper_z: FloatArray
+    dropper_length: FloatArray
+
+
+class CatenaryPart:
+    """An overhead contact line that is told where strips are and tells the contact forces.
+
+    Parameters
+    ----------
+    definition : CatenaryDefinition
+    pantographs : int
+        Number of pantograph ports.
+
+    Attributes
+    ----------
+    contact_force : ndarray, shape (P,)
+        Resultant force on the strip [N].
+    contact_point : ndarray, shape (P, 3)
+        Its point of application; without contact the place where the strip crosses the wire, or the strip's middle [m].
+    section_force : ndarray, shape (P, n_sections)
+        Force per wire [N].
+    support_uplift : ndarray, shape (n_supports,)
+        Rise of the contact wire at the supports [m].
+    """
+
+    def __init__(self, definition: CatenaryDefinition, pantographs: int = 1) -> None:
+        self.definition = definition
+        mesh = build_mesh(definition)
+        self.section_count = len(definition.sections)
+        self.supports = tuple(
+            Site(str(i), float(x)) for i, x in enumerate(mesh.points[mesh.support_nodes, 0], 1)
+        )
+        self.droppers = tuple(
+            Site(str(j), float(x)) for j, x in enumerate(mesh.points[mesh.droppers[:, 0], 0], 1)
+        )
+        self.time = 0.0
+        self.contact_force = np.zeros(pantographs)
+        self.contact_point = np.zeros((pantographs, 3))
+        self.section_force = np.zeros((pantographs, self.section_count))
+        self.support_uplift = np.zeros(len(self.supports))
+        self._strips = [StripExtrapolation(definition.extrapolation_order) for _ in range(pantographs)]
+        self._motion = StripMotion(np.zeros((pantographs, 2, 2, 3)), np.zeros(pantographs))
+        self._model: CatenaryModel | None = None
+        self._state: CatenaryState | None = None
+
+    @property
+    def model(self) -> CatenaryModel:
+        """Return the line, built (form finding, matrices) when first asked for.
+
+        Raises
+        ------
+        EquilibriumError
+            If the line has no static equilibrium of the wanted shape.
+        """
+        if self._model is None:
+            self._model = CatenaryModel(self.definition)
+        return self._model
+
+    @property
+    def state(self) -> CatenaryState:
+        """Return the line's state; at rest before the first initialisation."""
+        if self._state is None:
+            self._state = self.model.initial_state(len(self._strips))
+        return self._state
+
+    @property
+    def dropper_force(self) -> FloatArray:
+        """Return the tension of every dropper [N], shape (n_droppers,); 0 where slack."""
+        return self.model.dropper_force(self.state)
+
+    @property
+    def geometry(self) -> LineGeometry:
+        """Return the static geometry."""
+        mesh, static = self.model.mesh, self.model.static
+        support = static.positions[mesh.support_nodes]
+        lower, upper = (static.positions[mesh.droppers[:, k]] for k in (0, 1))
+        return LineGeometry(
+            *support.T.copy(),
+            static.positions[mesh.sprung, 2],
+            lower[:, 0].copy(),
+            lower[:, 1].copy(),
+            lower[:, 2].copy(),
+            upper[:, 2].copy(),
+            static.unstrained_length,
+        )
+
+    def initialise(self, time: float, strips: FloatArray) -> None:
+        """Put the line to rest at ``time`` and find the contacts of the strips with it.
+
+        Parameters
+        ----------
+        strips : ndarray, shape (P, 2, 2, 3)
+            Pantograph; end A, B; position, velocity; x, y, z.
+        """
+        self.time = time
+        self._state = self.model.initial_state(len(self._strips))
+        for extrapolation, strip in zip(self._strips, strips, strict=True):
+            extrapolation.start(time, strip)
+        self._publish(strips, self.model.contact_at_rest(self._state, strips))
+
+    def step(self, strips: FloatArray, step: float) -> None:
+        """Advance by ``step`` [s] under strips received for its beginning (or its end, if they have stepped already).
+
+        Parameters
+        ----------
+        strips : ndarray, shape (P, 2, 2, 3)
+        """
+        for extrapolation, strip in zip(self._strips, strips, strict=True):
+            extrapolation.receive(self.time, strip, step)
+        count = steps_within(step, self.definition.time_step)
+        start, h = self.time, step / count
+        motion = self._motion
+        for k in range(1, count + 1):
+            for extrapolation, strip in zip(self._strips, motion.strip, strict=True):
+                extrapolation.at(start + k * h, strip)
+            result = self.model.step(self.state, h, motion)
+        self.time = start + step
+        self._publish(motion.strip, result)
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state, bit for bit."""
+        result: Snapshot = {"time": np.array([self.time])}
+        result |= {f"line.{name}": value for name, value in self.state.snapshot().items()}
+        for p, extrapolation in enumerate(self._strips):
+            result |= {f"{p}.{name}": value for name, value in extrapolation.snapshot().items()}
+        outputs = ("contact_force", "contact_point", "section_force", "support_uplift")
+        return result | {name: getattr(self, name).copy() for name in outputs}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        self.time = float(snapshot["time"][0])
+        self.state.restore({n.removeprefix("line."): v for n, v in snapshot.items() if n.startswith("line.")})
+        for p, extrapolation in enumerate(self._strips):
+            extrapolation.restore({n.removeprefix(f"{p}."): v for n, v in snapshot.items() if n.startswith(f"{p}.")})
+        for name in ("contact_force", "contact_point", "section_force", "support_uplift"):
+            getattr(self, name)[...] = snapshot[name]
+
+    def _publish(self, strips: FloatArray, result: ContactResult) -> None:
+        self.section_force[...] = result.force
+        np.sum(result.force, axis=1, out=self.contact_force)
+        for p, strip in enumerate(strips):
+            self.contact_point[p] = _application(result.force[p], result.point[p], strip)
+        self.support_uplift[...] = self.model.uplift(self.state)
+
+
+def _application(force: FloatArray, point: FloatArray, strip: FloatArray) -> FloatArray:
+    """Return where the resultant of parallel forces acts."""
+    total = float(force.sum())
+    if total > 0.0:
+        touched = force > 0.0
+        result: FloatArray = force[touched] @ point[touched] / total
+        return result
+    crossed = np.flatnonzero(~np.isnan(point[:, 0]))
+    if crossed.size:
+        found: FloatArray = point[crossed[0]]
+        return found
+    middle: FloatArray = strip[:, 0].mean(axis=0)
+    return middle

@@ -1,0 +1,42 @@
+"""Command line of the physics: one module a verb, each with ``add(subparsers)`` and ``run(arguments)``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from models.catenary.equilibrium import EquilibriumError
+from models.catenary.local_response import LocalSolutionError
+from models.commands import couple
+from models.definition import DefinitionError
+from models.library import UnknownNameError
+from models.part import ParameterError
+
+_VERBS = (couple,)
+#: What a user can cause; everything else is a defect and keeps its traceback.
+_USER_ERRORS = (
+    DefinitionError,
+    EquilibriumError,
+    LocalSolutionError,
+    ParameterError,
+    UnknownNameError,
+    OSError,
+)
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run ``python -m models``; return 0, 1 (the run failed) or 2 (wrong command line or input)."""
+    parser = argparse.ArgumentParser(prog="python -m models", description="Physics of lines and pantographs.")
+    subparsers = parser.add_subparsers(dest="verb", required=True)
+    for verb in _VERBS:
+        verb.add(subparsers)
+    arguments = parser.parse_args(argv)
+    try:
+        return int(arguments.run(arguments))
+    except _USER_ERRORS as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2 if isinstance(error, (DefinitionError, UnknownNameError, ParameterError)) else 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 1

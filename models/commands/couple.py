@@ -1,0 +1,102 @@
+"""``python -m models couple LINE PANTOGRAPH``: the monolithic reference run."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from models.catenary.model import CatenaryModel
+from models.commands.options import add_settings, new_folder, print_table, settings
+from models.coupled import CoupledModel, CoupledRecord
+from models.library import load_line, load_pantograph
+from models.statistics import ContactFigures, contact_figures
+
+
+def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register the verb."""
+    parser = subparsers.add_parser(
+        "couple", help="run a lumped pantograph on a line as one system, without co-simulation"
+    )
+    parser.add_argument("line", help="name in the library, or a definition file")
+    parser.add_argument("pantograph", help="name in the library, or a definition file")
+    parser.add_argument("--speed", type=float, default=300.0, help="km/h (default 300)")
+    parser.add_argument("--start", type=float, default=None, help="where the pantograph is raised [m]")
+    parser.add_argument("--end", type=float, default=None, help="where the run ends [m]")
+    parser.add_argument(
+        "--interval", type=float, nargs=2, metavar=("FROM", "TO"), help="interval of interest [m]"
+    )
+    parser.add_argument("--step", type=float, default=1e-3, help="time step [s] (default 0.001)")
+    parser.add_argument("--out", type=Path, default=None, help="folder for timeseries.csv")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    add_settings(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run and print the contact-force figures."""
+    definition = load_line(arguments.line).with_values(settings(arguments.set, "line"))
+    line = CatenaryModel(definition)
+    span = _span_of(arguments, line)
+    speed = arguments.speed / 3.6
+    wanted = {"speed": speed, "start_position": span[0]} | settings(arguments.set, "pantograph")
+    pantograph = load_pantograph(arguments.pantograph).with_values(wanted)
+    coupled = CoupledModel(line, [pantograph])
+    stop = (span[1] - span[0]) / speed
+    begin = time.perf_counter()
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), disable=arguments.quiet
+    ) as bar:
+        task = bar.add_task(f"{arguments.line} + {arguments.pantograph}, monolithic", total=stop)
+        record = coupled.run(stop, arguments.step, lambda t: bar.update(task, completed=t))
+    wall = time.perf_counter() - begin
+    _print(arguments, record, span, stop / wall)
+    if arguments.out is not None:
+        write_timeseries(new_folder(arguments.out) / "timeseries.csv", record)
+    return 0
+
+
+def write_timeseries(path: Path, record: CoupledRecord) -> None:
+    """Write a record as CSV: first column time, then quantity with unit, one row per time."""
+    names = ["time [s]"]
+    columns = [record.time]
+    for p in range(record.contact_force.shape[1]):
+        names += [f"catenary.pantograph[{p + 1}].contact.{n}" for n in ("force [N]", "x [m]", "y [m]", "z [m]")]
+        columns += [record.contact_force[:, p], record.position[:, p], *record.contact_point[:, p, 1:].T]
+    names += [f"catenary.support[{i + 1}].uplift [m]" for i in range(record.uplift.shape[1])]
+    columns += list(record.uplift.T)
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+
+
+def _span_of(arguments: argparse.Namespace, line: CatenaryModel) -> tuple[float, float]:
+    """Return where the run begins and ends: as given, or well inside the line."""
+    first, last = line.wires[0].ends
+    length = last - first
+    start = arguments.start if arguments.start is not None else first + 0.2 * length
+    end = arguments.end if arguments.end is not None else last - 0.2 * length
+    if not first <= start < end <= last:
+        raise OSError(f"the run from {start:g} m to {end:g} m does not lie on the line, {first:g} m to {last:g} m")
+    return start, end
+
+
+def _print(arguments: argparse.Namespace, record: CoupledRecord, span: tuple[float, float], factor: float) -> None:
+    start, end = arguments.interval or (span[0] + 0.45 * (span[1] - span[0]), span[0] + 0.85 * (span[1] - span[0]))
+    figures = contact_figures(record.position[:, 0], record.contact_force[:, 0], arguments.step, start, end)
+    rows = [(label, f"{value:.2f}") for label, value in _rows(figures)]
+    inside = (record.position[-1, 0] > start) & (record.uplift.max(axis=0) > 0.0)
+    rows.append(("largest uplift at a support [mm]", f"{1e3 * record.uplift.max() * float(inside.any()):.1f}"))
+    print_table(f"Contact force, 0-20 Hz, {start:g} ... {end:g} m", ("quantity", "value"), rows)
+    print(f"{factor:.2f} times real time; peak of the record: {record.contact_force.max():.1f} N unfiltered")
+
+
+def _rows(figures: ContactFigures) -> list[tuple[str, float]]:
+    return [
+        ("mean [N]", figures.mean),
+        ("standard deviation [N]", figures.sigma),
+        ("maximum [N]", figures.maximum),
+        ("minimum [N]", figures.minimum),
+        ("loss of contact [%]", figures.loss),
+    ]

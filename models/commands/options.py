@@ -1,0 +1,67 @@
+"""Options and output that several verbs share."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from models.part import ParameterError
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add ``--set part.parameter=value``, repeatable."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="PART.PARAMETER=VALUE",
+        help="change a parameter: line.damping.alpha=0.00275, pantograph.static_force=170 (SI units)",
+    )
+
+
+def settings(given: Iterable[str], part: str) -> dict[str, float]:
+    """Return the ``--set`` values of one part.
+
+    Raises
+    ------
+    ParameterError
+        If a setting is not of the form PART.PARAMETER=VALUE.
+    """
+    result = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        head, dot, parameter = name.partition(".")
+        if not equals or not dot or head not in ("line", "pantograph"):
+            raise ParameterError(
+                f"--set {text}: write line.PARAMETER=VALUE or pantograph.PARAMETER=VALUE"
+            )
+        if head == part:
+            result[parameter] = _number(text, value)
+    return result
+
+
+def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table, first column left, others right."""
+    table = Table(title=title, title_justify="left")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right")
+    for row in rows:
+        table.add_row(*row)
+    Console(width=None if Console().is_terminal else 80).print(table)
+
+
+def new_folder(path: Path) -> Path:
+    """Create a folder for results (an existing one is used) and return it."""
+    path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def _number(text: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError as error:
+        raise ParameterError(f"--set {text}: '{value}' is not a number") from error

@@ -1,0 +1,106 @@
+"""Contact of a collector strip with a contact wire: where they cross in plan, and the normal force [1]_.
+
+References
+----------
+.. [1] P. Antunes, Co-simulation methods for multidisciplinary problems in railway dynamics (2012), section 4.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from models.part import FloatArray
+
+#: Below this penetration velocity an impact has no velocity to refer to [m/s].
+_SLOWEST_IMPACT = 1e-6
+
+
+class ContactParameters(Protocol):
+    """What a contact law needs."""
+
+    @property
+    def stiffness(self) -> float:
+        """Return the stiffness [N/m^n]."""
+
+    @property
+    def exponent(self) -> float:
+        """Return the exponent n."""
+
+    @property
+    def restitution(self) -> float:
+        """Return the coefficient of restitution."""
+
+
+@dataclass(frozen=True)
+class NormalForce:
+    """Normal force and its derivatives by penetration [N/m] and penetration velocity [N s/m]."""
+
+    force: float
+    by_penetration: float
+    by_velocity: float
+
+
+def continuous_contact(
+    penetration: float, velocity: float, impact_velocity: float, parameters: ContactParameters
+) -> NormalForce:
+    """Return K delta^n (1 + 3/4 (1 - e^2) delta'/delta'(-)), never negative [2.47].
+
+    Parameters
+    ----------
+    penetration, velocity : float
+        delta [m] and delta' [m/s].
+    impact_velocity : float
+        delta'(-), the velocity at impact [m/s].
+
+    Examples
+    --------
+    >>> from models.catenary.parameters import Contact
+    >>> continuous_contact(0.005, 0.1, 0.1, Contact()).force
+    100.0
+    """
+    if penetration <= 0.0:
+        return NormalForce(0.0, 0.0, 0.0)
+    n = parameters.exponent
+    elastic = parameters.stiffness * penetration**n
+    hysteresis = 0.75 * (1.0 - parameters.restitution**2) / max(impact_velocity, _SLOWEST_IMPACT)
+    factor = 1.0 + hysteresis * velocity
+    if factor <= 0.0:
+        return NormalForce(0.0, 0.0, 0.0)
+    return NormalForce(elastic * factor, n * elastic / penetration * factor, elastic * hysteresis)
+
+
+ContactLaw = Callable[[float, float, float, ContactParameters], NormalForce]
+#: Contact laws by name.
+CONTACT_LAWS: dict[str, ContactLaw] = {"continuous": continuous_contact}
+
+
+def crossing(a: FloatArray, b: FloatArray, i: tuple[float, float], j: tuple[float, float]) -> tuple[float, float] | None:
+    """Intersect strip and wire element in plan [2.36-2.42].
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (3,) or longer
+        Ends of the strip [m].
+    i, j : (float, float)
+        Ends of the element in plan [m].
+
+    Returns
+    -------
+    (float, float) or None
+        Shares of the way from A to B and from I to J; None if the two are parallel.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> crossing(np.array([1.0, 1.0, 0.0]), np.array([1.0, -1.0, 0.0]), (0.0, 0.5), (4.0, 0.5))
+    (0.25, 0.25)
+    """
+    strip_x, strip_y = float(b[0] - a[0]), float(b[1] - a[1])
+    wire_x, wire_y = j[0] - i[0], j[1] - i[1]
+    determinant = strip_y * wire_x - strip_x * wire_y
+    if determinant == 0.0:
+        return None
+    dx, dy = i[0] - float(a[0]), i[1] - float(a[1])
+    return (dy * wire_x - dx * wire_y) / determinant, (strip_x * dy - strip_y * dx) / determinant

@@ -1,0 +1,133 @@
+"""Monolithic coupling of a line with lumped pantographs: one system, one step, no communication.
+
+The yardstick of the co-simulation: the same equations and the same time integration, but contact force, line and
+pantographs are solved together at the end of every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.catenary.model import CatenaryModel, StripMotion
+from models.pantograph.lumped import LumpedModel, LumpedState
+from models.pantograph.parameters import LumpedDefinition
+from models.part import FloatArray
+
+
+@dataclass(frozen=True)
+class CoupledRecord:
+    """What a coupled run leaves: one row per time, the start included.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+    position : ndarray, shape (n, P)
+        Of the strips along the track [m].
+    contact_force : ndarray, shape (n, P)
+        [N].
+    contact_point : ndarray, shape (n, P, 3)
+        [m]; NaN where strip and wire do not cross.
+    strip_height : ndarray, shape (n, P)
+        [m].
+    uplift : ndarray, shape (n, n_supports)
+        [m].
+    dropper_force : ndarray, shape (n, n_droppers)
+        [N].
+    """
+
+    time: FloatArray
+    position: FloatArray
+    contact_force: FloatArray
+    contact_point: FloatArray
+    strip_height: FloatArray
+    uplift: FloatArray
+    dropper_force: FloatArray
+
+
+class CoupledModel:
+    """A line and its pantographs as one system.
+
+    Parameters
+    ----------
+    line : CatenaryModel
+    pantographs : sequence of LumpedDefinition
+        Each with its own ``start_position``.
+    """
+
+    def __init__(self, line: CatenaryModel, pantographs: Sequence[LumpedDefinition]) -> None:
+        self.line = line
+        self.pantographs = [LumpedModel(p) for p in pantographs]
+        self.line_state = line.initial_state(len(self.pantographs))
+        self.states: list[LumpedState] = [p.initial_state() for p in self.pantographs]
+        self.time = 0.0
+
+    def step(self, step: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """Advance by ``step`` to the time ``end``.
+
+        Returns
+        -------
+        force : ndarray, shape (P,)
+            Contact forces at the end of the step [N].
+        point : ndarray, shape (P, 3)
+        """
+        loads = [p.load(end, np.zeros(2)) for p in self.pantographs]
+        free = [
+            p.free_response(s, step, load) for p, s, load in zip(self.pantographs, self.states, loads, strict=True)
+        ]
+        motion = StripMotion(
+            np.array([self._strip(i, step, end, d) for i, d in enumerate(free)]),
+            np.array([p.compliance(step)[-1] for p in self.pantographs]),
+        )
+        result = self.line.step(self.line_state, step, motion)
+        force = result.force.sum(axis=1)
+        for i, (model, state) in enumerate(zip(self.pantographs, self.states, strict=True)):
+            model.advance(state, step, free[i] - force[i] * model.compliance(step))
+        self.time = end
+        return force, result.point[:, 0]
+
+    def run(
+        self, stop: float, step: float, progress: Callable[[float], None] | None = None
+    ) -> CoupledRecord:
+        """Run to ``stop`` [s] with a fixed step [s] and record every step."""
+        count = round(stop / step)
+        record = self._empty_record(count + 1, step)
+        for n in range(count + 1):
+            if n:
+                force, point = self.step(step, n * step)
+                record.contact_force[n], record.contact_point[n] = force, point
+            record.strip_height[n] = [self._height(i) for i in range(len(self.states))]
+            record.uplift[n] = self.line.uplift(self.line_state)
+            record.dropper_force[n] = self.line.dropper_force(self.line_state)
+            if progress is not None:
+                progress(n * step)
+        return record
+
+    def _strip(self, i: int, step: float, time: float, displacement: FloatArray) -> FloatArray:
+        definition = self.pantographs[i].definition
+        half = 0.5 * definition.strip_length
+        x = definition.start_position + definition.speed * time
+        z = definition.reference_height + displacement[-1]
+        vz = self.pantographs[i].velocity_of(self.states[i], step, displacement)[-1]
+        ends = [[[x, definition.strip_offset + side, z], [definition.speed, 0.0, vz]] for side in (half, -half)]
+        return np.array(ends)
+
+    def _height(self, i: int) -> float:
+        return float(self.pantographs[i].definition.reference_height + self.states[i].displacement[-1])
+
+    def _empty_record(self, rows: int, step: float) -> CoupledRecord:
+        P = len(self.pantographs)
+        time = np.arange(rows) * step
+        position = np.stack([p.definition.start_position + p.definition.speed * time for p in self.pantographs], 1)
+        line = self.line
+        return CoupledRecord(
+            time=time,
+            position=position,
+            contact_force=np.zeros((rows, P)),
+            contact_point=np.full((rows, P, 3), np.nan),
+            strip_height=np.zeros((rows, P)),
+            uplift=np.zeros((rows, len(line.uplift_dofs))),
+            dropper_force=np.zeros((rows, len(line.dropper_stiffness))),
+        )

@@ -1,0 +1,1 @@
+"""Pantograph models: lumped masses and multibody."""

@@ -1,0 +1,214 @@
+"""Lumped-mass pantograph: masses on a line, springs and dampers between them [2.12-2.19]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.extrapolation import ForceExtrapolation
+from models.pantograph.parameters import LumpedDefinition
+from models.part import FloatArray, Snapshot
+from models.time_integration import Newmark, steps_within
+
+
+@dataclass
+class LumpedState:
+    """State of a lumped pantograph, changed in place by a step.
+
+    Attributes
+    ----------
+    displacement, velocity, acceleration : ndarray, shape (n,)
+        Of the masses, bottom to top, from where the springs carry the weights [m, m/s, m/s2].
+    """
+
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+
+class LumpedModel:
+    """Linear equations of a lumped pantograph: M y'' + C y' + K y = f.
+
+    Parameters
+    ----------
+    definition : LumpedDefinition
+    """
+
+    def __init__(self, definition: LumpedDefinition) -> None:
+        self.definition = definition
+        n = len(definition.stage)
+        self.M = np.diag([s.mass for s in definition.stage])
+        self.C = _chain([s.damping for s in definition.stage])
+        self.K = _chain([s.stiffness for s in definition.stage])
+        self.size = n
+        self._inverse: dict[float, tuple[Newmark, FloatArray]] = {}
+
+    def initial_state(self) -> LumpedState:
+        """Return the pantograph at rest at its reference height."""
+        return LumpedState(*(np.zeros(self.size) for _ in range(3)))
+
+    def free_response(self, state: LumpedState, step: float, load: FloatArray) -> FloatArray:
+        """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value."""
+        newmark, inverse = self._effective(step)
+        d, v, a = state.displacement, state.velocity, state.acceleration
+        inertia = newmark.a0 * d + newmark.a2 * v + newmark.a3 * a
+        damping = newmark.a1 * d + newmark.a4 * v + newmark.a5 * a
+        result: FloatArray = inverse @ (load + self.M @ inertia + self.C @ damping)
+        return result
+
+    def compliance(self, step: float) -> FloatArray:
+        """Return the displacement within a step per force on the strip, shape (n,) [m/N]."""
+        result: FloatArray = self._effective(step)[1][:, -1]
+        return result
+
+    def velocity_of(self, state: LumpedState, step: float, displacement: FloatArray) -> FloatArray:
+        """Return the velocity that belongs to a new displacement, shape (n,)."""
+        n = self._effective(step)[0]
+        change = displacement - state.displacement
+        result: FloatArray = n.a1 * change - n.a4 * state.velocity - n.a5 * state.acceleration
+        return result
+
+    def advance(self, state: LumpedState, step: float, displacement: FloatArray) -> None:
+        """Replace the state by the one that belongs to a new displacement."""
+        n = self._effective(step)[0]
+        velocity = self.velocity_of(state, step, displacement)
+        change = displacement - state.displacement
+        state.acceleration = n.a0 * change - n.a2 * state.velocity - n.a3 * state.acceleration
+        state.velocity = velocity
+        state.displacement = displacement
+
+    def load(self, time: float, base: FloatArray) -> FloatArray:
+        """Return uplift and roof motion as loads, shape (n,) [N].
+
+        Parameters
+        ----------
+        base : ndarray, shape (2,)
+            Height [m] and velocity [m/s] of the roof, 0 at rest.
+        """
+        result = np.zeros(self.size)
+        lowest = self.definition.stage[0]
+        result[0] = self.definition.static_force * self.definition.raised(time)
+        result[0] += lowest.stiffness * base[0] + lowest.damping * base[1]
+        return result
+
+    def _effective(self, step: float) -> tuple[Newmark, FloatArray]:
+        if step not in self._inverse:
+            newmark = Newmark(step)
+            self._inverse[step] = newmark, np.linalg.inv(self.K + newmark.a0 * self.M + newmark.a1 * self.C)
+        return self._inverse[step]
+
+
+class LumpedPantographPart:
+    """A lumped pantograph between communication points.
+
+    Parameters
+    ----------
+    definition : LumpedDefinition
+
+    Attributes
+    ----------
+    strip : ndarray, shape (2, 2, 3)
+        End A (left), B (right); position, velocity; x, y, z.
+    observed : tuple of (name, unit, description)
+        What ``observation_values`` gives.
+    """
+
+    def __init__(self, definition: LumpedDefinition) -> None:
+        self.definition = definition
+        self.model = LumpedModel(definition)
+        self.state = self.model.initial_state()
+        self.time = 0.0
+        self._start_time = 0.0
+        self.strip = np.zeros((2, 2, 3))
+        self._force = ForceExtrapolation(definition.extrapolation_order)
+        self._base = np.zeros(2)
+        self.observed = _observed(len(definition.stage))
+
+    def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
+        """Set the pantograph to rest at its reference height at ``time``.
+
+        Parameters
+        ----------
+        force : float
+            Contact force [N].
+        point : ndarray, shape (3,)
+            Its point of application [m]; unused by masses on a line.
+        base : ndarray, shape (2,)
+            Height and vertical velocity of the roof [m, m/s].
+        """
+        del point
+        self.time = self._start_time = time
+        self.state = self.model.initial_state()
+        self._force.start(time, force)
+        self._base[...] = base
+        self._place_strip()
+
+    def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
+        """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
+        self._force.receive_at(self.time, force, float(point[0]), self._x(self.time), self.definition.speed, step)
+        count = steps_within(step, self.definition.time_step)
+        start, h = self.time, step / count
+        base_change = (base - self._base) / count
+        for k in range(1, count + 1):
+            self._base += base_change
+            self._substep(start + k * h, h)
+        self.time = start + step
+        self._base[...] = base
+        self._place_strip()
+
+    def observation_values(self) -> FloatArray:
+        """Return height, velocity and acceleration of every mass, shape (3 n,)."""
+        heights = self.definition.reference_height + self.state.displacement
+        return np.stack([heights, self.state.velocity, self.state.acceleration], axis=1).ravel()
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state, bit for bit."""
+        return {
+            "time": np.array([self.time, self._start_time]),
+            "displacement": self.state.displacement.copy(),
+            "velocity": self.state.velocity.copy(),
+            "acceleration": self.state.acceleration.copy(),
+            "base": self._base.copy(),
+            **self._force.snapshot(),
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        self.time, self._start_time = (float(t) for t in snapshot["time"])
+        self.state = LumpedState(*(snapshot[n].copy() for n in ("displacement", "velocity", "acceleration")))
+        self._base[...] = snapshot["base"]
+        self._force.restore(snapshot)
+        self._place_strip()
+
+    def _substep(self, time: float, h: float) -> None:
+        load = self.model.load(time - self._start_time, self._base)
+        load[-1] -= self._force.at(time)
+        self.model.advance(self.state, h, self.model.free_response(self.state, h, load))
+
+    def _x(self, time: float) -> float:
+        return self.definition.start_position + self.definition.speed * (time - self._start_time)
+
+    def _place_strip(self) -> None:
+        d = self.definition
+        half = 0.5 * d.strip_length
+        height = d.reference_height + self.state.displacement[-1]
+        for end, side in enumerate((half, -half)):
+            self.strip[end, 0] = self._x(self.time), d.strip_offset + side, height
+            self.strip[end, 1] = d.speed, 0.0, self.state.velocity[-1]
+
+
+def _chain(values: list[float]) -> FloatArray:
+    """Return the matrix of a chain of springs or dampers, the first to ground."""
+    matrix = np.diag(values)
+    for i in range(1, len(values)):
+        matrix[i - 1, i - 1] += values[i]
+        matrix[i - 1, i] = matrix[i, i - 1] = -values[i]
+    return matrix
+
+
+def _observed(stages: int) -> tuple[tuple[str, str, str], ...]:
+    kinds = (("z", "m", "height"), ("vz", "m/s", "vertical velocity"), ("az", "m/s2", "vertical acceleration"))
+    return tuple(
+        (f"mass[{i}].{key}", unit, f"{text} of mass {i}") for i in range(1, stages + 1) for key, unit, text in kinds
+    )

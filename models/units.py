@@ -1,0 +1,66 @@
+"""Units accepted in definition files and their conversion to SI, done once, at the edge."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+#: Unit -> (SI unit, factor).  A quantity in a file is multiplied by the factor.
+SI: Final[dict[str, tuple[str, float]]] = {
+    "1": ("1", 1.0),
+    "%": ("1", 0.01),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
+    "m2": ("m2", 1.0),
+    "mm2": ("m2", 1e-6),
+    "m4": ("m4", 1.0),
+    "mm4": ("m4", 1e-12),
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "1/s": ("1/s", 1.0),
+    "Hz": ("Hz", 1.0),
+    "m/s": ("m/s", 1.0),
+    "km/h": ("m/s", 1.0 / 3.6),
+    "m/s2": ("m/s2", 1.0),
+    "kg": ("kg", 1.0),
+    "kg/m": ("kg/m", 1.0),
+    "kg.m2": ("kg.m2", 1.0),
+    "N": ("N", 1.0),
+    "kN": ("N", 1e3),
+    "N.m": ("N.m", 1.0),
+    "kN.m": ("N.m", 1e3),
+    "N/m": ("N/m", 1.0),
+    "kN/m": ("N/m", 1e3),
+    "N.s/m": ("N.s/m", 1.0),
+    "N.m.s/rad": ("N.m.s/rad", 1.0),
+    "N.m/rad": ("N.m/rad", 1.0),
+    "N.m2": ("N.m2", 1.0),
+    "Pa": ("Pa", 1.0),
+    "MPa": ("Pa", 1e6),
+    "GPa": ("Pa", 1e9),
+    "rad": ("rad", 1.0),
+    "deg": ("rad", math.pi / 180.0),
+    "rad/s": ("rad/s", 1.0),
+}
+
+
+def to_si(value: float, unit: str, wanted: str) -> float:
+    """Convert ``value`` in ``unit`` to the SI unit ``wanted``.
+
+    Raises
+    ------
+    ValueError
+        If ``unit`` is unknown or measures something else than ``wanted``.
+
+    Examples
+    --------
+    >>> to_si(20.0, "kN", "N")
+    20000.0
+    """
+    if unit not in SI:
+        raise ValueError(f"unknown unit '{unit}'")
+    si, factor = SI[unit]
+    if si != wanted:
+        raise ValueError(f"unit '{unit}' where a unit of '{wanted}' is needed")
+    return value * factor

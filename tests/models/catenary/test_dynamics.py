@@ -1,0 +1,291 @@
+"""Dynamics of wires against theory, conservation of energy, and exact dropper slack against the plain iteration."""
+
+import dataclasses
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from models.catenary.assembly import assemble
+from models.catenary.elements import NODE_DOFS
+from models.catenary.equilibrium import weight
+from models.catenary.mesh import CatenaryMesh, Chain
+from models.catenary.model import CatenaryModel, StripMotion
+from models.time_integration import Newmark, steps_within
+from scipy.sparse.linalg import splu, spsolve
+
+GRAVITY = 9.81
+
+
+def _single_wire(length, elements):
+    """A contact wire alone, pinned at both ends."""
+    n = elements + 1
+    points = np.zeros((n, 3))
+    points[:, 0] = np.linspace(0.0, length, n)
+    points[:, 2] = 5.0
+    fixed = np.zeros((n, NODE_DOFS), dtype=bool)
+    fixed[[0, -1], :4] = True
+    nodes = np.arange(n)
+    return CatenaryMesh(
+        points=points,
+        beams=np.stack([nodes[:-1], nodes[1:]], axis=1),
+        component=np.zeros(elements, dtype=np.int64),
+        chains=(Chain("contact_wire", 0, nodes),),
+        droppers=np.zeros((0, 2), dtype=np.int64),
+        is_hanger=np.zeros(0, dtype=bool),
+        target=np.zeros(0),
+        fixed=fixed,
+        sprung=np.zeros(0, dtype=np.int64),
+        clamp_mass=np.zeros(n),
+        support_nodes=np.zeros(0, dtype=np.int64),
+        arms=np.zeros((0, 2), dtype=np.int64),
+    )
+
+
+def _wire_matrices(definition, mesh):
+    matrices = assemble(definition, mesh, mesh.points)
+    free = np.flatnonzero(~mesh.fixed.ravel())
+    K, M = (m[free][:, free].tocsc() for m in (matrices.K, matrices.M))
+    return K, M, matrices.load[free], free
+
+
+def test_sag_of_a_single_tensioned_span(short_line):
+    """Stiff string under its weight: parabola q x (L - x) / 2T less the ends' bending layers."""
+    length = 50.0
+    mesh = _single_wire(length, 100)
+    K, _, load, free = _wire_matrices(short_line, mesh)
+    d = np.zeros(mesh.fixed.size)
+    d[free] = spsolve(K, load)
+    wire = short_line.contact_wire
+    q, lam = wire.mass * GRAVITY, np.sqrt(wire.tension / wire.EI)
+    x = mesh.points[:, 0]
+    layer = 1.0 - np.cosh(lam * (x - length / 2.0)) / np.cosh(lam * length / 2.0)
+    exact = -q * x * (length - x) / (2.0 * wire.tension) + q / (wire.tension * lam**2) * layer
+    assert d.reshape(-1, NODE_DOFS)[:, 2] == pytest.approx(exact, abs=2e-6)
+
+
+def test_reactions_carry_the_weight(short_line):
+    model = CatenaryModel(short_line)
+    static, mesh = model.static, model.mesh
+    from models.catenary.assembly import dropper_rows
+
+    rows = dropper_rows(mesh, static.points)
+    internal = static.matrices.K @ static.displacement + rows.T @ static.dropper_force - static.matrices.load
+    reactions = internal.reshape(-1, NODE_DOFS)[:, 2][mesh.fixed[:, 2]]
+    assert reactions.sum() == pytest.approx(weight(static.matrices), rel=1e-9)
+    # The weight itself, from the definition: wires over their length, droppers, arms, clamps.
+    d = short_line
+    wires = (d.contact_wire.mass + d.messenger_wire.mass) * 300.0
+    droppers = d.dropper.mass * static.dropper_length.sum()
+    arms = 5 * (d.steady_arm.mass * d.steady_arm.length + d.clamps.steady_arm)
+    clamps = 42 * (d.clamps.dropper_lower + d.clamps.dropper_upper)
+    assert weight(static.matrices) == pytest.approx(GRAVITY * (wires + droppers + arms + clamps), rel=2e-3)
+
+
+def test_wave_speed_on_a_long_wire(short_line):
+    """A pulse runs along an untroubled wire with sqrt(T/m)."""
+    mesh = _single_wire(400.0, 800)
+    K, M, _, free = _wire_matrices(short_line, mesh)
+    newmark = Newmark(5e-4)
+    factor = splu((K + newmark.a0 * M).tocsc())
+    vertical = {node: i for i, node in enumerate(free.tolist())}
+    at = [vertical[int(round(x / 0.5)) * NODE_DOFS + 2] for x in (200.0, 250.0, 330.0)]
+    d, v, a = (np.zeros(len(free)) for _ in range(3))
+    history = []
+    for n in range(2600):
+        load = np.zeros(len(free))
+        t = n * newmark.step
+        load[at[0]] = 100.0 * np.sin(np.pi * t / 0.1) ** 2 if t < 0.1 else 0.0
+        new = factor.solve(load + M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a))
+        acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
+        v = v + 0.5 * newmark.step * (a + acceleration)
+        d, a = new, acceleration
+        history.append(v[at[1:]])
+    arrival = np.argmax(np.array(history), axis=0) * newmark.step
+    speed = 80.0 / (arrival[1] - arrival[0])
+    wire = short_line.contact_wire
+    assert speed == pytest.approx(np.sqrt(wire.tension / wire.mass), rel=0.01)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.6, 0.8])
+def test_uplift_under_a_moving_force_on_a_string_on_springs(short_line, ratio):
+    """w(x) = P / (2 sqrt(k T')) exp(-|x| sqrt(k / T')), T' = T (1 - V^2/c^2): Mathews (1958), without bending."""
+    definition = dataclasses.replace(
+        short_line, contact_wire=dataclasses.replace(short_line.contact_wire, bending_stiffness=1e-3)
+    )
+    length, elements, k, P = 300.0, 1200, 2000.0, 100.0
+    mesh = _single_wire(length, elements)
+    K, M, _, free = _wire_matrices(definition, mesh)
+    cell = length / elements
+    springs = np.zeros(mesh.fixed.size)
+    springs[2::NODE_DOFS] = k * cell
+    K = K + sp.diags(springs[free])
+    wire = definition.contact_wire
+    speed = ratio * np.sqrt(wire.tension / wire.mass)
+    newmark = Newmark(5e-4)
+    factor = splu((K + newmark.a0 * M).tocsc())
+    index = np.full(mesh.fixed.size, -1)
+    index[free] = np.arange(len(free))
+    d, v, a = (np.zeros(len(free)) for _ in range(3))
+    steps = int(200.0 / speed / newmark.step)
+    for n in range(1, steps + 1):
+        x = 50.0 + speed * n * newmark.step
+        element, xi = int(x / cell), x / cell - int(x / cell)
+        load = np.zeros(len(free))
+        ramp = np.sin(0.5 * np.pi * min(1.0, n * newmark.step / 1.2)) ** 2
+        shape = np.array([1 - 3 * xi**2 + 2 * xi**3, 3 * xi**2 - 2 * xi**3])
+        slope = cell * np.array([xi * (1 - xi) ** 2, xi**2 * (xi - 1)])
+        dofs = element * NODE_DOFS + np.array([2, 8, 4, 10])
+        at_force = np.concatenate([shape, -slope])
+        load[index[dofs]] = ramp * P * at_force
+        new = factor.solve(load + M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a))
+        acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
+        v = v + 0.5 * newmark.step * (a + acceleration)
+        d, a = new, acceleration
+    reduced = wire.tension * (1.0 - ratio**2)
+    exact = P / (2.0 * np.sqrt(k * reduced))
+    assert at_force @ d[index[dofs]] == pytest.approx(exact, rel=0.01)
+
+
+def test_undamped_line_keeps_its_energy(line_maker):
+    """Without damping, contact or slack the trapezoidal rule conserves energy to rounding."""
+    definition = line_maker(spans=4, alpha=0.0, dropper={
+        "stiffness": [1000.0, "kN/m", "test"], "mass": [0.11, "kg/m", "test"],
+        "compression_ratio": [1.0, "1", "test"],
+    })  # fmt: skip
+    model = CatenaryModel(definition)
+    state = model.initial_state()
+    rng = np.random.default_rng(1)
+    state.velocity[:] = 1e-2 * rng.standard_normal(len(state.velocity))
+    state.acceleration[:] = splu(model.M.tocsc()).solve(-(model.K @ state.displacement) - model.C @ state.velocity)
+    before = model.energy(state)
+    motion = StripMotion(_below(100.0), np.zeros(1))
+    for _ in range(300):
+        model.step(state, 1e-3, motion)
+    assert model.energy(state) == pytest.approx(before, rel=1e-9)
+
+
+def test_damping_takes_energy_away(short_line):
+    model = CatenaryModel(short_line)
+    state = model.initial_state()
+    state.velocity[:] = 1e-3
+    motion = StripMotion(_below(100.0), np.zeros(1))
+    energy = []
+    for _ in range(50):
+        model.step(state, 1e-3, motion)
+        energy.append(model.energy(state))
+    assert np.all(np.diff(energy) < 0.0)
+
+
+def test_line_at_rest_stays_at_rest(short_line):
+    model = CatenaryModel(short_line)
+    state = model.initial_state()
+    for _ in range(20):
+        model.step(state, 1e-3, StripMotion(_below(100.0), np.zeros(1)))
+    assert np.abs(state.displacement).max() == 0.0
+
+
+def _below(x):
+    return np.array([[[[x, 0.7, -50.0], [0.0, 0.0, 0.0]], [[x, -0.7, -50.0], [0.0, 0.0, 0.0]]]])
+
+
+def _moving_strip(n, dt, speed=83.0, start=95.0):
+    x = start + speed * n * dt
+    z = 5.09 + 0.05 * np.sin(2.0 * np.pi * n * dt / 0.25)
+    return np.array([[[[x, 0.7, z], [speed, 0.0, 0.0]], [[x, -0.7, z], [speed, 0.0, 0.0]]]])
+
+
+def _plain_iteration(model, dt, steps):
+    """The source's fixed-point iteration, run to convergence: every slack dropper's force compensated [2.11]."""
+    newmark = Newmark(dt)
+    lu = splu((model.K + newmark.a0 * model.M + newmark.a1 * model.C).tocsc())
+    d, v, a = (np.zeros(len(model.free)) for _ in range(3))
+    wire, contact = model.wires[0], model.definition.contact
+    element, forces, contacts = -1, [], []
+    for n in range(1, steps + 1):
+        strip = _moving_strip(n, dt)[0]
+        right = model.M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a)
+        right += model.C @ (newmark.a1 * d + newmark.a4 * v)
+        free = lu.solve(right)
+        found = wire.find(strip, free, element)
+        element = found.element
+        item, powers = wire.elements[found.element], found.powers
+        shape = powers @ item.rows
+        z = strip[0, 0, 2] + found.share * (strip[1, 0, 2] - strip[0, 0, 2])
+        new = free
+        for _ in range(400):
+            elastic = model.static.dropper_force + model.dropper_stiffness * (model.B @ new)
+            gap = z - (powers @ item.static + shape @ new[item.dofs])
+            force = contact.stiffness * max(gap, 0.0)
+            load = right + model.B.T @ np.minimum(elastic, 0.0)
+            load[item.dofs] += force * shape
+            before, new = new, lu.solve(load)
+            if np.abs(new - before).max() < 1e-15:
+                break
+        acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
+        v = v + 0.5 * dt * (a + acceleration)
+        d, a = new, acceleration
+        elastic = model.static.dropper_force + model.dropper_stiffness * (model.B @ d)
+        forces.append(np.maximum(elastic, 0.0))
+        contacts.append(force)
+    return np.array(forces), np.array(contacts)
+
+
+def test_exact_slack_equals_the_plain_iteration_run_to_convergence(line_maker):
+    """On a case that slackens many droppers: low damping (alpha 0.00275 s) and a strip that heaves."""
+    model = CatenaryModel(line_maker(spans=4, alpha=0.00275))
+    dt, steps = 1e-3, 500
+    plain, plain_contact = _plain_iteration(model, dt, steps)
+    state = model.initial_state()
+    exact, contact = [], []
+    for n in range(1, steps + 1):
+        result = model.step(state, dt, StripMotion(_moving_strip(n, dt), np.zeros(1)))
+        contact.append(result.force[0, 0])
+        exact.append(model.dropper_force(state))
+    exact = np.array(exact)
+    slack = exact < 1e-7
+    assert slack.any(axis=1).sum() > 50
+    assert slack.sum(axis=1).max() >= 3
+    assert exact.min() > -1e-9
+    assert np.abs(exact - plain).max() < 1e-6
+    assert np.abs(np.array(contact) - plain_contact).max() < 1e-6
+
+
+def test_stiffness_in_compression_is_the_given_share(line_maker):
+    """With a ratio r the force of a compressed dropper is r times that of a bilateral one."""
+    line = line_maker(spans=4, alpha=0.00275, dropper={
+        "stiffness": [900.0, "kN/m", "test"], "mass": [0.11, "kg/m", "test"], "compression_ratio": [0.01, "1", "test"],
+    })  # fmt: skip
+    model = CatenaryModel(line)
+    state = model.initial_state()
+    seen = 0
+    for n in range(1, 400):
+        model.step(state, 1e-3, StripMotion(_moving_strip(n, 1e-3), np.zeros(1)))
+        elastic = model.static.dropper_force + model.dropper_stiffness * (model.B @ state.displacement)
+        compressed = elastic < 0.0
+        seen += int(compressed.sum())
+        assert model.dropper_force(state)[compressed] == pytest.approx(0.01 * elastic[compressed], abs=1e-8)
+    assert seen > 50
+
+
+def test_free_vibration_converges_with_the_second_order_of_the_step(short_line):
+    """A smooth initial velocity of the whole line, no contact, no slack."""
+    results = []
+    for dt in (2e-3, 1e-3, 5e-4, 2.5e-4):
+        model = CatenaryModel(short_line)
+        state = model.initial_state()
+        x = model.mesh.points[:, 0]
+        field = np.zeros((len(x), NODE_DOFS))
+        field[:, 2] = 0.05 * np.sin(np.pi * x / 300.0) ** 4
+        state.velocity[:] = field.ravel()[model.free]
+        state.acceleration[:] = splu(model.M.tocsc()).solve(-(model.C @ state.velocity))
+        for _ in range(round(0.2 / dt)):
+            model.step(state, dt, StripMotion(_below(100.0), np.zeros(1)))
+        results.append(state.displacement.copy())
+    changes = [np.abs(b - a).max() for a, b in pairwise(results)]
+    assert np.log2(changes[1] / changes[2]) == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("duration", "longest", "count"), [(1e-3, 1e-3, 1), (5e-4, 1e-3, 1), (1e-2, 1e-3, 10)])
+def test_macro_steps_are_divided_evenly(duration, longest, count):
+    assert steps_within(duration, longest) == count

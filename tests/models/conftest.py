@@ -1,0 +1,87 @@
+"""Small lines and pantographs for the physics' tests."""
+
+from pathlib import Path
+
+import pytest
+from models.catenary.parameters import CatenaryDefinition, read
+from models.definition import Table
+from models.library import load_line, load_pantograph
+from models.pantograph.parameters import LumpedDefinition
+
+import models
+
+LIBRARY = Path(models.__file__).parent / "library"
+
+
+def make_line(spans: int = 6, alpha: float = 0.0272, **changes: object) -> CatenaryDefinition:
+    """Return a simple line of LN2's wires with ``spans`` spans of 50 m."""
+    source = "test"
+    data = {
+        "name": "short",
+        "type": "simple",
+        "profile": {
+            "contact_wire_height": [5.08, "m", source],
+            "encumbrance": [1.4, "m", source],
+            "pre_sag": [0.001, "1", source],
+        },
+        "spans": {
+            "start": [0.0, "m", source],
+            "count": spans,
+            "length": [50.0, "m", source],
+            "droppers": {"first": [4.5, "m", source], "count": 7},
+        },
+        "stagger": {"amplitude": [0.2, "m", source]},
+        "ends": {"spans": 1, "rise": [0.1, "m", source]},
+        "contact_wire": {
+            "area": [150, "mm2", source],
+            "mass": [1.334, "kg/m", source],
+            "youngs_modulus": [120, "GPa", source],
+            "tension": [20, "kN", source],
+        },
+        "messenger_wire": {
+            "area": [65.5, "mm2", source],
+            "mass": [0.605, "kg/m", source],
+            "youngs_modulus": [84.7, "GPa", source],
+            "tension": [14, "kN", source],
+        },
+        "dropper": {
+            "area": [12, "mm2", source],
+            "mass": [0.11, "kg/m", source],
+            "youngs_modulus": [84.7, "GPa", source],
+        },
+        "steady_arm": {
+            "area": [120, "mm2", source],
+            "mass": [1.07, "kg/m", source],
+            "youngs_modulus": [84.7, "GPa", source],
+            "length": [1.22, "m", source],
+            "angle": [-10, "deg", source],
+        },
+        "clamps": {
+            "dropper_upper": [0.195, "kg", source],
+            "dropper_lower": [0.165, "kg", source],
+            "steady_arm": [0.2, "kg", source],
+        },
+        "damping": {"alpha": [alpha, "s", source], "beta": [0.0, "1/s", source]},
+    }
+    data.update(changes)
+    return read(Table.from_dict(data, "short.toml"))
+
+
+@pytest.fixture(scope="session")
+def short_line() -> CatenaryDefinition:
+    return make_line()
+
+
+@pytest.fixture(scope="session")
+def line_maker():
+    return make_line
+
+
+@pytest.fixture(scope="session")
+def ln2() -> CatenaryDefinition:
+    return load_line("LN2")
+
+
+@pytest.fixture(scope="session")
+def cx() -> LumpedDefinition:
+    return load_pantograph("CX")

@@ -1,0 +1,120 @@
+"""Contact geometry in plan and the contact law."""
+
+import numpy as np
+import pytest
+from models.catenary.model import CatenaryModel, StripMotion
+from models.catenary.parameters import Contact
+from models.contact import continuous_contact, crossing
+
+
+def _strip(x, z, y=0.0, half=0.7, vz=0.0, skew=0.0):
+    return np.array([[[x + skew, y + half, z], [80.0, 0.0, vz]], [[x - skew, y - half, z], [80.0, 0.0, vz]]])
+
+
+def test_crossing_of_a_staggered_wire():
+    share, xi = crossing(np.array([3.0, 0.7, 5.0]), np.array([3.0, -0.7, 5.0]), (2.0, 0.1), (4.0, -0.1))
+    assert (share, xi) == pytest.approx((0.5, 0.5))
+
+
+def test_crossing_of_a_skewed_strip_satisfies_both_lines():
+    a, b = np.array([3.2, 0.7, 5.0]), np.array([2.9, -0.7, 5.1])
+    i, j = (2.0, 0.25), (4.0, -0.1)
+    share, xi = crossing(a, b, i, j)
+    on_strip = a[:2] + share * (b - a)[:2]
+    on_wire = np.array(i) + xi * (np.array(j) - np.array(i))
+    assert on_strip == pytest.approx(on_wire)
+
+
+def test_parallel_lines_do_not_cross():
+    assert crossing(np.array([0.0, 0.0]), np.array([1.0, 0.0]), (0.0, 1.0), (1.0, 1.0)) is None
+
+
+def test_force_is_elastic_and_never_pulls():
+    law = Contact(stiffness=20000.0)
+    assert continuous_contact(0.01, -3.0, 0.5, law).force == pytest.approx(200.0)
+    assert continuous_contact(-1e-9, 1.0, 0.5, law).force == 0.0
+    inelastic = Contact(stiffness=20000.0, restitution=0.1)
+    assert continuous_contact(0.001, -50.0, 0.1, inelastic).force == 0.0
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_slopes_are_derivatives(exponent):
+    law = Contact(stiffness=5e4, exponent=exponent, restitution=0.6)
+    at, h = (0.004, 0.2, 0.3), 1e-7
+    value = continuous_contact(*at, law)
+    ahead = continuous_contact(at[0] + h, at[1], at[2], law).force
+    faster = continuous_contact(at[0], at[1] + h, at[2], law).force
+    assert value.by_penetration == pytest.approx((ahead - value.force) / h, rel=1e-4)
+    assert value.by_velocity == pytest.approx((faster - value.force) / h, rel=1e-4)
+
+
+@pytest.mark.parametrize("restitution", [0.95, 0.9, 0.8])
+def test_rebound_velocity_is_that_of_the_coefficient_of_restitution(restitution):
+    """A mass thrown at a rigid wall; the law is derived for e near 1, where it must hold best."""
+    law, mass, dt = Contact(stiffness=1e5, restitution=restitution), 5.0, 1e-6
+    x, v, impact = 0.0, 0.4, 0.4
+    for _ in range(10**6):
+        force = continuous_contact(x, v, impact, law).force
+        v -= force / mass * dt
+        x += v * dt
+        if x < 0.0:
+            break
+    assert v < 0.0
+    assert -v / impact == pytest.approx(restitution, abs=0.4 * (1.0 - restitution))
+
+
+@pytest.fixture(scope="module")
+def model(short_line):
+    return CatenaryModel(short_line)
+
+
+def test_contact_point_follows_the_stagger(model):
+    """At a support the wire is at its stagger, in the middle of a span near the track's centre."""
+    state = model.initial_state()
+    at_support = model.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0]
+    at_middle = model.contact_at_rest(state, _strip(125.0, 6.0)[None]).point[0, 0]
+    assert abs(at_support[1]) == pytest.approx(0.2, abs=2e-3)
+    assert at_middle[1] == pytest.approx(0.0, abs=2e-3)
+    assert (at_support[0], at_middle[0]) == pytest.approx((100.0, 125.0), abs=1e-9)
+
+
+def test_static_height_between_droppers_is_continuous_and_at_the_droppers_exact(model):
+    state = model.initial_state()
+    wanted = dict(zip(model.static.positions[model.mesh.droppers[:, 0], 0], model.mesh.target, strict=True))
+    x = np.array(sorted(wanted))
+    heights = [model.contact_at_rest(state, _strip(a, 6.0)[None]).point[0, 0, 2] for a in x]
+    assert heights == pytest.approx([wanted[a] for a in x], abs=1e-7)
+    fine = np.arange(100.0, 110.0, 0.01)
+    z = np.array([model.contact_at_rest(state, _strip(a, 6.0)[None]).point[0, 0, 2] for a in fine])
+    assert np.abs(np.diff(z)).max() < 2e-4
+
+
+@pytest.mark.parametrize(("offset", "touches"), [(0.0, True), (0.49, True), (0.51, False), (-0.91, False)])
+def test_no_contact_beyond_the_strips_ends(model, offset, touches):
+    """The wire stands at 0.2 m at this support; a strip of +-0.7 m reaches it up to an offset of 0.9 / -0.5 m."""
+    state = model.initial_state()
+    side = np.sign(model.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0, 1])
+    result = model.contact_at_rest(state, _strip(100.0, 5.2, y=-side * offset)[None])
+    assert (result.force[0, 0] > 0.0) == touches
+
+
+def test_no_contact_beyond_the_ends_of_the_line(model):
+    state = model.initial_state()
+    for x in (-5.0, 305.0):
+        result = model.contact_at_rest(state, _strip(x, 9.0)[None])
+        assert result.force[0, 0] == 0.0
+        assert np.isnan(result.point[0, 0]).all()
+
+
+def test_contact_is_lost_and_found_again(model):
+    """A strip that dips below the wire for 20 ms: no force then, force before and after."""
+    state = model.initial_state()
+    z0 = float(model.contact_at_rest(state, _strip(120.0, 6.0)[None]).point[0, 0, 2])
+    forces = []
+    for n in range(60):
+        height = z0 + (0.006 if n < 20 or n >= 40 else -0.05)
+        motion = StripMotion(_strip(120.0 + 0.08 * n, height)[None], np.zeros(1))
+        forces.append(model.step(state, 1e-3, motion).force[0, 0])
+    assert min(forces[5:20]) > 10.0
+    assert max(forces[21:40]) == 0.0
+    assert min(forces[45:]) > 1.0

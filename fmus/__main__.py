@@ -1,0 +1,72 @@
+"""Command line: ``python -m fmus build | fingerprint | list``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from fmus.build import BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe
+
+DEFAULT_FOLDER = Path("build/fmus")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; 0 for success, 1 for a failure, 2 for a wrong command line."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except UnknownFmuError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except (BuildError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs.")
+    verbs = parser.add_subparsers(required=True, metavar="COMMAND")
+    verb = verbs.add_parser("build", help="build FMUs, all of the library if none is named")
+    verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, ...")
+    verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
+    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
+    verb.set_defaults(run=_build)
+    verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
+    verb.add_argument("name", metavar="NAME")
+    verb.set_defaults(run=_fingerprint)
+    verb = verbs.add_parser("list", help="list the FMUs that can be built")
+    verb.set_defaults(run=_list)
+    return parser
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} is not a number of pantographs")
+    return value
+
+
+def _build(options: argparse.Namespace) -> None:
+    for wanted in _recipes(options.names or known_names(), options.pantographs):
+        print(build(wanted, options.out))
+
+
+def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:
+    # All names are looked up before anything is built: a typing error must not cost a build.
+    return [recipe(name, pantographs) for name in names]
+
+
+def _fingerprint(options: argparse.Namespace) -> None:
+    print(fingerprint(recipe(options.name)))
+
+
+def _list(options: argparse.Namespace) -> None:
+    for name in known_names():
+        print(name)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

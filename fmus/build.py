@@ -1,0 +1,330 @@
+"""Building FMUs: from a definition and the sources to one deterministic archive."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import io
+import json
+import os
+import sys
+import tempfile
+import tomllib
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree.ElementTree import Element, indent, tostring
+
+import pythonfmu
+
+from fmus.bundle import BundleError, Module, collect, rewrite
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+LIBRARY = REPOSITORY / "models" / "library"
+PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
+#: Packages that are carried inside an FMU; pythonfmu too, for another FMU may bring another version of it.
+ROOTS: Mapping[str, Path] = {
+    "models": REPOSITORY / "models",
+    "fmus": REPOSITORY / "fmus",
+    "pythonfmu": PYTHONFMU,
+}
+_EMPTIED = frozenset({"pythonfmu"})
+#: The earliest time a zip archive can hold: the same for every file, so that builds are identical.
+_ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+#: Kind of pantograph, as its definition says -> module and class of the adapter.
+_PANTOGRAPHS: Mapping[str, tuple[str, str]] = {"lumped": ("fmus.pantograph", "LumpedPantographSlave")}
+_PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
+
+_SCRIPT = '''"""Entry for pythonfmu. Generated; the name of this file holds the content hash."""
+
+{imports}
+from {package}.fmus.adapter import hold
+from {package}.{module} import {base}
+
+hold(globals())
+
+
+class {name}({base}):
+    """The adapter, with what is special about this FMU."""
+
+    fingerprint = "{fingerprint}"
+    description = {title!r}
+{settings}'''
+
+
+class BuildError(ValueError):
+    """An FMU that cannot be built; says which and why."""
+
+
+class UnknownFmuError(BuildError):
+    """No FMU of this name; lists those that there are."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What an FMU is made of.
+
+    Attributes
+    ----------
+    name : str
+        Model name and name of the file, a Python identifier.
+    title : str
+        One line for users.
+    module, base : str
+        The adapter: a subclass of ``Adapter`` and its module.
+    definition : Path
+        File that becomes ``resources/definition.toml``.
+    settings : mapping
+        Class attributes of the adapter.
+    roots : mapping
+        Packages that are carried along, and their folders.
+    """
+
+    name: str
+    title: str
+    module: str
+    base: str
+    definition: Path
+    settings: Mapping[str, int] = field(default_factory=dict)
+    roots: Mapping[str, Path] = field(default_factory=lambda: ROOTS)
+
+
+@dataclass(frozen=True)
+class _Sources:
+    """All that decides about an FMU's bytes, and the hash of it."""
+
+    modules: Mapping[str, Module]
+    definition: bytes
+    binaries: Mapping[str, bytes]
+    licenses: Mapping[str, bytes]
+    fingerprint: str
+
+    @property
+    def package(self) -> str:
+        return f"openpanto_{self.fingerprint.replace('-', '')[:12]}"
+
+
+def known_names() -> list[str]:
+    """Return the names of all FMUs that the library has definitions for."""
+    lines = [f"Catenary_{path.stem}" for path in _definitions("lines")]
+    files = _definitions("pantographs")
+    pantographs = [f"Pantograph_{path.stem}" for path in files if _head(path).get("type") in _PANTOGRAPHS]
+    return lines + pantographs
+
+
+def recipe(name: str, pantographs: int | None = None) -> Recipe:
+    """Return how to make the FMU of a name.
+
+    Parameters
+    ----------
+    name : str
+        ``Catenary_LINE``, ``Catenary_LINE_P2`` for two pantograph ports, or ``Pantograph_NAME``.
+    pantographs : int, optional
+        Number of pantograph ports of a line; the name gets the suffix ``_Pn``.
+
+    Raises
+    ------
+    UnknownFmuError
+        If the library has no definition for it.
+    """
+    kind, _, rest = name.partition("_")
+    stem, ports = _split_ports(rest, pantographs)
+    if kind == "Catenary" and (path := LIBRARY / "lines" / f"{stem}.toml").is_file():
+        suffix = f"_P{ports}" if ports > 1 else ""
+        return Recipe(
+            f"Catenary_{stem}{suffix}",
+            _head(path).get("title") or f"Overhead contact line {stem}",
+            "fmus.catenary",
+            "CatenarySlave",
+            path,
+            {"pantographs": ports},
+        )
+    path = LIBRARY / "pantographs" / f"{rest}.toml"
+    if kind == "Pantograph" and path.is_file() and (adapter := _PANTOGRAPHS.get(_head(path).get("type", ""))):
+        return Recipe(name, _head(path).get("title") or f"Pantograph {rest}", *adapter, path)
+    known = ", ".join(known_names()) or "none"
+    raise UnknownFmuError(
+        f"There is no FMU '{name}'; known are {known} (and NAME_P2: a line for two pantographs)."
+    )
+
+
+def fingerprint(wanted: Recipe) -> str:
+    """Return the content hash of an FMU, its GUID, without building it."""
+    return _gather(wanted).fingerprint
+
+
+def build(wanted: Recipe, folder: Path) -> Path:
+    """Write ``folder/NAME.fmu`` and return its path; other builds may run at the same time.
+
+    Raises
+    ------
+    BuildError
+        If the definition or the sources do not make an FMU.
+    """
+    data = archive(wanted)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{wanted.name}.fmu"
+    handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{wanted.name}.", suffix=".tmp")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path
+
+
+def archive(wanted: Recipe) -> bytes:
+    """Return the bytes of an FMU; the same sources give the same bytes."""
+    files = _contents(wanted, _gather(wanted))
+    buffer = io.BytesIO()
+    # Stored, not compressed: what a compressor makes of the same input differs between its versions.
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as package:
+        for name, data in sorted(files.items()):
+            entry = zipfile.ZipInfo(name, _ZIP_DATE)
+            entry.create_system = 3
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            package.writestr(entry, data)
+    return buffer.getvalue()
+
+
+def _definitions(folder: str) -> list[Path]:
+    return sorted((LIBRARY / folder).glob("*.toml"))
+
+
+def _head(path: Path) -> dict[str, str]:
+    """Return the plain texts of a definition; a file that cannot be read has none, the build says why."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {"type": "lumped"}
+    return {key: value for key, value in data.items() if isinstance(value, str)}
+
+
+def _split_ports(text: str, pantographs: int | None) -> tuple[str, int]:
+    stem, separator, number = text.rpartition("_P")
+    if separator and number.isdigit() and int(number) > 0:
+        return stem, pantographs or int(number)
+    return text, pantographs or 1
+
+
+def _gather(wanted: Recipe) -> _Sources:
+    try:
+        modules = collect(wanted.module, wanted.roots, _EMPTIED)
+        definition = wanted.definition.read_bytes()
+    except (BundleError, SyntaxError) as error:
+        raise BuildError(f"{wanted.name}: {error}") from error
+    except OSError as error:
+        raise BuildError(f"{wanted.name}: {error.filename} cannot be read ({error.strerror})") from error
+    binaries, licenses = _binaries(wanted.name), _licenses()
+    pieces = {f"module/{n}": m.source.encode() for n, m in modules.items()} | binaries | licenses
+    # The build itself decides about the bytes as well.
+    pieces |= {"build": Path(__file__).read_bytes(), "recipe": _recipe_bytes(wanted)}
+    pieces["definition"] = definition
+    return _Sources(modules, definition, binaries, licenses, _hash(pieces))
+
+
+def _recipe_bytes(wanted: Recipe) -> bytes:
+    texts = [wanted.name, wanted.title, wanted.module, wanted.base, dict(wanted.settings)]
+    return json.dumps(texts, sort_keys=True).encode()
+
+
+def _hash(pieces: Mapping[str, bytes]) -> str:
+    """Return a SHA-256 over names and contents, cut and written as a GUID."""
+    whole = hashlib.sha256()
+    for name, data in sorted(pieces.items()):
+        whole.update(f"{name}\0{len(data)}\0".encode() + data)
+    digest = whole.hexdigest()
+    return "-".join([digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32]])
+
+
+def _binaries(name: str) -> dict[str, bytes]:
+    folder = PYTHONFMU / "resources" / "binaries"
+    files = sorted(p for p in folder.rglob("*") if p.suffix in _PLATFORMS)
+    return {f"binaries/{p.parent.name}/{name}{p.suffix}": p.read_bytes() for p in files}
+
+
+def _licenses() -> dict[str, bytes]:
+    found = {"openpanto": REPOSITORY / "LICENSE"}
+    for info in PYTHONFMU.parent.glob(f"pythonfmu-{pythonfmu.__version__}.dist-info"):
+        found["pythonfmu"] = next(iter(sorted(info.rglob("LICENSE*"))), info)
+    files = {name: path for name, path in sorted(found.items()) if path.is_file()}
+    return {f"documentation/licenses/{name}.txt": path.read_bytes() for name, path in files.items()}
+
+
+def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:
+    script = f"{wanted.name}_{sources.package.removeprefix('openpanto_')}"
+    resources = {
+        "slavemodule.txt": script.encode(),
+        f"{script}.py": _script(wanted, sources).encode(),
+        "definition.toml": sources.definition,
+        "requirements.txt": b"numpy\nscipy\n",
+        f"{sources.package}/__init__.py": f'"""Sources of {wanted.name}."""\n'.encode(),
+    }
+    try:
+        for module in sources.modules.values():
+            text = rewrite(module, sources.package, wanted.roots)
+            resources[f"{sources.package}/{module.inner_path()}"] = text.encode()
+    except BundleError as error:
+        raise BuildError(f"{wanted.name}: {error}") from error
+    description = _describe(wanted, sources.package, script, resources)
+    files = {f"resources/{name}": data for name, data in resources.items()}
+    return files | {"modelDescription.xml": description, **sources.binaries, **sources.licenses}
+
+
+def _script(wanted: Recipe, sources: _Sources) -> str:
+    # Everything is imported at once: the folder of the first of two instances may be gone later.
+    imports = "\n".join(f"import {sources.package}.{name}" for name in sources.modules)
+    settings = "".join(f"    {name} = {value!r}\n" for name, value in sorted(wanted.settings.items()))
+    return _SCRIPT.format(
+        title=wanted.title,
+        imports=imports,
+        package=sources.package,
+        module=wanted.module,
+        base=wanted.base,
+        name=wanted.name,
+        fingerprint=sources.fingerprint,
+        settings=settings,
+    )
+
+
+def _describe(wanted: Recipe, package: str, script: str, resources: Mapping[str, bytes]) -> bytes:
+    """Return the model description, made by the packed sources themselves: so they are known to import."""
+    with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
+        for name, data in resources.items():
+            path = Path(folder) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        with _importable(folder, (package, script)):
+            root = _instance_description(wanted, script, folder)
+    indent(root)
+    text = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+def _instance_description(wanted: Recipe, script: str, folder: str) -> Element:
+    try:
+        slave_class = getattr(importlib.import_module(script), wanted.name)
+        root: Element = slave_class(instance_name=wanted.name, resources=folder).to_xml()
+    except Exception as error:
+        raise BuildError(f"{wanted.name} cannot be built: {error}") from error
+    return root
+
+
+@contextmanager
+def _importable(folder: str, names: tuple[str, ...]) -> Iterator[None]:
+    """Make a folder's modules importable for a while, and forget them afterwards: their files go away."""
+    no_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    sys.path.insert(0, folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+        sys.dont_write_bytecode = no_bytecode
+        for name in [n for n in sys.modules if n.partition(".")[0] in names]:
+            del sys.modules[name]
+        importlib.invalidate_caches()

@@ -1,0 +1,119 @@
+"""Ports of an overhead contact line."""
+
+from __future__ import annotations
+
+from operator import attrgetter
+from pathlib import Path
+from typing import ClassVar
+
+from models.catenary.part import CatenaryPart
+
+from fmus.adapter import Adapter
+from fmus.ports import Port, Ports, Signal, vector
+from models.catenary.parameters import CatenaryDefinition, load
+from models.part import FloatArray
+
+#: An unconnected port is a strip far below the wire, which touches nothing.
+_FAR_BELOW = -100.0
+_HALF_WIDTH = {"A": 0.5, "B": -0.5}
+
+
+class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
+    """Overhead contact line: collector strips in, contact forces and points out."""
+
+    pantographs: ClassVar[int] = 1
+
+    def _read_definition(self, path: Path) -> CatenaryDefinition:
+        return load(path)
+
+    def _make_part(self, definition: CatenaryDefinition) -> CatenaryPart:
+        return CatenaryPart(definition, pantographs=self.pantographs)
+
+    def _make_ports(self, part: CatenaryPart) -> Ports:
+        numbers = range(1, self.pantographs + 1)
+        return Ports(
+            inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
+            outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
+            local=(_dropper_port(part),),
+            calculated=_geometry_ports(part),
+        )
+
+    def _initialise(self, part: CatenaryPart, time: float, inputs: FloatArray) -> None:
+        part.initialise(time, inputs.reshape(self.pantographs, 2, 2, 3))
+
+    def _advance(self, part: CatenaryPart, inputs: FloatArray, step: float) -> None:
+        part.step(inputs.reshape(self.pantographs, 2, 2, 3), step)
+
+
+def _end(number: int, end: str) -> tuple[Signal, ...]:
+    name, text = f"pantograph[{number}].{end}", f"of end {end} of the collector strip"
+    position = vector(f"{name}.", "m", f"position {text}", (0.0, _HALF_WIDTH[end], _FAR_BELOW))
+    return position + vector(f"{name}.v", "m/s", f"velocity {text}", (0.0, 0.0, 0.0))
+
+
+def _contact_ports(numbers: range, sections: int) -> tuple[Port, ...]:
+    force = tuple(
+        Signal(
+            f"pantograph[{p}].contact.force",
+            "N",
+            "contact force; positive pushes the wire up, the strip down",
+        )
+        for p in numbers
+    )
+    point = tuple(
+        s
+        for p in numbers
+        for s in vector(f"pantograph[{p}].contact.", "m", "point of application of the contact force")
+    )
+    ports = (Port(force, attrgetter("contact_force")), Port(point, attrgetter("contact_point")))
+    return ports if sections == 1 else (*ports, _section_port(numbers, sections))
+
+
+def _section_port(numbers: range, sections: int) -> Port:
+    signals = tuple(
+        Signal(f"pantograph[{p}].section[{s}].force", "N", f"part of the contact force on wire section {s}")
+        for p in numbers
+        for s in range(1, sections + 1)
+    )
+    return Port(signals, attrgetter("section_force"))
+
+
+def _uplift_port(part: CatenaryPart) -> Port:
+    signals = tuple(
+        Signal(f"support[{i}].uplift", "m", f"uplift of the contact wire at support {s.name}, x = {s.x:g} m")
+        for i, s in enumerate(part.supports, 1)
+    )
+    return Port(signals, attrgetter("support_uplift"))
+
+
+def _dropper_port(part: CatenaryPart) -> Port:
+    signals = tuple(
+        Signal(f"dropper[{j}].force", "N", f"tension of dropper {d.name}, x = {d.x:g} m")
+        for j, d in enumerate(part.droppers, 1)
+    )
+    return Port(signals, attrgetter("dropper_force"))
+
+
+def _geometry_ports(part: CatenaryPart) -> tuple[Port, ...]:
+    supports = [
+        ("x", "support_x", "position along the track"),
+        ("y", "support_y", "static lateral position of the contact wire"),
+        ("z", "support_z", "static height of the contact wire"),
+        ("messenger_wire.z", "support_messenger_z", "static height of the messenger wire"),
+    ]
+    droppers = [
+        ("x", "dropper_x", "position along the track"),
+        ("lower.y", "dropper_lower_y", "static lateral position of the lower end"),
+        ("lower.z", "dropper_lower_z", "static height of the lower end"),
+        ("upper.z", "dropper_upper_z", "static height of the upper end"),
+        ("length", "dropper_length", "unstressed length"),
+    ]
+    return (
+        *(_length_port("support", len(part.supports), *row) for row in supports),
+        *(_length_port("dropper", len(part.droppers), *row) for row in droppers),
+    )
+
+
+def _length_port(thing: str, count: int, name: str, attribute: str, text: str) -> Port:
+    signals = tuple(Signal(f"{thing}[{i}].{name}", "m", f"{text}, {thing} {i}") for i in range(1, count + 1))
+    return Port(signals, attrgetter(f"geometry.{attribute}"))

@@ -1,0 +1,143 @@
+"""Builds: the same from the same sources, apart from other builds, and at home anywhere."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from fmus.__main__ import main
+from fmus.build import REPOSITORY, BuildError, archive, build, fingerprint
+from tests.fmus.support import Instance, toy_recipe, toy_variant
+
+_BUILD_ELSEWHERE = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from tests.fmus.support import toy_recipe
+from fmus.build import build
+build(toy_recipe(), Path(sys.argv[2]))
+"""
+
+_RUN_ALONE = """
+import json, sys, fmpy
+sys.path = [p for p in sys.path if p not in ("", sys.argv[2])]
+result = fmpy.simulate_fmu(sys.argv[1], stop_time=0.01, step_size=1e-3, output_interval=1e-3,
+    start_values={"stiffness": 250.0}, output=["mass[2].z"])
+ours = sorted(m for m in sys.modules if m.partition(".")[0] in ("models", "fmus", "pythonfmu", "toy"))
+print(json.dumps([float(result["mass[2].z"][-1]), ours]))
+"""
+
+
+@pytest.mark.parametrize("seed", ["1", "77"])
+def test_same_bytes_from_another_folder_process_and_hash_seed(toy_fmu, tmp_path, seed):
+    subprocess.run(
+        [sys.executable, "-c", _BUILD_ELSEWHERE, str(REPOSITORY), str(tmp_path / "out")],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONHASHSEED": seed, "TZ": "Asia/Tokyo"},
+        check=True,
+    )
+    assert (tmp_path / "out" / "Toy.fmu").read_bytes() == toy_fmu.read_bytes()
+
+
+def test_fingerprint_is_the_guid(instantiate):
+    assert instantiate().description.guid == fingerprint(toy_recipe())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "file"),
+    [
+        ("GAIN = 1.0", "GAIN = 2.0", "law.py"),
+        ("choice: round", "Table 2", "toy.toml"),
+        ("not used", "of no use", "slave.py"),
+    ],
+)
+def test_any_change_of_sources_changes_the_fingerprint(tmp_path, old, new, file):
+    assert fingerprint(toy_recipe(toy_variant(tmp_path, old, new, file))) != fingerprint(toy_recipe())
+
+
+def test_two_builds_in_one_process_do_not_mix(toy_fmu, tmp_path, instantiate):
+    other = build(toy_recipe(toy_variant(tmp_path, "GAIN = 1.0", "GAIN = 2.0")), tmp_path)
+    first, second, again = instantiate(), instantiate(other), instantiate()
+    for instance in (first, second, again):
+        instance.initialise(force=5.0)
+    assert first["spring[1].force"] == again["spring[1].force"] == pytest.approx(5.0)
+    assert second["spring[1].force"] == pytest.approx(20.0)
+
+
+def test_second_instance_outlives_the_first_ones_folder(toy_fmu):
+    first = Instance(toy_fmu)
+    second = Instance(toy_fmu)
+    first.initialise()
+    first.free()
+    second.initialise(force=1.0)
+    assert second["spring[1].force"] == pytest.approx(1.0)
+    second.free()
+
+
+def test_runs_alone_anywhere(toy_fmu, tmp_path, instantiate):
+
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    command = [sys.executable, "-I", "-c", _RUN_ALONE, str(toy_fmu), str(REPOSITORY)]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, check=True, capture_output=True, text=True)
+    value, shared = json.loads(done.stdout.splitlines()[-1])
+    assert shared == []
+    reference = instantiate()
+    reference.initialise(stiffness=250.0)
+    for n in range(10):
+        reference.step(n * 1e-3)
+    assert value == pytest.approx(reference["mass[2].z"], rel=1e-12)
+
+
+def test_archive_holds_what_is_needed_and_no_more(toy_fmu, instantiate):
+    guid = instantiate().description.guid.replace("-", "")[:12]
+    with zipfile.ZipFile(toy_fmu) as package:
+        names = set(package.namelist())
+        definition = package.read("resources/definition.toml")
+    private = {n.removeprefix(f"resources/openpanto_{guid}/") for n in names if f"openpanto_{guid}/" in n}
+    assert definition == (Path(__file__).parent / "toy" / "toy.toml").read_bytes()
+    assert {"__init__.py", "models/schema.py", "toy/law.py", "fmus/adapter.py"} <= private
+    assert not {"models/contact.py", "fmus/build.py", "pythonfmu/builder.py", "conftest.py"} & private
+    assert {"binaries/linux64/Toy.so", "binaries/win64/Toy.dll"} <= names
+    assert not any("__pycache__" in n for n in names)
+
+
+def test_concurrent_builds_leave_a_whole_file(tmp_path):
+    command = [sys.executable, "-c", _BUILD_ELSEWHERE, str(REPOSITORY), str(tmp_path)]
+    running = [subprocess.Popen(command) for _ in range(3)]
+    assert [process.wait() for process in running] == [0, 0, 0]
+    assert [p.name for p in tmp_path.iterdir()] == ["Toy.fmu"]
+    assert (tmp_path / "Toy.fmu").read_bytes() == archive(toy_recipe())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "file", "text"),
+    [
+        ("GAIN = 1.0", "import rich\nGAIN = 1.0", "law.py", "imports rich"),
+        ("GAIN = 1.0", "GAIN = ", "law.py", "syntax"),
+        ('"N/m"', '"kg"', "toy.toml", "unit 'kg' where a unit of 'N/m' is needed"),
+        ("mass =", "mess =", "toy.toml", "mass: is missing"),
+    ],
+)
+def test_what_cannot_be_built_is_said(tmp_path, old, new, file, text):
+    with pytest.raises(BuildError, match=text):
+        build(toy_recipe(toy_variant(tmp_path, old, new, file)), tmp_path / "out")
+    assert not list((tmp_path / "out").glob("*"))
+
+
+def test_unknown_name_lists_the_known_ones(tmp_path, capsys):
+    assert main(["build", "Catenary_LN2", "Catenary_Nowhere", "--out", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("There is no FMU 'Catenary_Nowhere'; known are")
+    assert "Catenary_LN2" in told
+    assert not list(tmp_path.iterdir())
+
+
+def test_list_names_every_definition(capsys):
+    assert main(["list"]) == 0
+    assert "Catenary_LN2" in capsys.readouterr().out.split()

@@ -61,7 +61,7 @@ class CoupledModel:
         self.line = line
         self.pantographs = [LumpedModel(p) for p in pantographs]
         self.line_state = line.initial_state(len(self.pantographs))
-        self.states: list[LumpedState] = [p.initial_state() for p in self.pantographs]
+        self.states: list[LumpedState] = [p.initial_state(p.load(0.0, np.zeros(2))) for p in self.pantographs]
         self.time = 0.0
 
     def step(self, step: float, end: float) -> tuple[FloatArray, FloatArray]:
@@ -119,7 +119,7 @@ class CoupledModel:
 
     def _empty_record(self, rows: int, step: float) -> CoupledRecord:
         P = len(self.pantographs)
-        time = np.arange(rows) * step
+        time = np.arange(rows, dtype=np.float64) * step
         position = np.stack([p.definition.start_position + p.definition.speed * time for p in self.pantographs], 1)
         line = self.line
         return CoupledRecord(

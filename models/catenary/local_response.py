@@ -28,6 +28,8 @@ from models.contact import ContactLaw, ContactParameters, NormalForce
 from models.part import FloatArray, IntArray
 
 _MAX_ITERATIONS = 60
+#: Relative change of the contact forces at which a nonlinear contact law counts as solved.
+_TOLERANCE = 1e-10
 
 
 class LocalSolutionError(RuntimeError):
@@ -154,7 +156,8 @@ class LocalProblem:
             penetration, velocity = coupling.penetration(forces, slack, compensation)
             now_slack = np.flatnonzero(elastic < 0.0)
             signature = (now_slack.tobytes(), (penetration > 0.0).tobytes())
-            if signature == previous and np.array_equal(now_slack, slack) and change <= 1e-10 * (1.0 + forces.max(initial=0.0)):
+            settled = change <= _TOLERANCE * (1.0 + forces.max(initial=0.0))
+            if settled and signature == previous and np.array_equal(now_slack, slack):
                 return LocalForces(forces, velocity, penetration > 0.0, slack, compensation, elastic)
             previous = signature
             compensation = _carried(now_slack, slack, compensation)
@@ -250,7 +253,7 @@ class _Coupling:
             system[n:, :n] += share * self.dropper_contact[slack]
             system[n:, n:] -= share * self.dropper_dropper(slack, slack)
             right[n:] = -share * free[slack]
-        solution = np.linalg.solve(system, right) if n + m else right
+        solution = np.asarray(np.linalg.solve(system, right) if n + m else right, dtype=np.float64)
         return solution[:n], solution[n:]
 
 

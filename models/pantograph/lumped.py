@@ -44,9 +44,10 @@ class LumpedModel:
         self.size = n
         self._inverse: dict[float, tuple[Newmark, FloatArray]] = {}
 
-    def initial_state(self) -> LumpedState:
-        """Return the pantograph at rest at its reference height."""
-        return LumpedState(*(np.zeros(self.size) for _ in range(3)))
+    def initial_state(self, load: FloatArray | None = None) -> LumpedState:
+        """Return the pantograph at rest at its reference height, its acceleration that of ``load``, shape (n,) [N]."""
+        acceleration = np.zeros(self.size) if load is None else load / np.diag(self.M)
+        return LumpedState(np.zeros(self.size), np.zeros(self.size), acceleration)
 
     def free_response(self, state: LumpedState, step: float, load: FloatArray) -> FloatArray:
         """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value."""
@@ -95,7 +96,8 @@ class LumpedModel:
     def _effective(self, step: float) -> tuple[Newmark, FloatArray]:
         if step not in self._inverse:
             newmark = Newmark(step)
-            self._inverse[step] = newmark, np.linalg.inv(self.K + newmark.a0 * self.M + newmark.a1 * self.C)
+            inverse = np.linalg.inv(self.K + newmark.a0 * self.M + newmark.a1 * self.C)
+            self._inverse[step] = newmark, np.asarray(inverse, dtype=np.float64)
         return self._inverse[step]
 
 
@@ -139,7 +141,9 @@ class LumpedPantographPart:
         """
         del point
         self.time = self._start_time = time
-        self.state = self.model.initial_state()
+        load = self.model.load(0.0, base)
+        load[-1] -= force
+        self.state = self.model.initial_state(load)
         self._force.start(time, force)
         self._base[...] = base
         self._place_strip()
@@ -176,7 +180,9 @@ class LumpedPantographPart:
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
         self.time, self._start_time = (float(t) for t in snapshot["time"])
-        self.state = LumpedState(*(snapshot[n].copy() for n in ("displacement", "velocity", "acceleration")))
+        self.state = LumpedState(
+            *(np.array(snapshot[n], dtype=np.float64) for n in ("displacement", "velocity", "acceleration"))
+        )
         self._base[...] = snapshot["base"]
         self._force.restore(snapshot)
         self._place_strip()

@@ -1,0 +1,121 @@
+"""Lumped pantographs: statics, frequencies, time integration, communication."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+
+from models.pantograph.lumped import LumpedModel, LumpedPantographPart
+from models.part import ParameterError
+
+POINT, BASE = np.zeros(3), np.zeros(2)
+
+
+def test_equations_are_those_of_three_masses(cx):
+    """Written out from the source's equations 2.12 to 2.14."""
+    model = LumpedModel(cx)
+    (m1, k1, c1), (m2, k2, c2), (m3, k3, c3) = [(s.mass, s.stiffness, s.damping) for s in cx.stage]
+    assert np.array_equal(np.diag(model.M), [m1, m2, m3])
+    assert model.K == pytest.approx(np.array([[k1 + k2, -k2, 0], [-k2, k2 + k3, -k3], [0, -k3, k3]]))
+    assert model.C == pytest.approx(np.array([[c1 + c2, -c2, 0], [-c2, c2 + c3, -c3], [0, -c3, c3]]))
+
+
+def test_steady_state_balances_uplift_and_contact_force(cx):
+    """At rest F_static - F = k1 (rise of the lowest mass): k1 takes uplift away as the strip rises."""
+    part = LumpedPantographPart(cx.with_values({"speed": 0.0, "static_force": 120.0, "raise_duration": 1.0}))
+    part.initialise(0.0, 0.0, POINT, BASE)
+    for _ in range(20000):
+        part.step(100.0, POINT, BASE, 1e-3)
+    rise = part.observation_values()[0] - cx.reference_height
+    assert cx.stage[0].stiffness * rise == pytest.approx(20.0, rel=1e-3)
+
+
+def test_roof_motion_lifts_the_pantograph(cx):
+    part = LumpedPantographPart(cx.with_values({"speed": 0.0, "static_force": 0.0}))
+    part.initialise(0.0, 0.0, POINT, BASE)
+    for _ in range(20000):
+        part.step(0.0, POINT, np.array([0.05, 0.0]), 1e-3)
+    assert part.strip[0, 0, 2] == pytest.approx(cx.reference_height + 0.05, abs=1e-5)
+
+
+def test_no_uplift_no_motion(cx):
+    part = LumpedPantographPart(cx.with_values({"static_force": 0.0}))
+    part.initialise(0.0, 0.0, POINT, BASE)
+    for _ in range(100):
+        part.step(0.0, POINT, BASE, 1e-3)
+    assert part.strip[:, 0, 2] == pytest.approx(cx.reference_height, abs=1e-15)
+    assert part.strip[0, 0, 0] == pytest.approx(cx.speed * 0.1)
+
+
+def _force(t):
+    return 100.0 + 40.0 * np.sin(2.0 * np.pi * 3.0 * t)
+
+
+def _exact(cx, stop):
+    model = LumpedModel(cx)
+    M_inverse = np.linalg.inv(model.M)
+
+    def rate(t, y):
+        load = model.load(t, BASE)
+        load[-1] -= _force(t)
+        return np.concatenate([y[3:], M_inverse @ (load - model.C @ y[3:] - model.K @ y[:3])])
+
+    return solve_ivp(rate, (0.0, stop), np.zeros(6), rtol=1e-10, atol=1e-12, max_step=0.01).y[:3, -1]
+
+
+@pytest.mark.parametrize(("order", "expected"), [(0, 1.0), (1, 2.0), (2, 2.0)])
+def test_order_of_a_step_with_extrapolated_force(cx, order, expected):
+    """Held force: first order; continued force: second, the trapezoidal rule's own."""
+    definition = cx.with_values({"speed": 0.0, "extrapolation_order": order, "raise_duration": 0.0})
+    exact = _exact(definition, 0.5)
+    errors = []
+    for h in (2e-3, 1e-3, 5e-4):
+        part = LumpedPantographPart(definition.with_values({"time_step": h}))
+        part.initialise(0.0, _force(0.0), POINT, BASE)
+        for n in range(round(0.5 / h)):
+            part.step(_force(n * h), POINT, BASE, h)
+        errors.append(np.abs(part.state.displacement - exact).max())
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(expected, abs=0.25)
+
+
+def test_natural_frequencies_of_cx(cx):
+    """Printed parameters give modes near 0.45, 8 and 11 Hz when the strip is free; checked by a Rayleigh quotient."""
+    model = LumpedModel(cx)
+    omega2, modes = eigh(model.K, model.M)
+    for value, mode in zip(omega2, modes.T, strict=True):
+        assert mode @ model.K @ mode / (mode @ model.M @ mode) == pytest.approx(value)
+    assert np.sqrt(omega2[0]) / (2 * np.pi) == pytest.approx(np.sqrt(178.45 / 22.11) / (2 * np.pi), rel=0.01)
+
+
+def test_macro_steps_longer_than_the_time_step_are_divided(cx):
+    """Two halves of a macro step give what one call gives, force and roof standing still."""
+    one, two = LumpedPantographPart(cx), LumpedPantographPart(cx)
+    for part in (one, two):
+        part.initialise(0.0, 0.0, POINT, BASE)
+    for n in range(50):
+        one.step(0.0, POINT, BASE, 2e-3)
+        for _ in range(2):
+            two.step(0.0, POINT, BASE, 1e-3)
+        del n
+    assert one.strip == pytest.approx(two.strip, abs=1e-12)
+
+
+def test_snapshots_continue_identically(cx):
+    first, second = LumpedPantographPart(cx), LumpedPantographPart(cx)
+    first.initialise(0.0, 0.0, POINT, BASE)
+    for n in range(20):
+        first.step(_force(n * 1e-3), POINT, BASE, 1e-3)
+    second.restore(first.snapshot())
+    for n in range(20, 40):
+        for part in (first, second):
+            part.step(_force(n * 1e-3), POINT, BASE, 1e-3)
+    assert np.array_equal(first.strip, second.strip)
+    assert np.array_equal(first.observation_values(), second.observation_values())
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("stage[2].mass", -1.0), ("stage[4].mass", 1.0), ("speed", np.nan), ("sped", 80.0)]
+)
+def test_wrong_parameters_are_refused_by_name(cx, name, value):
+    with pytest.raises(ParameterError, match=name.replace("[", r"\[").replace("]", r"\]")):
+        cx.with_values({name: value})

@@ -1,0 +1,159 @@
+"""The monolithic coupling against one assembled system, and the co-simulation of the parts against it."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
+
+from models.catenary.model import CatenaryModel
+from models.catenary.part import CatenaryPart
+from models.coupled import CoupledModel
+from models.pantograph.lumped import LumpedModel, LumpedPantographPart
+from models.time_integration import Newmark
+
+START, STOP = 60.0, 1.2
+
+
+@pytest.fixture(scope="module")
+def line(line_maker):
+    return line_maker(spans=5)
+
+
+@pytest.fixture(scope="module")
+def pantograph(cx):
+    return cx.with_values({"start_position": START, "raise_duration": 0.05})
+
+
+def _assembled(line, pantograph, dt, steps):
+    """One matrix for line, pantograph and contact spring, assembled and solved anew every step."""
+    catenary, lumped = CatenaryModel(line), LumpedModel(pantograph)
+    newmark, n, m = Newmark(dt), len(catenary.free), lumped.size
+    M = sp.block_diag([catenary.M, lumped.M], format="csr")
+    C = sp.block_diag([catenary.C, lumped.C], format="csr")
+    K = sp.block_diag([catenary.K, lumped.K], format="csr")
+    base = (K + newmark.a0 * M + newmark.a1 * C).tocsc()
+    wire, k = catenary.wires[0], line.contact.stiffness
+    d, v, a = (np.zeros(n + m) for _ in range(3))
+    forces, element = [], -1
+    for step in range(1, steps + 1):
+        t = step * dt
+        right = M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a) + C @ (newmark.a1 * d + newmark.a4 * v)
+        right[n:] += lumped.load(t, np.zeros(2))
+        x = pantograph.start_position + pantograph.speed * t
+        strip = np.array([[[x, y, 0.0], [pantograph.speed, 0, 0]] for y in (0.7, -0.7)])
+        found = wire.find(strip, spsolve(base, right)[:n], element)
+        element = found.element
+        item, powers = wire.elements[found.element], found.powers
+        row = np.zeros(n + m)
+        row[item.dofs] = -(powers @ item.rows)
+        row[-1] = 1.0
+        row = sp.csc_matrix(row[:, None])
+        gap0 = pantograph.reference_height - powers @ item.static
+        slack: set[int] = set()
+        closed = False
+        for _ in range(50):
+            system, load = base, right.copy()
+            if closed:
+                system = system + k * (row @ row.T)
+                load -= k * gap0 * row.toarray()[:, 0]
+            if slack:
+                rows = sp.block_diag([catenary.B, sp.csr_matrix((0, m))], format="csr")[sorted(slack)]
+                stiff = sp.diags(catenary.dropper_stiffness[sorted(slack)])
+                system = system - rows.T @ stiff @ rows
+                load += rows.T @ catenary.static.dropper_force[sorted(slack)]
+            new = spsolve(system.tocsc(), load)
+            gap = gap0 + (row.T @ new)[0]
+            elastic = catenary.static.dropper_force + catenary.dropper_stiffness * (catenary.B @ new[:n])
+            now = set(np.flatnonzero(elastic < 0.0).tolist())
+            if (gap > 0.0) == closed and now == slack:
+                break
+            closed, slack = bool(gap > 0.0), now
+        acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
+        v = v + 0.5 * dt * (a + acceleration)
+        d, a = new, acceleration
+        forces.append(k * max(gap, 0.0))
+    return np.array(forces)
+
+
+def test_coupling_by_local_response_equals_one_assembled_system(line, pantograph):
+    """Independent of the step's split into free response and local corrections, slack included."""
+    steps, dt = 350, 1e-3
+    low = line.with_values({"damping.alpha": 0.00275})
+    expected = _assembled(low, pantograph, dt, steps)
+    coupled = CoupledModel(CatenaryModel(low), [pantograph])
+    record = coupled.run(steps * dt, dt)
+    assert expected.max() > 100.0
+    assert (record.dropper_force <= 1e-9).any()
+    assert np.abs(record.contact_force[1:, 0] - expected).max() < 1e-5
+
+
+def _cosimulate(line, pantograph, H, scheme, order):
+    settings = {"extrapolation_order": order, "time_step": H}
+    catenary = CatenaryPart(line.with_values(settings))
+    lumped = LumpedPantographPart(pantograph.with_values(settings))
+    base = np.zeros(2)
+    lumped.initialise(0.0, 0.0, np.zeros(3), base)
+    catenary.initialise(0.0, lumped.strip[None])
+    forces = []
+    for _ in range(round(STOP / H)):
+        force, point, strip = catenary.contact_force[0], catenary.contact_point[0].copy(), lumped.strip.copy()
+        if scheme == "pantograph first":
+            lumped.step(force, point, base, H)
+            strip = lumped.strip.copy()
+        catenary.step(strip[None], H)
+        if scheme == "catenary first":
+            force, point = catenary.contact_force[0], catenary.contact_point[0]
+        if scheme != "pantograph first":
+            lumped.step(force, point, base, H)
+        forces.append(catenary.contact_force[0])
+    return np.array(forces)
+
+
+def _difference(line, pantograph, H, scheme, order):
+    """Largest difference of the contact force from the monolithic run, once the impact of raising is over."""
+    record = CoupledModel(CatenaryModel(line), [pantograph]).run(STOP, H)
+    force = _cosimulate(line, pantograph, H, scheme, order)
+    settled = record.time[1:] > 0.6
+    return np.abs(force - record.contact_force[1:, 0])[settled].max()
+
+
+@pytest.mark.parametrize("scheme", ["jacobi", "catenary first", "pantograph first"])
+def test_difference_from_the_monolithic_run_shrinks_with_the_step(line, pantograph, scheme):
+    """Held inputs between the tools, continued inside: second order with linear, third with quadratic inputs."""
+    for order, expected in ((1, 1.7), (2, 2.5)):
+        coarse, fine = (_difference(line, pantograph, H, scheme, order) for H in (2e-3, 1e-3))
+        assert np.log2(coarse / fine) > expected
+
+
+def test_quadratic_inputs_beat_linear_and_held_ones(line, pantograph):
+    held, linear, quadratic = (_difference(line, pantograph, 1e-3, "jacobi", order) for order in (0, 1, 2))
+    assert quadratic < 0.5 * linear < 0.25 * held
+
+
+def test_gauss_seidel_is_at_least_as_close_as_jacobi(line, pantograph):
+    jacobi = _difference(line, pantograph, 1e-3, "jacobi", 2)
+    for scheme in ("catenary first", "pantograph first"):
+        assert _difference(line, pantograph, 1e-3, scheme, 2) <= jacobi
+
+
+def test_parts_continue_identically_from_a_snapshot(line, pantograph):
+    parts = [(CatenaryPart(line), LumpedPantographPart(pantograph)) for _ in range(2)]
+    base = np.zeros(2)
+    for catenary, lumped in parts:
+        lumped.initialise(0.0, 0.0, np.zeros(3), base)
+        catenary.initialise(0.0, lumped.strip[None])
+
+    def run(catenary, lumped, steps):
+        for _ in range(steps):
+            force, point = catenary.contact_force[0], catenary.contact_point[0].copy()
+            catenary.step(lumped.strip[None].copy(), 1e-3)
+            lumped.step(force, point, base, 1e-3)
+
+    run(*parts[0], 300)
+    for source, target in zip(*parts, strict=True):
+        target.restore(source.snapshot())
+    for catenary, lumped in parts:
+        run(catenary, lumped, 100)
+    assert parts[0][0].contact_force[0] > 0.0
+    for first, second in zip(parts[0][0].snapshot().items(), parts[1][0].snapshot().items(), strict=True):
+        assert np.array_equal(first[1], second[1], equal_nan=True), first[0]

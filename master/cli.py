@@ -1,0 +1,339 @@
+"""The command line: ``python -m master [VERB] ...``.
+
+Exit codes: 0 done, 1 the run failed or the scenario is invalid, 2 the command line is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+
+from master import calibrate, report, results
+from master.compare import Comparison, compare
+from master.errors import MasterError, Problem, ScenarioError, UsageError
+from master.progress import ProgressObserver
+from master.results import Results
+from master.run import run
+from master.scenario import Overrides, find_parameter, open_scenario
+from master.ssp.annotation import SCHEMES, Calibration
+from master.ssp.archive import SSD_NAME, Package
+from master.ssp.pack import pack
+from master.ssp.ssd import read_structure
+from master.ssp.xml import Reader
+from master.system import System
+
+VERBS: Final = ("run", "pack", "validate", "compare", "report", "calibrate")
+_WIDTH: Final = 80
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and given[0] not in VERBS and given[0] not in ("-h", "--help"):
+        given.insert(0, "run")
+    options = _parser().parse_args(given)
+    error = Console(stderr=True, width=_WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
+    try:
+        code: int = options.verb(options)
+    except UsageError as failure:
+        return _fail(error, failure, 2)
+    except MasterError as failure:
+        return _fail(error, failure, 1)
+    except BrokenPipeError:
+        return 1
+    except KeyboardInterrupt:
+        return _fail(error, "interrupted", 1)
+    except OSError as failure:
+        return _fail(error, f"{failure.filename or 'a file'}: {failure.strerror or failure}", 1)
+    return code
+
+
+def _fail(console: Console, failure: object, code: int) -> int:
+    console.print(f"error: {failure}", style="red", markup=False, highlight=False)
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m master",
+        description="Run pantograph-catenary scenarios (SSP) and judge the contact quality.",
+        epilog="'run' may be left out: python -m master SCENARIO ...",
+    )
+    verbs = parser.add_subparsers(required=True, metavar="VERB")
+    _add_run(verbs)
+    _add(verbs, "validate", "check a scenario without running it", _validate, scenario=True)
+    packing = _add(verbs, "pack", "write a scenario as a .ssp archive, FMUs included", _pack, scenario=True)
+    packing.add_argument("--out", type=Path, metavar="FILE", help="default: dist/NAME.ssp")
+    comparing = _add(verbs, "compare", "two runs side by side", _compare)
+    comparing.add_argument("first", type=Path, metavar="RUN", help="results folder")
+    comparing.add_argument("second", type=Path, metavar="RUN", help="results folder")
+    comparing.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    reporting = _add(verbs, "report", "write plots and report of a run again", _report)
+    reporting.add_argument("run", type=Path, metavar="RUN", help="results folder")
+    _add_calibrate(verbs)
+    return parser
+
+
+def _add(verbs: Any, name: str, text: str, verb: Callable[..., int], scenario: bool = False) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text)
+    parser.set_defaults(verb=verb)
+    if scenario:
+        parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="folder NAME.ssp/ or archive NAME.ssp")
+        parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
+    return parser
+
+
+def _add_run(verbs: Any) -> None:
+    parser = _add(verbs, "run", "run a scenario", _run, scenario=True)
+    _add_overrides(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="results folder, default: results/NAME")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no tables")
+    parser.add_argument("--no-report", action="store_true", help="no plots, no report.html")
+    parser.add_argument("--json", action="store_true", help="print summary.json instead of tables")
+
+
+def _add_overrides(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--stop", type=_number, metavar="T", help="stop time [s]")
+    parser.add_argument("--step", type=_positive, metavar="H", help="macro step [s]")
+    parser.add_argument("--scheme", choices=SCHEMES, help="coupling scheme")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=_assignment,
+        metavar="COMPONENT.PARAMETER=VALUE",
+        help="change a parameter",
+    )
+
+
+def _add_calibrate(verbs: Any) -> None:
+    text = "find the parameter value that gives the wanted mean force and store it in the scenario"
+    parser = _add(verbs, "calibrate", text, _calibrate, scenario=True)
+    _add_overrides(parser)
+    parser.add_argument(
+        "--parameter", metavar="COMPONENT.PARAMETER", help="what to change; default: as the scenario says"
+    )
+    parser.add_argument(
+        "--mean", type=_positive, metavar="N", help="wanted mean force [N]; default: as the scenario says"
+    )
+    parser.add_argument("--tolerance", type=_positive, metavar="N", help="how near is near enough [N], default 0.1")
+    parser.add_argument("--dry-run", action="store_true", help="do not store the value")
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = _number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"'{text}' must be greater than 0")
+    return value
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    name, sign, value = text.partition("=")
+    if not (name and sign and value):
+        raise argparse.ArgumentTypeError(f"'{text}' must be written COMPONENT.PARAMETER=VALUE")
+    return name, value
+
+
+def _overrides(options: argparse.Namespace) -> Overrides:
+    return Overrides(options.stop, options.step, options.scheme, dict(options.set))
+
+
+def _tell(text: str) -> None:
+    Console(stderr=True).print(text, style="dim", markup=False, highlight=False)
+
+
+def _run(options: argparse.Namespace) -> int:
+    tell = (lambda _: None) if options.quiet else _tell
+    with open_scenario(options.scenario, _overrides(options), tell, not options.no_build) as scenario:
+        folder = options.out or Path("results") / scenario.system.name
+        _protect(folder, scenario.package)
+        done = _run_shown(scenario.system, folder, options.quiet)
+    if not options.no_report:
+        report.write(done)
+    if options.json:
+        print((folder / results.SUMMARY).read_text(encoding="utf-8"), end="")
+    elif not options.quiet:
+        _show(done)
+    return 0
+
+
+def _protect(folder: Path, package: Package) -> None:
+    if folder.resolve().is_relative_to(package.root) or package.root.is_relative_to(folder.resolve()):
+        raise UsageError(
+            f"the results folder {folder} and the scenario lie inside each other; choose another with --out"
+        )
+
+
+def _run_shown(system: System, folder: Path, quiet: bool) -> Results:
+    if quiet:
+        return run(system, folder)
+    progress = ProgressObserver(Console(stderr=True), system.start, system.stop)
+    try:
+        return run(system, folder, [progress])
+    finally:
+        progress.finish()
+
+
+def _show(done: Results) -> None:
+    console = Console(width=_WIDTH, highlight=False)
+    assessments = done.assessments()
+    if assessments:
+        heads = [a.contact.pantograph for a in assessments]
+        console.print(report.figures_table([a.quality for a in assessments], heads))
+    for assessment in assessments:
+        console.print(report.verdict_table(assessment))
+    if not assessments:
+        console.print("no contact-quality figures: the run has no contact force in the interval of interest")
+    if line := report.uplift_line(done):
+        console.print(line)
+    for line in _closing_lines(done):
+        console.print(line, markup=False, soft_wrap=True)
+
+
+def _closing_lines(done: Results) -> list[str]:
+    performance = done.summary["performance"]
+    lines = [
+        f"wall time {performance['wall_time']:.2f} s, "
+        f"initialization {performance['initialisation_time']:.2f} s, "
+        f"real-time factor {performance['real_time_factor']:.2f}, {performance['peak_memory']:.0f} MB",
+    ]
+    lines += [
+        f"contact {p['contact']}: coupling added {p['energy']:.3g} J of {p['transferred']:.4g} J exchanged"
+        for p in done.summary["interface_power"]
+    ]
+    return [*lines, f"results in {done.folder}"]
+
+
+def _validate(options: argparse.Namespace) -> int:
+    with open_scenario(options.scenario, tell=_tell, build=not options.no_build) as scenario:
+        system = scenario.system
+        counts = f"{len(system.components)} components, {len(system.connections)} connections"
+        times = f"{system.start:g} s to {system.stop:g} s in steps of {system.step:g} s"
+        print(f"{system.name}: valid; {counts}, {times}, {system.settings.coupling.scheme}")
+    return 0
+
+
+def _pack(options: argparse.Namespace) -> int:
+    with open_scenario(options.scenario, tell=_tell, build=not options.no_build) as scenario:
+        archive = options.out or Path("dist") / f"{scenario.system.name}.ssp"
+        if archive.is_dir():
+            raise UsageError(f"{archive} is a folder; choose another name with --out")
+        print(pack(scenario.package.root, archive))
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    done = results.read(options.run)
+    assessments = done.assessments()
+    summary = {**done.summary, **results.figures(assessments, done.uplifts)}
+    results.write_json(done.folder / results.SUMMARY, summary)
+    print(report.write(replace(done, summary=summary)))
+    return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    compared = compare(results.read(options.first), results.read(options.second))
+    if options.json:
+        print(json.dumps([_comparison(c) for c in compared], indent=1))
+        return 0
+    console = Console(width=_WIDTH, highlight=False)
+    for c in compared:
+        console.print(report.figures_table([c.first.quality, c.second.quality], ["first", "second"]))
+        if c.rms is not None and c.largest is not None:
+            console.print(f"0-20 Hz forces differ by {c.rms:.3g} N (rms), {c.largest:.3g} N (largest)")
+    return 0
+
+
+def _comparison(c: Comparison) -> Mapping[str, Any]:
+    names = ("mean", "sigma", "minimum", "maximum")
+    one, two = c.first.quality, c.second.quality
+    difference = {n: getattr(two, n) - getattr(one, n) for n in names}
+    return {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
+        system = scenario.system
+        task = _task(options, system)
+        place = None if options.dry_run or options.set else _place(scenario.package, task.parameter)
+        found = calibrate.find_value(
+            lambda value: _trial(system, task, value),
+            task.mean_force,
+            _start_value(system, task.parameter),
+            task.tolerance,
+        )
+        print(
+            f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
+            f"({len(found.trials)} runs)"
+        )
+        if place is not None:
+            note = (
+                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) with "
+                f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
+                f"in {len(found.trials)} runs of 'python -m master calibrate'"
+            )
+            calibrate.store_value(*place, found.value, note)
+            print(f"stored in {place[0]}")
+    return 0
+
+
+def _task(options: argparse.Namespace, system: System) -> Calibration:
+    known = system.settings.calibration
+    parameter = options.parameter or (known.parameter if known else None)
+    mean = options.mean or (known.mean_force if known else None)
+    if parameter is None or mean is None:
+        raise UsageError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
+    tolerance = options.tolerance or (known.tolerance if known else 0.1)
+    return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
+
+
+def _start_value(system: System, parameter: str) -> float:
+    index, variable = find_parameter(system.components, parameter)
+    component = system.components[index]
+    if variable.type != "Real":
+        raise UsageError(f"parameter '{parameter}' is not Real and cannot be calibrated")
+    return float(component.parameters.get(variable.name, variable.start or 0.0))
+
+
+def _trial(system: System, task: Calibration, value: float) -> float:
+    index, variable = find_parameter(system.components, task.parameter)
+    component = system.components[index]
+    changed = replace(component, parameters={**component.parameters, variable.name: value})
+    components = (*system.components[:index], changed, *system.components[index + 1 :])
+    with tempfile.TemporaryDirectory(prefix="calibrate-") as folder:
+        done = _run_shown(replace(system, components=components), Path(folder), quiet=False)
+        for assessment in done.assessments():
+            if assessment.quality.contact == task.contact:
+                _tell(f"{task.parameter} = {value:.6g}: mean force {assessment.quality.mean:.3f} N")
+                return assessment.quality.mean
+    raise MasterError(f"contact {task.contact} has no figures in the interval of interest; nothing to calibrate on")
+
+
+def _place(package: Package, parameter: str) -> tuple[Path, str]:
+    """Return the ``.ssv`` file that holds a parameter, and its name there."""
+    if not package.writable:
+        raise UsageError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
+    structure = read_structure(package.root, Reader(SSD_NAME))
+    for c in structure.components:
+        for binding in c.bindings:
+            for p in binding.parameters.parameters:
+                if f"{c.name}.{binding.prefix}{p.name}" == parameter:
+                    return package.root / p.file, p.name
+    text = f"parameter '{parameter}' is not in the scenario's parameter files; add it, or use --dry-run"
+    raise ScenarioError([Problem(SSD_NAME, 0, "calibration", text)])

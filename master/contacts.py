@@ -1,0 +1,91 @@
+"""Which variables belong to which contact of pantograph and wire: found from the connections."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from master.arrays import FloatArray
+from master.recorder import Recording
+from master.system import Connection
+
+_FORCE: Final = re.compile(r"(?:pantograph\[(\d+)\]\.)?contact\.force")
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One pantograph on the line.
+
+    Attributes
+    ----------
+    index : int
+        1, 2, ... in the order of the catenary's ports.
+    catenary, pantograph : str
+        Component names.
+    prefix : str
+        Of the catenary's variables of this contact, e.g. ``catenary.pantograph[1].contact``.
+    """
+
+    index: int
+    catenary: str
+    pantograph: str
+    prefix: str
+
+    @property
+    def force(self) -> str:
+        """Name of the recorded contact force."""
+        return f"{self.prefix}.force"
+
+    def point(self, axis: str) -> str:
+        """Name of the recorded contact point's coordinate."""
+        return f"{self.prefix}.{axis}"
+
+    def end(self, end: str, axis: str) -> str:
+        """Name of a coordinate (x, y, z, vx, vy, vz) of the strip's end A or B."""
+        return f"{self.pantograph}.{end}.{axis}"
+
+
+def find_contacts(connections: Iterable[Connection]) -> tuple[Contact, ...]:
+    """Return the contacts: every connection of a ``contact.force`` to an input of that name is one."""
+    found = []
+    for c in connections:
+        if (match := _FORCE.fullmatch(c.output)) and c.input.endswith("contact.force"):
+            prefix = f"{c.source}.{c.output.removesuffix('.force')}"
+            found.append(Contact(int(match[1] or 1), c.source, c.target, prefix))
+    return tuple(sorted(found, key=lambda x: (x.catenary, x.index)))
+
+
+def strip_centre(recording: Recording, contact: Contact, axis: str) -> FloatArray | None:
+    """Return the coordinate of the strip's middle, shape (n,), None if it is not recorded."""
+    names = [contact.end(end, axis) for end in "AB"]
+    if any(n not in recording for n in names):
+        return None
+    centre: FloatArray = 0.5 * (recording[names[0]] + recording[names[1]])
+    return centre
+
+
+def track_position(recording: Recording, contact: Contact) -> FloatArray:
+    """Return where along the track the contact is [m], shape (n,).
+
+    Without contact (no force) the point of contact does not exist, and the strip's middle is taken.
+    """
+    centre = strip_centre(recording, contact, "x")
+    if contact.point("x") not in recording:
+        return recording.time if centre is None else centre
+    point = recording[contact.point("x")]
+    if centre is None:
+        return point
+    return np.where(recording[contact.force] > 0.0, point, centre)
+
+
+def lateral_position(recording: Recording, contact: Contact) -> FloatArray | None:
+    """Return the contact's position on the strip from its middle [m], NaN without contact, shape (n,)."""
+    centre = strip_centre(recording, contact, "y")
+    if centre is None or contact.point("y") not in recording:
+        return None
+    offset = recording[contact.point("y")] - centre
+    return np.where(recording[contact.force] > 0.0, offset, np.nan)

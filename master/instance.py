@@ -1,0 +1,199 @@
+"""An FMU instance: grouped reading and writing, parameters, steps, state, readable errors.
+
+Values pass through preallocated arrays that ctypes and NumPy share, and one FMI call moves a whole group: the
+price of an exchange is that of the FMI call itself.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from ctypes import byref, c_double, c_int, c_uint, c_void_p
+from typing import Any, Final
+
+import fmpy
+import numpy as np
+from fmpy.fmi2 import FMU2Slave
+
+from master import fmi_log
+from master.arrays import FloatArray
+from master.errors import SlaveError
+from master.ssp.ssv import Value
+from master.system import Component, Variable
+
+_STATUS: Final = ("ok", "warning", "discard", "error", "fatal", "pending")
+_WARNING: Final = 1
+_FATAL: Final = 4
+
+
+class Group:
+    """Real variables of an instance that are read or written with one call.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n,)
+        Where `read` puts them and `write` takes them from.
+    """
+
+    def __init__(self, instance: Instance, names: Sequence[str], values: FloatArray | None = None) -> None:
+        n = len(names)
+        self.names = tuple(names)
+        self.values: FloatArray = np.zeros(n) if values is None else values
+        references = [instance.component.fmu.variables[name].reference for name in names]
+        self._references = (c_uint * n)(*references)
+        self._buffer = (c_double * n).from_buffer(self.values.data) if n else (c_double * 0)()
+        self._arguments = (instance.handle, self._references, n, self._buffer)
+        self._get, self._set = instance.function("fmi2GetReal"), instance.function("fmi2SetReal")
+        self._instance = instance
+
+    def read(self) -> None:
+        """Fill `values` from the FMU."""
+        if self.names and (status := self._get(*self._arguments)) > _WARNING:
+            raise self._instance.error("reading its variables", status)
+
+    def write(self) -> None:
+        """Set the FMU's variables to `values`."""
+        if self.names and (status := self._set(*self._arguments)) > _WARNING:
+            raise self._instance.error("setting its inputs", status)
+
+
+class Instance:
+    """An FMU of the system, loaded; a `Slave` for the coupling algorithms.
+
+    The order of calls: `bind`, `start`, then `write` and `read` as often as needed, `finish_initialisation`,
+    then `step` and exchanges, at last `close`.
+
+    Parameters
+    ----------
+    component : Component
+        What to load.
+
+    Raises
+    ------
+    SlaveError
+        If the FMU cannot be loaded or instantiated.
+    """
+
+    def __init__(self, component: Component) -> None:
+        self.component = component
+        self.name = component.name
+        self.input_names = component.inputs
+        self.output_names = component.outputs
+        self.time = float("nan")
+        self._dead = False
+        fmi_log.clear(self.name)
+        self._folder = tempfile.mkdtemp(prefix="fmu-")
+        self._fmu = self._load()
+        self.handle = self._fmu.component
+        self._do_step: Callable[..., int] = self.function("fmi2DoStep")
+
+    def function(self, name: str) -> Callable[..., int]:
+        """Return an FMI function of the library; FMPy has declared its argument types."""
+        return getattr(self._fmu.dll, name)
+
+    def group(self, names: Sequence[str]) -> Group:
+        """Return a group for further variables, e.g. for recording."""
+        return Group(self, names)
+
+    def bind(self, inputs: FloatArray, outputs: FloatArray) -> None:
+        """Exchange through these arrays from now on."""
+        self._inputs = Group(self, self.input_names, inputs)
+        self._outputs = Group(self, self.output_names, outputs)
+
+    def start(self, start: float, stop: float) -> None:
+        """Set up the experiment, set the parameters, enter initialization mode."""
+        self.time = start
+        self._call("setting up the experiment", "fmi2SetupExperiment", 0, 0.0, start, 1, stop)
+        for name, value in self.component.parameters.items():
+            self._set(self.component.fmu.variables[name], value)
+        self._call("entering initialization", "fmi2EnterInitializationMode")
+
+    def finish_initialisation(self) -> None:
+        """Leave initialization mode."""
+        self._call("its initialization", "fmi2ExitInitializationMode")
+
+    def write(self) -> None:
+        """Pass the bound inputs to the FMU."""
+        self._inputs.write()
+
+    def read(self) -> None:
+        """Take the bound outputs from the FMU."""
+        self._outputs.read()
+
+    def step(self, time: float, step: float) -> None:
+        """Advance from ``time`` to ``time + step``."""
+        self.time = time
+        status = self._do_step(self.handle, time, step, 1)
+        if status > _WARNING:
+            raise self.error("a step", status)
+
+    def save(self) -> c_void_p:
+        """Return the FMU's state; hand it back to `release`."""
+        state = c_void_p()
+        self._call("saving its state", "fmi2GetFMUstate", byref(state))
+        return state
+
+    def restore(self, state: c_void_p) -> None:
+        """Return to a saved state."""
+        self._call("restoring its state", "fmi2SetFMUstate", state)
+
+    def release(self, state: c_void_p) -> None:
+        """Free a saved state."""
+        self._call("freeing a state", "fmi2FreeFMUstate", byref(state))
+
+    def remark(self) -> str:
+        """Return the FMU's last warning or error message."""
+        return fmi_log.last_words(self.name)
+
+    def close(self) -> None:
+        """Terminate and free the instance and its files; an FMU that died is only forgotten."""
+        if not self._dead:
+            self._dead = True
+            self.function("fmi2Terminate")(self.handle)
+            self._fmu.freeInstance()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def error(self, doing: str, status: int) -> SlaveError:
+        """Return the error for a failed call, in the FMU's own words if it said any."""
+        self._dead = self._dead or status >= _FATAL
+        label = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
+        said = fmi_log.last_words(self.name) or "the FMU gave no reason"
+        at = f" at t = {self.time:.6g} s" if self.time == self.time else ""
+        who = f"component '{self.name}' ({self.component.fmu.path.name})"
+        return SlaveError(f"{who} failed in {doing}{at}, status {label}: {said}")
+
+    def _call(self, doing: str, function: str, *arguments: Any) -> None:
+        status = self.function(function)(self.handle, *arguments)
+        if status > _WARNING:
+            raise self.error(doing, status)
+
+    def _set(self, variable: Variable, value: Value) -> None:
+        reference = (c_uint * 1)(variable.reference)
+        if variable.type == "Real":
+            name, buffer = "fmi2SetReal", (c_double * 1)(float(value))
+        elif variable.type == "String":
+            name, buffer = "fmi2SetString", (ctypes.c_char_p * 1)(str(value).encode())  # type: ignore[assignment]
+        else:
+            kind = "Boolean" if variable.type == "Boolean" else "Integer"
+            name, buffer = f"fmi2Set{kind}", (c_int * 1)(int(value))  # type: ignore[assignment]
+        self._call(f"setting parameter '{variable.name}' to {value}", name, reference, 1, buffer)
+
+    def _load(self) -> Any:
+        fmu = self.component.fmu
+        try:
+            fmpy.extract(str(fmu.path), unzipdir=self._folder)
+            slave = FMU2Slave(
+                instanceName=self.name,
+                guid=fmu.guid,
+                modelIdentifier=fmu.identifier,
+                unzipDirectory=self._folder,
+            )
+            slave.instantiate(callbacks=fmi_log.CALLBACKS, loggingOn=True)
+        except Exception as error:  # FMPy raises bare exceptions
+            shutil.rmtree(self._folder, ignore_errors=True)
+            said = fmi_log.last_words(self.name)
+            reason = f"{error}" + (f": {said}" if said else "")
+            raise SlaveError(f"component '{self.name}': {fmu.path.name} cannot be loaded ({reason})") from error
+        return slave

@@ -1,0 +1,104 @@
+"""The line's static geometry and the supports' uplift, as the catenary FMU reports them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from master.arrays import FloatArray
+from master.network import Network
+from master.recorder import Recording
+from master.system import System
+
+_INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
+
+#: Values of one component's calculated parameters by variable name.
+Geometry = dict[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Uplift:
+    """Largest uplift of a support over the whole run.
+
+    Attributes
+    ----------
+    component : str
+        The catenary.
+    support : int
+        Number of the support.
+    x : float, optional
+        Its position along the track [m], if the FMU says it.
+    maximum : float
+        Largest uplift [m].
+    time : float
+        When it occurs [s].
+    """
+
+    component: str
+    support: int
+    x: float | None
+    maximum: float
+    time: float
+
+
+class GeometryObserver:
+    """Observer that reads all Real calculated parameters once, when they are known."""
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self.geometry: Geometry = {}
+
+    def begin(self, time: float, network: Network) -> None:
+        """Read."""
+        for component, slave in zip(self._system.components, network.slaves, strict=True):
+            variables = component.fmu.variables.values()
+            names = [v.name for v in variables if v.causality == "calculatedParameter" and v.type == "Real"]
+            group = getattr(slave, "group", None)
+            if names and group is not None:
+                values = group(names)
+                values.read()
+                self.geometry[component.name] = dict(zip(names, values.values.tolist(), strict=True))
+
+    def observe(self, index: int, time: float, network: Network) -> None:
+        """Nothing changes."""
+
+    def finish(self) -> None:
+        """Nothing to close."""
+
+
+def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:
+    """Return the values ``kind[1].name, kind[2].name, ...``, shape (n,); empty if there are none.
+
+    Examples
+    --------
+    >>> indexed({"support[1].x": 0.0, "support[2].x": 50.0}, "support", "x").tolist()
+    [0.0, 50.0]
+    """
+    found = {
+        int(m[2]): v for k, v in geometry.items() if (m := _INDEXED.fullmatch(k)) and m[1] == kind and m[3] == name
+    }
+    return np.array([found[i] for i in sorted(found)])
+
+
+def support_uplifts(recordings: tuple[Recording, ...], geometry: Geometry) -> tuple[Uplift, ...]:
+    """Return the largest uplift of every support that is recorded, in the order of the supports."""
+    found = [
+        _uplift(recording, name, geometry)
+        for recording in recordings
+        if len(recording.time)
+        for name in recording.matching("*.support[*].uplift")
+    ]
+    return tuple(sorted(found, key=lambda u: (u.component, u.support)))
+
+
+def _uplift(recording: Recording, full: str, geometry: Geometry) -> Uplift:
+    component, _, name = full.partition(".support[")
+    number = int(name.partition("]")[0])
+    values = recording[full]
+    peak = int(np.argmax(values))
+    x = geometry.get(component, {}).get(f"support[{number}].x")
+    return Uplift(component, number, x, float(values[peak]), float(recording.time[peak]))

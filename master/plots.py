@@ -1,0 +1,218 @@
+"""Plots of a run. Every function returns a Matplotlib figure and touches nothing else."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from master.arrays import FloatArray
+from master.contacts import track_position
+from master.line import indexed
+from master.quality import low_pass
+from master.recorder import Recording
+from master.results import Results
+
+_COLOURS: Final = ("#1f5fa8", "#c2571a", "#2e7d4f", "#7b3fa0")
+_GREY: Final = "#9aa0a6"
+_INTERVAL: Final = "#f4e7b4"
+
+
+def all_plots(results: Results) -> dict[str, Figure]:
+    """Return every plot that the run has the data for, by file name without ending."""
+    found = {
+        "contact_force": contact_force(results),
+        "uplift": uplift(results),
+        "uplift_history": uplift_history(results),
+        "contact_height": contact_height(results),
+        **{f"line_{name}": geometry(values) for name, values in results.geometry.items()},
+    }
+    return {name: figure for name, figure in found.items() if figure is not None}
+
+
+def contact_force(results: Results) -> Figure | None:
+    """Contact force, raw and 0-20 Hz, over track position; supports, droppers and interval are marked."""
+    recording = results.recordings[0]
+    contacts = [c for c in results.contacts if c.force in recording]
+    if not contacts or len(recording.time) < 2:
+        return None
+    figure, rows = _figure(len(contacts), height=3.4)
+    for i, (axes, contact) in enumerate(zip(rows, contacts, strict=True)):
+        x, force = track_position(recording, contact), recording[contact.force]
+        filtered = low_pass(force, _step(recording))
+        _mark_line(axes, results, contact.catenary, (float(x.min()), float(x.max())))
+        axes.plot(x, force, color=_GREY, linewidth=0.6, label="raw")
+        axes.plot(x, filtered, color=_COLOURS[i % len(_COLOURS)], linewidth=1.3, label="0-20 Hz")
+        axes.set_ylabel(f"contact force [N]\n{contact.pantograph}")
+        axes.set_ylim(*_force_range(force, filtered, x, results.interval))
+        axes.legend(loc="lower left", ncols=5, frameon=False, bbox_to_anchor=(0.0, 1.0), fontsize=8)
+    rows[-1].set_xlabel("track position of the contact [m]")
+    return figure
+
+
+def uplift(results: Results) -> Figure | None:
+    """Largest uplift of every support as bars."""
+    uplifts = results.uplifts
+    if not uplifts:
+        return None
+    figure, (axes,) = _figure(1, height=3.0)
+    labels = [f"{u.x:.0f}" if u.x is not None else str(u.support) for u in uplifts]
+    axes.bar(range(len(uplifts)), [1e3 * u.maximum for u in uplifts], color=_COLOURS[0], width=0.7)
+    axes.set_xticks(range(len(uplifts)), labels, rotation=60, ha="right", fontsize=8)
+    axes.set_xlabel("support at [m]" if uplifts[0].x is not None else "support number")
+    axes.set_ylabel("largest uplift [mm]")
+    return figure
+
+
+def uplift_history(results: Results, most: int = 8) -> Figure | None:
+    """Uplift of the supports in the interval of interest over time."""
+    chosen = [u for u in results.uplifts if _within(u.x, results.interval)] or list(results.uplifts)
+    if not chosen:
+        return None
+    figure, (axes,) = _figure(1, height=3.0)
+    for u in chosen[:: max(1, -(-len(chosen) // most))]:
+        name = f"{u.component}.support[{u.support}].uplift"
+        recording = next(r for r in results.recordings if name in r)
+        label = f"{u.x:.0f} m" if u.x is not None else f"support {u.support}"
+        axes.plot(recording.time, 1e3 * recording[name], linewidth=1.0, label=label)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("uplift [mm]")
+    axes.legend(loc="upper left", ncols=2, frameon=False, fontsize=8)
+    return figure
+
+
+def contact_height(results: Results) -> Figure | None:
+    """Height of the contact point over track position."""
+    recording = results.recordings[0]
+    contacts = [c for c in results.contacts if c.point("z") in recording and c.force in recording]
+    if not contacts or len(recording.time) < 2:
+        return None
+    figure, (axes,) = _figure(1, height=3.0)
+    for i, contact in enumerate(contacts):
+        x = track_position(recording, contact)
+        z = np.where(recording[contact.force] > 0.0, recording[contact.point("z")], np.nan)
+        if i == 0:
+            _mark_line(axes, results, contact.catenary, (float(x.min()), float(x.max())))
+        axes.plot(x, z, color=_COLOURS[i % len(_COLOURS)], linewidth=1.1, label=contact.pantograph)
+    axes.set_xlabel("track position of the contact [m]")
+    axes.set_ylabel("contact height [m]")
+    axes.legend(loc="lower left", ncols=5, frameon=False, bbox_to_anchor=(0.0, 1.0), fontsize=8)
+    return figure
+
+
+def geometry(values: dict[str, float]) -> Figure | None:
+    """Return static line geometry: elevation and plan."""
+    droppers = {n: indexed(values, "dropper", n) for n in ("x", "upper.z", "lower.z", "lower.y")}
+    supports = {n: indexed(values, "support", n) for n in ("x", "y", "z", "messenger_wire.z")}
+    if not len(supports["x"]) or not len(droppers["x"]):
+        return None
+    figure, (elevation, plan) = _figure(2, height=2.6)
+    _draw_elevation(elevation, droppers, supports)
+    _draw_plan(plan, droppers, supports)
+    plan.set_xlabel("track position [m]")
+    return figure
+
+
+def _draw_elevation(axes: Any, droppers: dict[str, FloatArray], supports: dict[str, FloatArray]) -> None:
+    x, low, high = droppers["x"], droppers["lower.z"], droppers["upper.z"]
+    for one in zip(x, low, high, strict=True):
+        axes.plot([one[0]] * 2, one[1:], color=_GREY, linewidth=0.6)
+    wires = (
+        ("contact wire", low, supports["z"], _COLOURS[0]),
+        ("messenger wire", high, supports["messenger_wire.z"], _COLOURS[1]),
+    )
+    for label, at_droppers, at_supports, colour in wires:
+        points = at_supports if len(at_supports) == len(supports["x"]) else np.full(len(supports["x"]), np.nan)
+        xs, zs = _merged(x, at_droppers, supports["x"], points)
+        axes.plot(xs, zs, color=colour, linewidth=1.1, label=label)
+    axes.plot(supports["x"], supports["z"], "v", color="black", markersize=4, label="support")
+    axes.set_ylabel("height [m]")
+    axes.legend(loc="upper right", ncols=3, frameon=False, fontsize=8, bbox_to_anchor=(1.0, 1.18))
+
+
+def _draw_plan(axes: Any, droppers: dict[str, FloatArray], supports: dict[str, FloatArray]) -> None:
+    if len(droppers["lower.y"]) and len(supports["y"]) == len(supports["x"]):
+        xs, ys = _merged(droppers["x"], droppers["lower.y"], supports["x"], supports["y"])
+        axes.plot(xs, ys, color=_COLOURS[0], linewidth=1.1)
+        axes.plot(supports["x"], supports["y"], "v", color="black", markersize=4)
+    axes.axhline(0.0, color=_GREY, linewidth=0.6)
+    axes.set_ylabel("lateral [m]")
+
+
+def _merged(x1: FloatArray, y1: FloatArray, x2: FloatArray, y2: FloatArray) -> tuple[FloatArray, FloatArray]:
+    known = np.isfinite(y2)
+    x = np.concatenate((x1, x2[known]))
+    y = np.concatenate((y1, y2[known]))
+    order = np.argsort(x, kind="stable")
+    return x[order], y[order]
+
+
+def _figure(rows: int, height: float) -> tuple[Figure, Sequence[Any]]:
+    figure = Figure(figsize=(9.0, 0.6 + height * rows), layout="constrained")
+    made = [figure.add_subplot(rows, 1, i + 1) for i in range(rows)]
+    for axes in made:
+        axes.grid(axis="y", color="#e3e5e8", linewidth=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+        if axes is not made[0]:
+            axes.sharex(made[0])
+    return figure, made
+
+
+def _mark_line(axes: Any, results: Results, catenary: str, shown: tuple[float, float]) -> None:
+    """Mark interval of interest, supports (dashed) and droppers (ticks at the bottom)."""
+    start, end = results.interval
+    if start is not None or end is not None:
+        first, last = shown[0] if start is None else start, shown[1] if end is None else end
+        axes.axvspan(first, last, color=_INTERVAL, alpha=0.6, linewidth=0, label="interval of interest")
+    values = results.geometry.get(catenary, {})
+    supports, droppers = indexed(values, "support", "x"), indexed(values, "dropper", "x")
+    transform = axes.get_xaxis_transform()
+    inside = _inside(supports, shown)
+    axes.vlines(inside, 0.0, 1.0, transform=transform, color="#5f6368", linewidth=0.6, linestyle="--", label="support")
+    axes.vlines(
+        _inside(droppers, shown),
+        0.0,
+        0.03,
+        transform=transform,
+        color="#5f6368",
+        linewidth=0.6,
+        label="dropper",
+    )
+    axes.set_xlim(*shown)
+
+
+def _inside(x: FloatArray, shown: tuple[float, float]) -> FloatArray:
+    return x[(x >= shown[0]) & (x <= shown[1])]
+
+
+def _force_range(
+    force: FloatArray, filtered: FloatArray, x: FloatArray, interval: tuple[float | None, float | None]
+) -> tuple[float, float]:
+    """Return limits that show the whole filtered force and the raw force of the interval."""
+    inside = (x >= (interval[0] or -np.inf)) & (x <= (interval[1] or np.inf))
+    top = max(float(filtered.max()), float(force[inside].max(initial=0.0)), 1.0)
+    return min(0.0, float(filtered.min())), 1.05 * top
+
+
+def _within(x: float | None, interval: tuple[float | None, float | None]) -> bool:
+    start, end = interval
+    return x is not None and (start is None or x >= start - 1.0) and (end is None or x <= end + 1.0)
+
+
+def _step(recording: Recording) -> float:
+    return float(recording.time[-1] - recording.time[0]) / (len(recording.time) - 1)
+
+
+def title_of(name: str) -> str:
+    """Return a caption for a plot's file name.
+
+    Examples
+    --------
+    >>> title_of("contact_force")
+    'Contact force'
+    """
+    words = re.sub("_", " ", name)
+    return words[:1].upper() + words[1:]

@@ -1,0 +1,226 @@
+"""From a scenario's files to a runnable system; the place where overrides of the command line enter."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from master import store
+from master.errors import Problem, ScenarioError, UsageError
+from master.fmu_file import read_fmu
+from master.ssp.annotation import RunSettings, Scheme
+from master.ssp.archive import SSD_NAME, Package, inside, open_package
+from master.ssp.ssd import Component as SsdComponent
+from master.ssp.ssd import Structure, read_structure
+from master.ssp.validation import Checker, out_of_range, settable
+from master.ssp.xml import Reader
+from master.system import Component, Fmu, System, Variable
+
+DEFAULT_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """What the command line changes in a scenario.
+
+    Attributes
+    ----------
+    stop, step : float, optional
+        Stop time and macro step [s].
+    scheme : str, optional
+        Coupling scheme.
+    parameters : dict
+        Values as text by ``component.parameter``, in the FMU's own units.
+    """
+
+    stop: float | None = None
+    step: float | None = None
+    scheme: Scheme | None = None
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """An opened scenario: its files and the system they describe."""
+
+    package: Package
+    system: System
+
+
+@contextmanager
+def open_scenario(
+    path: Path,
+    overrides: Overrides | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+    build: bool = True,
+) -> Iterator[Scenario]:
+    """Open, build what is missing, check and resolve a scenario.
+
+    Parameters
+    ----------
+    path : Path
+        Folder or ``.ssp`` archive.
+    overrides : Overrides, optional
+        Changes from the command line.
+    tell : callable
+        Is told what takes time (building FMUs).
+    build : bool
+        Whether missing or stale FMUs are built.
+
+    Raises
+    ------
+    ScenarioError
+        With every problem found.
+    """
+    with open_package(path) as package:
+        yield Scenario(package, load_system(package, overrides or Overrides(), tell, build))
+
+
+def load_system(package: Package, overrides: Overrides, tell: Callable[[str], None], build: bool) -> System:
+    """Read and check the files of ``package``."""
+    reader = Reader(SSD_NAME)
+    structure = read_structure(package.root, reader)
+    fmus = _fmus(package, structure.components, reader.problems, tell, build)
+    checker = Checker(structure, fmus, reader.problems)
+    connections = checker.connections()
+    components = checker.components(connections)
+    times = _times(structure, overrides, reader.problems)
+    settings = _settings(structure, overrides, components, reader.problems)
+    if reader.problems:
+        raise ScenarioError(_sorted(reader.problems))
+    components = _override(components, overrides.parameters)
+    return System(package.name, components, connections, *times, settings)
+
+
+def _sorted(problems: Iterable[Problem]) -> list[Problem]:
+    return sorted(dict.fromkeys(problems), key=lambda p: (p.file, p.line))
+
+
+def _fmus(
+    package: Package,
+    components: Iterable[SsdComponent],
+    problems: list[Problem],
+    tell: Callable[[str], None],
+    build: bool,
+) -> dict[str, Fmu]:
+    found: dict[str, Fmu] = {}
+    by_path: dict[Path, Fmu | str] = {}
+    for c in components:
+        path = inside(package.root, c.source)
+        if path is None:
+            problems.append(Problem(SSD_NAME, c.line, "source", f"'{c.source}' does not lie inside the scenario"))
+            continue
+        if path not in by_path:
+            by_path[path] = _provide(path, package.writable and build, tell)
+        fmu = by_path[path]
+        if isinstance(fmu, str):
+            problems.append(Problem(SSD_NAME, c.line, "fmu", f"component '{c.name}': {c.source} {fmu}"))
+        else:
+            found[c.name] = fmu
+    return found
+
+
+def _provide(path: Path, build: bool, tell: Callable[[str], None]) -> Fmu | str:
+    try:
+        if build:
+            store.ensure(path, tell)
+        if not path.is_file():
+            return "does not exist"
+        return read_fmu(path)
+    except ValueError as error:
+        return str(error)
+
+
+def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) -> tuple[float, float, float]:
+    start = structure.start
+    stop = overrides.stop if overrides.stop is not None else structure.stop
+    step = overrides.step if overrides.step is not None else structure.annotations.step or DEFAULT_STEP
+    if stop is None:
+        problems.append(Problem(SSD_NAME, 0, "stop", "no stopTime in ssd:DefaultExperiment; give --stop"))
+        stop = start + step
+    if not (math.isfinite(start) and start < stop < math.inf):
+        problems.append(Problem(SSD_NAME, 0, "stop", f"stop time {stop:g} s must lie after start time {start:g} s"))
+    elif not 0 < step <= stop - start:
+        problems.append(
+            Problem(SSD_NAME, 0, "step", f"macro step {step:g} s must lie between 0 and {stop - start:g} s")
+        )
+    return start, stop, step
+
+
+def _settings(
+    structure: Structure, overrides: Overrides, components: tuple[Component, ...], problems: list[Problem]
+) -> RunSettings:
+    settings = structure.annotations.settings
+    if overrides.scheme is not None:
+        coupling = settings.coupling.model_copy(update={"scheme": overrides.scheme})
+        settings = settings.model_copy(update={"coupling": coupling})
+    names = sorted(c.name for c in structure.components)
+    order = settings.coupling.order
+    if order and sorted(order) != names:
+        text = f"Coupling order '{' '.join(order)}' must name every component once: {' '.join(names)}"
+        problems.append(Problem(SSD_NAME, 0, "annotation", text))
+    if settings.coupling.scheme == "iterative":
+        problems.extend(
+            Problem(
+                SSD_NAME,
+                0,
+                "fmu",
+                f"scheme iterative: the FMU of '{c.name}' cannot save and restore its state",
+            )
+            for c in components
+            if not c.fmu.can_restore
+        )
+    return settings
+
+
+def _override(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
+    for full, text in values.items():
+        index, variable = find_parameter(components, full)
+        parameters = {**components[index].parameters, variable.name: _typed(variable, full, text)}
+        changed = replace(components[index], parameters=parameters)
+        components = (*components[:index], changed, *components[index + 1 :])
+    return components
+
+
+def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, Variable]:
+    """Find ``component.parameter``; returns the component's index and the variable.
+
+    Raises
+    ------
+    UsageError
+        Naming the nearest parameters, if there is no such one.
+    """
+    for index, component in enumerate(components):
+        variable = component.fmu.variables.get(full[len(component.name) + 1 :])
+        if full.startswith(f"{component.name}.") and variable is not None:
+            return index, variable
+    settables = [
+        f"{c.name}.{v.name}" for c in components for v in c.fmu.variables.values() if v.causality == "parameter"
+    ]
+    near = difflib.get_close_matches(full, settables, n=3, cutoff=0.5)
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    raise UsageError(f"there is no parameter '{full}' in the scenario{hint}")
+
+
+def _typed(variable: Variable, full: str, text: str) -> float | int | bool | str:
+    reason = settable(variable, variable.type if variable.type != "Enumeration" else "Integer")
+    if reason:
+        raise UsageError(f"parameter '{full}' {reason}")
+    if variable.type == "String":
+        return text
+    if variable.type == "Boolean":
+        if text.lower() not in ("true", "false", "1", "0"):
+            raise UsageError(f"parameter '{full}': '{text}' is neither true nor false")
+        return text.lower() in ("true", "1")
+    try:
+        number = float(text) if variable.type == "Real" else int(text)
+    except ValueError:
+        raise UsageError(f"parameter '{full}': '{text}' is not a number") from None
+    reason = "is not finite" if not math.isfinite(number) else out_of_range(variable, number)
+    if reason:
+        raise UsageError(f"parameter '{full}' {reason}")
+    return number

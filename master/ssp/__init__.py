@@ -1,0 +1,1 @@
+"""Reading and writing System Structure and Parameterization (SSP 1.0) packages."""

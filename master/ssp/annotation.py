@@ -1,0 +1,174 @@
+"""Run settings that SSP has no place for, in an annotation that other tools skip.
+
+The annotation stands in the ``ssd:Annotations`` of the system structure description::
+
+    <ssc:Annotation type="urn:openpanto:ssp">
+      <panto:Run xmlns:panto="urn:openpanto:ssp">
+        <panto:Coupling scheme="jacobi"/>
+        <panto:Interval start="551" end="798"/>
+        <panto:Calibration parameter="pantograph.static_force" meanForce="157.5" tolerance="0.1"/>
+        <panto:Record variables="catenary.dropper[*].force" every="0.005"/>
+      </panto:Run>
+    </ssc:Annotation>
+
+Everything is optional. The macro step is read from ``osp:FixedStepAlgorithm``, which libcosim reads too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from master.ssp.xml import SSC, Reader, children, elements, tag
+
+NAMESPACE: Final = "urn:openpanto:ssp"
+OSP_TYPE: Final = "com.opensimulationplatform"
+
+Scheme = Literal["jacobi", "gauss-seidel", "iterative"]
+SCHEMES: Final = ("jacobi", "gauss-seidel", "iterative")
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Coupling(_Settings):
+    """How the components exchange values.
+
+    Attributes
+    ----------
+    scheme : str
+        jacobi, gauss-seidel or iterative.
+    order : tuple of str
+        Components in the order in which gauss-seidel steps them; empty: as in the SSD.
+    tolerance : float
+        iterative: largest relative change of an exchanged value that counts as settled.
+    max_iterations : int
+        iterative: repetitions of a step before the run stops with an error.
+    weight : float
+        iterative: weight of the step's end in what the components are told (`master.algorithm.Iterative`).
+    """
+
+    scheme: Scheme = "jacobi"
+    order: tuple[str, ...] = ()
+    tolerance: float = Field(1e-8, gt=0)
+    max_iterations: int = Field(50, ge=2, alias="maxIterations")
+    weight: float = Field(1.0, gt=0, le=1)
+
+
+class Interval(_Settings):
+    """Interval of interest along the track [m]; a missing end means the run's own."""
+
+    start: float | None = None
+    end: float | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Interval:
+        if self.start is not None and self.end is not None and self.start >= self.end:
+            raise ValueError(f"start {self.start:g} m must lie before end {self.end:g} m")
+        return self
+
+
+class Calibration(_Settings):
+    """The parameter that is adjusted, and the mean contact force [N] that it has to give."""
+
+    parameter: str
+    mean_force: float = Field(alias="meanForce", gt=0)
+    tolerance: float = Field(0.1, gt=0)
+    contact: int = Field(1, ge=1)
+
+
+class Record(_Settings):
+    """Variables (``component.variable``, ``*`` for anything) recorded every so many seconds.
+
+    ``every = 0`` means at every step. Later entries win where several match.
+    """
+
+    variables: tuple[str, ...]
+    every: float = Field(0.0, ge=0)
+
+
+#: Bulky variables of a catenary, recorded at a coarser rate unless the scenario says otherwise.
+DEFAULT_RECORDS: Final = (Record(variables=("*.dropper[*].force", "*.support[*].uplift"), every=0.005),)
+
+
+class RunSettings(_Settings):
+    """Everything that our annotation can say."""
+
+    coupling: Coupling = Field(default_factory=lambda: Coupling.model_validate({}))
+    interval: Interval = Field(default_factory=Interval)
+    calibration: Calibration | None = None
+    records: tuple[Record, ...] = DEFAULT_RECORDS
+
+
+_SECTIONS: Final[dict[str, type[_Settings]]] = {
+    "Coupling": Coupling,
+    "Interval": Interval,
+    "Calibration": Calibration,
+    "Record": Record,
+}
+_LISTS: Final = ("order", "variables")
+
+
+@dataclass(frozen=True)
+class Annotations:
+    """What the annotations of a scenario say; None where they are silent."""
+
+    settings: RunSettings
+    step: float | None
+
+
+def parse_annotations(nodes: list[Any], reader: Reader) -> Annotations:
+    """Read the run settings and the macro step from lists of ``ssd:Annotations``."""
+    entries = [a for n in nodes for a in children(n, SSC, "Annotation")]
+    ours = [a for a in entries if a.get("type") == NAMESPACE]
+    steps = [s for a in entries if a.get("type") == OSP_TYPE if (s := parse_osp(a, reader)) is not None]
+    for extra in ours[1:]:
+        reader.problem(extra, "annotation", f"a second annotation of type {NAMESPACE}; one is enough")
+    settings = parse_run(ours[0], reader) if ours else RunSettings()
+    return Annotations(settings, steps[0] if steps else None)
+
+
+def parse_osp(node: Any, reader: Reader) -> float | None:
+    """Return the macro step [s] from ``osp:Algorithm/osp:FixedStepAlgorithm``."""
+    for element in node.iter():
+        if isinstance(element.tag, str) and tag(element) == "FixedStepAlgorithm":
+            step = reader.number(element, "baseStepSize")
+            if step == step and step <= 0:
+                reader.problem(element, "step", f"baseStepSize='{step:g}' must be greater than 0")
+                return None
+            return step if step == step else None
+    return None
+
+
+def parse_run(annotation: Any, reader: Reader) -> RunSettings:
+    """Parse ``panto:Run``; every mistake becomes a problem and leaves that section at its default."""
+    found: dict[str, list[_Settings]] = {name: [] for name in _SECTIONS}
+    for run in elements(annotation):
+        for section in elements(run):
+            parsed = parse_section(section, reader)
+            if parsed is not None:
+                found[tag(section)].append(parsed)
+    for name in ("Coupling", "Interval", "Calibration"):
+        if len(found[name]) > 1:
+            reader.problem(annotation, "annotation", f"{name} is given {len(found[name])} times; once is enough")
+    single = {name.lower(): found[name][0] for name in ("Coupling", "Interval", "Calibration") if found[name]}
+    return RunSettings.model_validate({**single, "records": (*DEFAULT_RECORDS, *found["Record"])})
+
+
+def parse_section(node: Any, reader: Reader) -> _Settings | None:
+    """Parse one element of ``panto:Run`` by its own model."""
+    model = _SECTIONS.get(tag(node))
+    if model is None:
+        reader.problem(node, "annotation", f"unknown element '{tag(node)}' (known: {', '.join(_SECTIONS)})")
+        return None
+    values: dict[str, Any] = {k: v.split() if k in _LISTS else v for k, v in node.attrib.items()}
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        for item in error.errors():
+            where = ".".join(str(part) for part in item["loc"][:1])
+            reader.problem(node, "annotation", f"{tag(node)} {where}: {item['msg']}")
+        return None

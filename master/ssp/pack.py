@@ -1,0 +1,58 @@
+"""Writing a scenario folder as a ``.ssp`` archive: the same files give the same bytes."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Final
+
+from master.errors import MasterError
+
+#: Time stamp of every member: the earliest that zip can express.
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+_UNIX: Final = 3
+_PLAIN_FILE: Final = 0o100644 << 16
+
+
+def pack(root: Path, archive: Path) -> Path:
+    """Write all files under ``root`` into ``archive``, sorted, with fixed times and modes; return it.
+
+    Hidden files and files that editors leave behind stay out.
+
+    Raises
+    ------
+    MasterError
+        If the archive cannot be written, or ``root`` holds symbolic links.
+    """
+    members = _members(root)
+    temporary = archive.with_name(archive.name + ".part")
+    try:
+        archive.parent.mkdir(parents=True, exist_ok=True)
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file:
+            for path in members:
+                file.writestr(_info(path.relative_to(root).as_posix()), path.read_bytes())
+        temporary.replace(archive)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise MasterError(f"{archive} cannot be written ({error.strerror})") from error
+    return archive
+
+
+def _members(root: Path) -> list[Path]:
+    found = [p for p in root.rglob("*") if p.is_file() and not _is_hidden(p.relative_to(root))]
+    for path in found:
+        if path.is_symlink():
+            raise MasterError(f"{path} is a symbolic link; put the file itself into the scenario")
+    return sorted(found, key=lambda p: p.relative_to(root).as_posix())
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") or part.endswith("~") for part in path.parts)
+
+
+def _info(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name, _EPOCH)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.create_system = _UNIX
+    info.external_attr = _PLAIN_FILE
+    return info

@@ -1,0 +1,98 @@
+"""Parameter sets (``.ssv`` files, or inline in a parameter binding)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from master.ssp.units import Unit, parse_units
+from master.ssp.xml import SSV, Reader, child, children, elements, tag
+
+Value = float | int | bool | str
+
+SUPPORTED_TYPES: Final = ("Real", "Integer", "Boolean", "String")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A named value as written in a parameter set.
+
+    Attributes
+    ----------
+    name, type : str
+        Variable name and SSP type (Real, Integer, Boolean, String).
+    value : float, int, bool or str
+        Its value, in ``unit``.
+    unit : str
+        Unit, empty when none is given.
+    file, line : str, int
+        Where it is written.
+    """
+
+    name: str
+    type: str
+    value: Value
+    unit: str
+    file: str
+    line: int
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """A parameter set with the units it declares."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    units: dict[str, Unit]
+
+
+def read_parameter_file(path: Path, reader: Reader) -> ParameterSet | None:
+    """Read and check an ``.ssv`` file; None if it is not XML."""
+    root = reader.parse(path)
+    if root is None:
+        return None
+    reader.check_schema(root, "ssv")
+    return parse_parameter_set(root, reader)
+
+
+def parse_parameter_set(node: Any, reader: Reader) -> ParameterSet:
+    """Parse ``ssv:ParameterSet``."""
+    if child(node, SSV, "Enumerations") is not None:
+        reader.problem(node, "unsupported", "enumerations in a parameter set are not supported; use Integer parameters")
+    parameters = [parse_parameter(p, reader) for p in children(child(node, SSV, "Parameters"), SSV, "Parameter")]
+    return ParameterSet(
+        reader.text(node, "name"),
+        tuple(p for p in parameters if p is not None),
+        parse_units(child(node, SSV, "Units"), reader),
+    )
+
+
+def parse_parameter(node: Any, reader: Reader) -> Parameter | None:
+    """Parse ``ssv:Parameter``; None (and a problem) if its type or value cannot be honoured."""
+    name = reader.text(node, "name")
+    typed = next((e for e in elements(node) if tag(e) in SUPPORTED_TYPES), None)
+    if typed is None:
+        reader.problem(node, "unsupported", f"parameter '{name}' has no value of type {', '.join(SUPPORTED_TYPES)}")
+        return None
+    value = _value(typed, reader, name)
+    if value is None:
+        return None
+    return Parameter(name, tag(typed), value, reader.text(typed, "unit"), reader.file, int(node.sourceline or 0))
+
+
+def _value(node: Any, reader: Reader, name: str) -> Value | None:
+    kind = tag(node)
+    if kind == "Real":
+        number = reader.number(node, "value")
+        return number if number == number else None
+    if kind == "Boolean":
+        return reader.flag(node, "value")
+    raw = reader.text(node, "value")
+    if kind == "String":
+        return raw
+    try:
+        return int(raw)
+    except ValueError:
+        reader.problem(node, "number", f"parameter '{name}': '{raw}' is not a whole number")
+        return None

@@ -1,0 +1,126 @@
+"""Units: as declared in SSP and FMI files, and the conversion between compatible ones."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+from master.ssp.xml import SSC, Reader, child, children
+
+#: Exponents of kg, m, s, A, K, mol, cd, rad.
+Dimension = tuple[int, int, int, int, int, int, int, int]
+BASE_UNITS: Final = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: value in base units = factor * value + offset."""
+
+    name: str
+    dimension: Dimension
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """The map factor * value + offset from one unit to another."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def __call__(self, value: float) -> float:
+        """Convert a value."""
+        return self.factor * value + self.offset
+
+    def then(self, other: Conversion) -> Conversion:
+        """Return the conversion that applies this one and then ``other``."""
+        return Conversion(other.factor * self.factor, other.factor * self.offset + other.offset)
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether values pass unchanged."""
+        return self.factor == 1.0 and self.offset == 0.0
+
+
+def _unit(name: str, factor: float = 1.0, offset: float = 0.0, **powers: int) -> Unit:
+    dimension = [powers.get(base, 0) for base in BASE_UNITS]
+    return Unit(name, tuple(dimension), factor, offset)  # type: ignore[arg-type]
+
+
+#: Units known without a declaration; a file's own declaration of the same name takes precedence.
+COMMON: Final = {
+    u.name: u
+    for u in (
+        _unit("1"),
+        _unit("%", 0.01),
+        _unit("m", m=1),
+        _unit("mm", 1e-3, m=1),
+        _unit("cm", 1e-2, m=1),
+        _unit("km", 1e3, m=1),
+        _unit("s", s=1),
+        _unit("ms", 1e-3, s=1),
+        _unit("Hz", s=-1),
+        _unit("1/s", s=-1),
+        _unit("m/s", m=1, s=-1),
+        _unit("mm/s", 1e-3, m=1, s=-1),
+        _unit("km/h", 1 / 3.6, m=1, s=-1),
+        _unit("m/s2", m=1, s=-2),
+        _unit("kg", kg=1),
+        _unit("kg/m", kg=1, m=-1),
+        _unit("N", kg=1, m=1, s=-2),
+        _unit("kN", 1e3, kg=1, m=1, s=-2),
+        _unit("N.m", kg=1, m=2, s=-2),
+        _unit("kN.m", 1e3, kg=1, m=2, s=-2),
+        _unit("N/m", kg=1, s=-2),
+        _unit("kN/m", 1e3, kg=1, s=-2),
+        _unit("N/mm", 1e3, kg=1, s=-2),
+        _unit("N.s/m", kg=1, s=-1),
+        _unit("W", kg=1, m=2, s=-3),
+        _unit("J", kg=1, m=2, s=-2),
+        _unit("rad", rad=1),
+        _unit("deg", math.pi / 180, rad=1),
+        _unit("rad/s", rad=1, s=-1),
+        _unit("K", K=1),
+        _unit("degC", 1.0, 273.15, K=1),
+    )
+}
+
+
+def parse_units(node: Any | None, reader: Reader) -> dict[str, Unit]:
+    """Parse a list of ``ssc:Unit`` (inside ``ssd:Units`` or ``ssv:Units``)."""
+    units = (parse_unit(u, reader) for u in children(node, SSC, "Unit"))
+    return {u.name: u for u in units}
+
+
+def parse_unit(node: Any, reader: Reader) -> Unit:
+    """Parse ``ssc:Unit``."""
+    base = child(node, SSC, "BaseUnit")
+    name = reader.text(node, "name")
+    if base is None:
+        return Unit(name, (0,) * 8)
+    powers = tuple(_power(base, b, reader) for b in BASE_UNITS)
+    return Unit(name, powers, reader.number(base, "factor", 1.0), reader.number(base, "offset", 0.0))  # type: ignore[arg-type]
+
+
+def conversion(source: Unit, target: Unit) -> Conversion | None:
+    """Return the conversion from ``source`` to ``target``, None if they measure different things.
+
+    Examples
+    --------
+    >>> round(conversion(COMMON["km/h"], COMMON["m/s"])(36.0), 12)
+    10.0
+    >>> conversion(COMMON["N"], COMMON["m"]) is None
+    True
+    """
+    if source.dimension != target.dimension:
+        return None
+    if source.factor == target.factor and source.offset == target.offset:
+        return Conversion()
+    return Conversion(source.factor / target.factor, (source.offset - target.offset) / target.factor)
+
+
+def _power(node: Any, name: str, reader: Reader) -> int:
+    value = reader.number(node, name, 0.0)
+    return int(value) if value == value else 0

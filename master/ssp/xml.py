@@ -1,0 +1,129 @@
+"""XML access shared by the SSP readers: safe parsing, schema check, attributes with line numbers."""
+
+from __future__ import annotations
+
+import importlib.resources
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from lxml import etree
+
+from master.errors import Problem
+
+SSC: Final = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+SSD: Final = "http://ssp-standard.org/SSP1/SystemStructureDescription"
+SSV: Final = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSM: Final = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+
+#: The schema file of each kind of document, as shipped with FMPy.
+SCHEMAS: Final = {
+    "ssd": "SystemStructureDescription.xsd",
+    "ssv": "SystemStructureParameterValues.xsd",
+    "ssm": "SystemStructureParameterMapping.xsd",
+}
+
+
+@dataclass
+class Reader:
+    """One XML document being read; problems are collected, so that reading goes on.
+
+    Attributes
+    ----------
+    file : str
+        Its name in messages.
+    problems : list of Problem
+        Shared by all documents of a scenario.
+    """
+
+    file: str
+    problems: list[Problem] = field(default_factory=list)
+
+    def problem(self, node: Any, rule: str, text: str) -> None:
+        """Record a problem at ``node`` (None: at the file as a whole)."""
+        line = 0 if node is None else int(node.sourceline or 0)
+        self.problems.append(Problem(self.file, line, rule, text))
+
+    def parse(self, path: Path) -> Any | None:
+        """Return the root element of ``path``; None (and a problem) if it is not well-formed XML."""
+        parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+        try:
+            tree = etree.fromstring(path.read_bytes(), parser).getroottree()
+        except OSError as error:
+            self.problems.append(Problem(self.file, 0, "file", f"cannot be read ({error.strerror})"))
+            return None
+        except etree.XMLSyntaxError as error:
+            self.problems.append(Problem(self.file, error.lineno or 0, "xml", f"is not well-formed XML: {error.msg}"))
+            return None
+        if tree.docinfo.doctype:
+            self.problem(tree.getroot(), "xml", "a document type declaration is not allowed")
+            return None
+        return tree.getroot()
+
+    def check_schema(self, root: Any, kind: str) -> None:
+        """Validate against the official SSP 1.0 schema of ``kind`` ('ssd', 'ssv' or 'ssm')."""
+        folder = importlib.resources.files("fmpy") / "ssp" / "schema" / SCHEMAS[kind]
+        schema = etree.XMLSchema(file=str(folder))
+        schema.validate(root)
+        for entry in schema.error_log:
+            self.problems.append(Problem(self.file, entry.line, "schema", _plain(entry.message)))
+
+    def text(self, node: Any, name: str, default: str = "") -> str:
+        """Return an attribute; absence is reported by the schema check."""
+        return str(node.get(name, default))
+
+    def number(self, node: Any, name: str, default: float | None = None) -> float:
+        """Return an attribute as a finite number, NaN (and a problem) if it is none."""
+        raw = node.get(name)
+        if raw is None:
+            if default is None:
+                self.problem(node, "attribute", f"attribute '{name}' is missing")
+                return math.nan
+            return default
+        try:
+            value = float(raw)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            self.problem(node, "number", f"{name}='{raw}' is not a finite number")
+            return math.nan
+        return value
+
+    def flag(self, node: Any, name: str, default: bool = False) -> bool:
+        """Return an attribute of type xs:boolean."""
+        raw = node.get(name)
+        if raw is None:
+            return default
+        if raw not in ("true", "false", "1", "0"):
+            self.problem(node, "boolean", f"{name}='{raw}' is neither true nor false")
+        return raw in ("true", "1")
+
+
+def tag(node: Any) -> str:
+    """Return the local name of an element."""
+    return str(etree.QName(node).localname)
+
+
+def children(node: Any | None, namespace: str, name: str) -> Iterator[Any]:
+    """Iterate over the child elements with this qualified name."""
+    if node is not None:
+        yield from node.iterchildren(f"{{{namespace}}}{name}")
+
+
+def child(node: Any | None, namespace: str, name: str) -> Any | None:
+    """Return the first child element with this qualified name."""
+    return next(children(node, namespace, name), None)
+
+
+def elements(node: Any | None) -> Iterator[Any]:
+    """Iterate over the child elements, leaving out comments and processing instructions."""
+    if node is not None:
+        yield from node.iterchildren(etree.Element)
+
+
+def _plain(message: str) -> str:
+    for namespace, prefix in ((SSC, "ssc:"), (SSD, "ssd:"), (SSV, "ssv:"), (SSM, "ssm:")):
+        message = message.replace(f"{{{namespace}}}", prefix)
+    return message

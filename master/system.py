@@ -1,0 +1,117 @@
+"""What is coupled to what: the checked, frozen description of a system of FMUs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from master.ssp.annotation import RunSettings
+from master.ssp.ssv import Value
+from master.ssp.units import Conversion
+
+#: Share of a step by which the stop time may miss a whole number of steps for want of digits.
+_ROUNDING: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of an FMU, as its modelDescription.xml declares it."""
+
+    name: str
+    reference: int
+    type: str
+    causality: str
+    variability: str
+    unit: str
+    start: str | None
+    minimum: float | None
+    maximum: float | None
+
+
+@dataclass(frozen=True)
+class Fmu:
+    """What the master needs to know of an FMU file.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    guid, identifier : str
+        Of its co-simulation interface.
+    variables : dict
+        Declared variables by name.
+    can_restore : bool
+        Whether it can save and restore its state.
+    sha256 : str
+        Hash of the file.
+    tool : str
+        Generation tool.
+    """
+
+    path: Path
+    guid: str
+    identifier: str
+    variables: dict[str, Variable]
+    can_restore: bool
+    sha256: str
+    tool: str
+
+
+@dataclass(frozen=True)
+class Component:
+    """An FMU in the system: its name, parameter values (in the FMU's units) and exchanged variables."""
+
+    name: str
+    fmu: Fmu
+    parameters: dict[str, Value]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Connection:
+    """From one component's output to another's input: input = conversion(output)."""
+
+    source: str
+    output: str
+    target: str
+    input: str
+    conversion: Conversion = field(default_factory=Conversion)
+
+
+@dataclass(frozen=True)
+class System:
+    """A runnable system.
+
+    Attributes
+    ----------
+    name : str
+        The scenario's name.
+    components : tuple of Component
+        In the order of the SSD.
+    connections : tuple of Connection
+        In the order of the SSD.
+    start, stop, step : float
+        Start time, stop time and macro step [s].
+    settings : RunSettings
+        Coupling, interval of interest, calibration, recording.
+    """
+
+    name: str
+    components: tuple[Component, ...]
+    connections: tuple[Connection, ...]
+    start: float
+    stop: float
+    step: float
+    settings: RunSettings
+
+    def component(self, name: str) -> Component:
+        """Return a component by its name."""
+        return next(c for c in self.components if c.name == name)
+
+    @property
+    def step_count(self) -> int:
+        """Number of macro steps: the last one ends at the stop time, or less than a step before it."""
+        return max(1, math.floor((self.stop - self.start) / self.step + _ROUNDING))

@@ -1,0 +1,209 @@
+"""The command line: exit codes and what is said."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from master import results
+from master.cli import main
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["run"],
+        ["x.ssp", "--scheme", "magic"],
+        ["x.ssp", "--step", "0"],
+        ["x.ssp", "--step", "nan"],
+        ["x.ssp", "--stop", "soon"],
+        ["x.ssp", "--set", "nonsense"],
+        ["x.ssp", "--wrong"],
+        ["compare", "one"],
+    ],
+)
+def test_wrong_command_lines_end_with_2(arguments, capsys):
+    try:
+        code = main(arguments)
+    except SystemExit as stop:
+        code = stop.code
+    assert code == 2
+    assert "error" in capsys.readouterr().err
+
+
+def test_help_names_every_verb(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--help"])
+    assert stop.value.code == 0
+    out = capsys.readouterr().out
+    assert all(verb in out for verb in ("run", "pack", "validate", "compare", "report", "calibrate"))
+
+
+def test_run_says_figures_and_verdict_in_80_columns(toy, in_folder, capsys):
+    assert main([str(toy), "--no-build"]) == 0
+    out = capsys.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert "EN 50367, pantograph, 20-45 m, 180 km/h" in out
+    assert "mean force [N]" in out
+    assert "failed" in out  # 140 N are too many at 180 km/h
+    assert "real-time factor" in out
+    folder = in_folder / "results" / "toy"
+    text = (folder / "report.html").read_text()
+    assert "EN 50367" in text
+    assert text.count("data:image/png;base64,") == len(list(folder.glob("*.png"))) == 5
+    assert "src='http" not in text
+
+
+def test_quiet_says_nothing(toy, in_folder, capsys):
+    assert main(["run", str(toy), "--quiet", "--no-report", "--no-build", "--stop", "0.5", "--out", "r"]) == 0
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", "")
+    assert not list((in_folder / "r").glob("*.png"))
+
+
+def test_json_is_the_summary(toy, in_folder, capsys):
+    assert main([str(toy), "--json", "--no-report", "--no-build"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["quality"][0]["mean"] > 100
+    assert summary == json.loads((in_folder / "results/toy/summary.json").read_text())
+
+
+def test_overrides_are_honoured(toy, in_folder):
+    options = [
+        "--stop",
+        "0.6",
+        "--step",
+        "0.002",
+        "--scheme",
+        "gauss-seidel",
+        "--set",
+        "pantograph.static_force=90",
+    ]
+    assert main([str(toy), *options, "--quiet", "--no-report", "--no-build"]) == 0
+    summary = results.read(in_folder / "results/toy").summary
+    assert summary["steps"] == 300
+    assert summary["settings"]["coupling"]["scheme"] == "gauss-seidel"
+    assert summary["components"][1]["parameters"]["static_force"] == 90.0
+
+
+@pytest.mark.parametrize(
+    ("assignment", "text"),
+    [
+        ("pantograph.static_farce=1", "did you mean pantograph.static_force"),
+        ("pantograph.A.z=1", "causality 'output'"),
+        ("pantograph.static_force=much", "'much' is not a number"),
+        ("pantograph.static_force=inf", "is not finite"),
+    ],
+)
+def test_parameters_that_cannot_be_set(toy, in_folder, capsys, assignment, text):
+    assert main([str(toy), "--set", assignment, "--no-build"]) == 2
+    assert text in " ".join(capsys.readouterr().err.split())
+    assert not (in_folder / "results").exists()
+
+
+def test_a_packed_scenario_runs_like_its_folder(toy, in_folder):
+    common = ["--quiet", "--no-report", "--no-build"]
+    assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build"]) == 0
+    assert main([str(toy), "--out", "a", *common]) == 0
+    assert main(["packed.ssp", "--out", "b", *common]) == 0
+    assert (in_folder / "a/timeseries.csv").read_bytes() == (in_folder / "b/timeseries.csv").read_bytes()
+
+
+def test_missing_scenario_and_missing_fmu(toy, in_folder, capsys):
+    assert main(["none.ssp"]) == 1
+    assert "there is no such folder" in capsys.readouterr().err
+    (toy / "resources" / "ToyCatenary.fmu").unlink()
+    assert main([str(toy)]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "SystemStructure.ssd:6: component 'catenary': resources/ToyCatenary.fmu does not exist" in said
+
+
+def test_an_fmu_that_is_none(toy, capsys):
+    (toy / "resources" / "ToyCatenary.fmu").write_text("not a zip")
+    assert main(["validate", str(toy), "--no-build"]) == 1
+    assert "is not a readable FMU" in capsys.readouterr().err
+
+
+def test_validate_lists_all_problems_with_lines(toy, capsys):
+    path = toy / "SystemStructure.ssd"
+    text = (
+        path.read_text()
+        .replace('startConnector="A.x"', 'startConnector="A.q"')
+        .replace('stopTime="1.0"', 'stopTime="-1"')
+    )
+    path.write_text(text)
+    assert main(["validate", str(toy), "--no-build"]) == 1
+    said = capsys.readouterr().err
+    line = text[: text.index('startConnector="A.q"')].count("\n") + 1
+    assert f"SystemStructure.ssd:{line}: component 'pantograph' declares no connector 'A.q'" in said
+    assert "stop time -1 s must lie after start time 0 s" in said
+
+
+def test_validate_accepts(toy, capsys):
+    assert main(["validate", str(toy), "--no-build"]) == 0
+    assert "toy: valid; 2 components, 16 connections" in capsys.readouterr().out
+
+
+def test_results_may_not_lie_in_the_scenario(toy, capsys):
+    assert main([str(toy), "--out", str(toy / "results"), "--no-build"]) == 2
+    assert main([str(toy), "--out", str(toy.parent), "--no-build"]) == 2
+    assert "lie inside each other" in capsys.readouterr().err
+
+
+def test_compare_shows_the_difference(toy, in_folder, capsys):
+    common = ["--quiet", "--no-report", "--no-build"]
+    main([str(toy), "--out", "a", *common])
+    main([str(toy), "--out", "b", "--set", "pantograph.static_force=150", *common])
+    capsys.readouterr()
+    assert main(["compare", "a", "b"]) == 0
+    assert "differ by" in capsys.readouterr().out
+    assert main(["compare", "a", "b", "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)
+    assert found["difference"]["mean"] == pytest.approx(10.0, abs=1.0)
+    assert found["rms"] >= abs(found["difference"]["mean"]) - 1e-9  # Jensen
+    assert main(["compare", "a", "a", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["rms"] == 0.0
+
+
+def test_compare_needs_results(in_folder, capsys):
+    assert main(["compare", ".", "."]) == 1
+    assert "is not a results folder" in capsys.readouterr().err
+
+
+def test_report_is_written_again(toy, in_folder, capsys):
+    main([str(toy), "--out", "a", "--quiet", "--no-report", "--no-build"])
+    assert main(["report", "a"]) == 0
+    assert (in_folder / "a/report.html").is_file()
+    assert (in_folder / "a/contact_force.svg").is_file()
+
+
+def test_calibrate_stores_what_it_finds(toy, in_folder, capsys):
+    before = (toy / "parameters.ssv").read_text()
+    options = ["--parameter", "pantograph.static_force", "--mean", "120", "--no-build"]
+    assert main(["calibrate", str(toy), *options, "--dry-run"]) == 0
+    assert (toy / "parameters.ssv").read_text() == before
+    assert main(["calibrate", str(toy), *options]) == 0
+    after = (toy / "parameters.ssv").read_text()
+    assert "<!-- kept as it is -->" in after
+    assert "<!-- calibrated: mean force 1" in after
+    assert main([str(toy), "--quiet", "--no-report", "--no-build", "--out", "r"]) == 0
+    assert results.read(in_folder / "r").assessments()[0].quality.mean == pytest.approx(120.0, abs=0.1)
+
+
+def test_calibrate_without_a_target(toy, capsys):
+    assert main(["calibrate", str(toy), "--no-build"]) == 2
+    assert "give --parameter and --mean" in capsys.readouterr().err
+
+
+def test_no_traceback_from_the_module(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "master", str(tmp_path)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: ")
+    assert "Traceback" not in done.stderr

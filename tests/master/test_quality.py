@@ -1,0 +1,192 @@
+"""Contact-quality figures against analytic signals."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from master.quality import assess, band_pass, find_losses, interval_mask, judge, low_pass, target_mean_force
+
+STEP = 1e-3
+TIME = np.arange(8001) * STEP
+MIDDLE = slice(2000, 6000)  # 4 s: whole periods of every sine below, less one sample
+
+
+def sine(frequency, amplitude=1.0, phase=0.0):
+    return amplitude * np.sin(2 * np.pi * frequency * TIME + phase)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 1.0, 5.0, 12.0, 19.0])
+def test_filter_passes_low_frequencies_without_shift(frequency):
+    signal = sine(frequency, phase=0.7)
+    assert low_pass(signal, STEP)[MIDDLE] == pytest.approx(signal[MIDDLE], abs=0.01)
+
+
+@pytest.mark.parametrize("frequency", [21.0, 25.0, 50.0, 200.0])
+def test_filter_stops_high_frequencies(frequency):
+    assert np.abs(low_pass(sine(frequency), STEP)[MIDDLE]).max() < 3e-3
+
+
+def test_filter_has_unit_gain_for_constants_and_straight_lines_up_to_the_ends():
+    line = 100.0 + 3.0 * TIME
+    assert low_pass(line, STEP) == pytest.approx(line, rel=1e-12)
+
+
+def test_filter_is_zero_phase_in_the_strict_sense():
+    """Filtering a signal turned round in time is the filtered signal turned round."""
+    rng = np.random.default_rng(1)
+    signal = rng.normal(size=3000)
+    assert low_pass(signal[::-1], STEP)[::-1] == pytest.approx(low_pass(signal, STEP), abs=1e-10)
+
+
+def test_filter_is_linear():
+    rng = np.random.default_rng(2)
+    a, b = rng.normal(size=(2, 2000))
+    both = low_pass(2.0 * a - 3.0 * b, STEP)
+    assert both == pytest.approx(2.0 * low_pass(a, STEP) - 3.0 * low_pass(b, STEP), abs=1e-10)
+
+
+def test_what_happens_far_outside_the_interval_hardly_matters():
+    """An impact 1.5 s before the interval changes the filtered force in it by less than 0.25 % of it."""
+    force = 150.0 + sine(3.0, 30.0)
+    struck = force.copy()
+    struck[400:420] += 400.0
+    difference = (low_pass(struck, STEP) - low_pass(force, STEP))[MIDDLE]
+    assert np.abs(difference).max() < 1.0
+
+
+def test_coarse_sampling_passes_whole():
+    signal = np.random.default_rng(3).normal(size=50)
+    assert low_pass(signal, 0.05).tolist() == signal.tolist()
+
+
+def test_sigma_per_band_is_that_of_the_sine_in_the_band():
+    force = 150.0 + sine(1.0, 10.0) + sine(4.0, 20.0) + sine(10.0, 30.0) + sine(60.0, 80.0)
+    found = assess(force, 80.0 * TIME, STEP, (160.0, 479.99))
+    root = np.sqrt(2.0)
+    assert found.mean == pytest.approx(150.0, abs=0.01)
+    assert found.sigma_bands["0-2"] == pytest.approx(10.0 / root, rel=5e-3)
+    assert found.sigma_bands["0-5"] == pytest.approx(np.hypot(10.0, 20.0) / root, rel=5e-3)
+    assert found.sigma_bands["5-20"] == pytest.approx(30.0 / root, rel=5e-3)
+    assert found.sigma == pytest.approx(np.sqrt(100 + 400 + 900) / root, rel=5e-3)
+    assert found.raw_maximum - found.maximum > 40.0  # the 60 Hz part is in the raw force alone
+
+
+def test_extremes_of_a_sine():
+    found = assess(150.0 + sine(5.0, 40.0), 80.0 * TIME, STEP, (160.0, 479.99))
+    assert found.maximum == pytest.approx(190.0, abs=0.05)
+    assert found.minimum == pytest.approx(110.0, abs=0.05)
+    assert found.amplitude == pytest.approx(80.0, abs=0.1)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(50, 300), st.floats(1, 60))
+@settings(max_examples=20, deadline=None)
+def test_statistical_identities(seed, mean, spread):
+    force = mean + spread * np.random.default_rng(seed).normal(size=4001)
+    found = assess(force, 60.0 * np.arange(4001) * STEP, STEP, (30.0, 200.0))
+    assert found.statistical_maximum - found.statistical_minimum == pytest.approx(6 * found.sigma)
+    assert found.statistical_maximum + found.statistical_minimum == pytest.approx(2 * found.mean)
+    assert found.amplitude == pytest.approx(found.maximum - found.minimum)
+    assert found.minimum <= found.mean <= found.maximum
+    assert found.sigma <= 0.5 * found.amplitude + 1e-9  # Popoviciu's inequality
+    assert sum(found.histogram_share) == pytest.approx(1.0)
+
+
+def test_bands_add_up_to_the_whole():
+    force = np.random.default_rng(4).normal(size=4000)
+    whole = band_pass(force, STEP, 0.0, 5.0) + band_pass(force, STEP, 5.0, 20.0)
+    assert whole == pytest.approx(low_pass(force, STEP), abs=1e-10)
+
+
+def test_losses_are_counted_with_their_durations():
+    force = np.full(1000, 100.0)
+    force[100:103] = 0.0  # 3 ms: no arc
+    force[500:512] = 0.0  # 12 ms
+    force[990:] = 0.0  # 10 ms, up to the end
+    found = find_losses(force, STEP)
+    assert found.count == 3
+    assert found.longest == pytest.approx(0.012)
+    assert found.total == pytest.approx(0.025)
+    assert found.percentage == pytest.approx(2.5)
+    assert found.nq == pytest.approx(2.2)
+
+
+def test_no_loss():
+    found = find_losses(np.full(10, 1e-9), STEP)
+    assert (found.count, found.total, found.percentage, found.nq) == (0, 0.0, 0.0, 0.0)
+
+
+def test_losses_outside_the_interval_do_not_count():
+    force = np.full(1000, 100.0)
+    force[:200] = 0.0
+    found = assess(force, np.arange(1000) * 0.1, STEP, (50.0, 90.0))
+    assert found.losses.count == 0
+
+
+def test_interval_includes_its_ends_and_knows_open_ones():
+    x = np.arange(6.0)
+    assert interval_mask(x, 1.0, 4.0).tolist() == [False, True, True, True, True, False]
+    assert interval_mask(x, None, 2.0).sum() == 3
+    assert interval_mask(x, None, None).all()
+
+
+def test_an_interval_without_samples_gives_no_figures():
+    assert assess(np.ones(100), np.arange(100.0), STEP, (200.0, 300.0)) is None
+
+
+def test_height_and_lateral_ranges_leave_out_times_without_contact():
+    n = 1000
+    height = np.full(n, 5.0)
+    height[100:200] = 5.03
+    height[500] = np.nan
+    lateral = np.linspace(-0.2, 0.2, n)
+    found = assess(np.full(n, 100.0), np.arange(n) * 0.1, STEP, (0.0, 99.9), height, lateral)
+    assert found.contact_height_range == pytest.approx(0.03)
+    assert (found.lateral_minimum, found.lateral_maximum) == pytest.approx((-0.2, 0.2))
+
+
+def test_speed_comes_from_the_record():
+    found = assess(np.full(1000, 100.0), 83.0 * np.arange(1000) * STEP, STEP, (10.0, 50.0))
+    assert found.speed == pytest.approx(83.0)
+
+
+def test_target_mean_force_at_300_kmh():
+    """157.3 N at 300 km/h [EN 50367: 0.00097 v^2 + 70]; the branches nearly meet at 200 km/h."""
+    assert target_mean_force(300 / 3.6) == pytest.approx(157.3)
+    assert target_mean_force(200 / 3.6) == pytest.approx(108.8)
+
+
+def quality(force, speed=300 / 3.6, **options):
+    n = len(force)
+    return assess(force, speed * np.arange(n) * STEP, STEP, (speed, speed * (n * STEP - 1)), **options)
+
+
+def verdicts(criteria):
+    return {c.name: c.passed for c in criteria}
+
+
+def test_verdict_passes_a_good_run():
+    criteria = judge(quality(157.5 + sine(2.0, 50.0), height=np.full(len(TIME), 5.08)), [0.045, 0.046])
+    assert all(c.passed for c in criteria)
+    assert len(criteria) == 6
+
+
+@pytest.mark.parametrize(
+    ("force", "uplifts", "height", "failed"),
+    [
+        (170.0 + sine(2.0, 30.0), [0.05], 5.0, "mean force"),
+        (157.5 + sine(2.0, 72.0), [0.05], 5.0, "sigma / mean"),
+        (154.5 + 210.0 * np.exp(-(((TIME - 4.0) / 0.05) ** 2)), [0.05], 5.0, "maximum force"),
+        (157.5 + sine(2.0, 30.0), [0.05, 0.121], 5.0, "uplift at supports"),
+        (157.5 + sine(2.0, 30.0), [0.05], 5.0 + sine(1.0, 0.041), "contact height range"),
+    ],
+)
+def test_each_limit_can_fail_alone(force, uplifts, height, failed):
+    found = verdicts(judge(quality(force, height=height + 0.0 * TIME), uplifts))
+    assert [name for name, passed in found.items() if not passed] == [failed]
+
+
+def test_arcing_fails():
+    force = 157.5 + sine(2.0, 30.0)
+    force[4000:4020] = 0.0
+    assert not verdicts(judge(quality(force)))["NQ (estimate)"]

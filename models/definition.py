@@ -276,7 +276,8 @@ class Table:
         """
         self._report_unknown()
         if self._log.problems:
-            raise DefinitionError(self._log.problems)
+            # A rule that is read for every span reports its mistakes for every span.
+            raise DefinitionError(tuple(dict.fromkeys(self._log.problems)))
 
     def _child(self, data: dict[str, Any], path: str) -> Table:
         child = Table(data, self._log, path)
@@ -299,6 +300,8 @@ class Table:
             self.problem(name, f'{entry!r} must be written {form}, "unit", "source"]')
             return None
         raw, written_unit, source = entry
+        if not source.strip():
+            self.problem(name, "names no source; where none states the value, write 'choice: why'")
         values = raw if many and isinstance(raw, list) else [raw]
         if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
             self.problem(name, f"{raw!r} is not a number")

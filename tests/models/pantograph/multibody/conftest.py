@@ -1,0 +1,15 @@
+"""Shared mechanisms: assembled once."""
+
+from __future__ import annotations
+
+import pytest
+
+from models.pantograph.multibody.mechanism import Mechanism
+from models.pantograph.multibody.statics import settle_springs
+from tests.models.pantograph.multibody.mechanisms import library
+
+
+@pytest.fixture(scope="session")
+def generic():
+    mechanism = Mechanism(library("generic_multibody"))
+    return mechanism, settle_springs(mechanism)

@@ -13,7 +13,7 @@ from lxml import etree
 from master.quality import assess
 from models.catenary.model import CatenaryModel
 from models.coupled import CoupledModel
-from models.library import load_line, load_pantograph
+from models.library import load_line, load_lumped
 
 pytestmark = pytest.mark.slow
 
@@ -39,7 +39,7 @@ def monolithic():
         key = (step, *sorted(line_values.items()))
         if key not in done:
             line = load_line("LN2").with_values(line_values)
-            pantograph = load_pantograph("CX").with_values(_parameters())
+            pantograph = load_lumped("CX").with_values(_parameters())
             record = CoupledModel(CatenaryModel(line), [pantograph]).run(7.8, step)
             quality = assess(record.contact_force[:, 0], record.position[:, 0], step, INTERVAL)
             done[key] = quality, record

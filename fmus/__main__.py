@@ -1,4 +1,4 @@
-"""Command line: ``python -m fmus build | fingerprint | list``."""
+"""Command line: ``python -m fmus build | doctor | fingerprint | list``."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from fmus import doctor
 from fmus.build import BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe
 
 DEFAULT_FOLDER = Path("build/fmus")
@@ -16,24 +17,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 for success, 1 for a failure, 2 for a wrong command line."""
     options = _parser().parse_args(arguments)
     try:
-        options.run(options)
+        code: int | None = options.run(options)
     except UnknownFmuError as error:
         print(error, file=sys.stderr)
         return 2
     except (BuildError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
-    return 0
+    return code or 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs.")
+    parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs, and see whether they run here.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     verb = verbs.add_parser("build", help="build FMUs, all of the library if none is named")
     verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
+    verb.add_argument("--shim", action="store_true", help="bring Python into hosts that are not Python (Linux)")
     verb.set_defaults(run=_build)
+    verb = verbs.add_parser("doctor", help="say what this machine lacks for running an FMU")
+    verb.add_argument("fmu", type=Path, metavar="FILE", help="X.fmu")
+    verb.set_defaults(run=_examine)
     verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
     verb.add_argument("name", metavar="NAME")
     verb.set_defaults(run=_fingerprint)
@@ -51,7 +56,11 @@ def _count(text: str) -> int:
 
 def _build(options: argparse.Namespace) -> None:
     for wanted in _recipes(options.names or known_names(), options.pantographs):
-        print(build(wanted, options.out))
+        print(build(wanted, options.out, options.shim))
+
+
+def _examine(options: argparse.Namespace) -> int:
+    return doctor.main(options.fmu)
 
 
 def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:

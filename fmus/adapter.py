@@ -26,7 +26,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 from fmus.description import describe
 from fmus.ports import Port, Ports, Table
 from fmus.state import StateError, pack, unpack
-from models.part import Definition, FloatArray, Snapshot
+from models.part import Definition, FloatArray, Parameter, Snapshot
 
 #: A step may begin this share of its length away from where the model is: hosts sum up time.
 _TIME_TOLERANCE = 1e-3
@@ -91,9 +91,15 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
     ----------
     fingerprint : str
         Content hash of the FMU, its GUID; set by the build.
+    models : str
+        What is modelled, a paragraph for the page inside the FMU.
+    limits : tuple of str
+        What is not, for the same page.
     """
 
     fingerprint: ClassVar[str] = ""
+    models: ClassVar[str] = "See the definition below."
+    limits: ClassVar[tuple[str, ...]] = ()
     license: ClassVar[str] = "MIT"
 
     def __init__(self, **kwargs: Any) -> None:
@@ -173,7 +179,7 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         try:
             if max(vrs) >= self._stale_from:
                 self._bring_up_to_date()
-            return self._values.take(vrs).tolist()  # type: ignore[no-any-return]
+            return self._values.take(vrs).tolist()
         except BaseException as error:
             self._refuse(error)
             return [math.nan] * len(vrs)
@@ -253,6 +259,16 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
     def to_xml(self, model_options: Mapping[str, str] | None = None) -> Element:
         """Return the model description; only the build asks for it."""
         return describe(self, self._table, super().to_xml)
+
+    @property
+    def table(self) -> Table:
+        """Every variable; only the build asks for it."""
+        return self._table
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The definition's parameters; only the build asks for them."""
+        return self._definition.parameters()
 
     # Inside.
 

@@ -15,11 +15,15 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from xml.etree.ElementTree import Element, indent, tostring
 
 import pythonfmu
 
 from fmus.bundle import BundleError, Module, collect, rewrite
+from fmus.documentation import About, page
+from fmus.icon import icon
+from fmus.shim import NATIVE, ShimError, with_shim
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 LIBRARY = REPOSITORY / "models" / "library"
@@ -34,7 +38,13 @@ _EMPTIED = frozenset({"pythonfmu"})
 #: The earliest time a zip archive can hold: the same for every file, so that builds are identical.
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 #: Kind of pantograph, as its definition says -> module and class of the adapter.
-_PANTOGRAPHS: Mapping[str, tuple[str, str]] = {"lumped": ("fmus.pantograph", "LumpedPantographSlave")}
+_PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
+    "lumped": ("fmus.pantograph", "LumpedPantographSlave"),
+    "multibody": ("fmus.multibody", "MultibodyPantographSlave"),
+}
+#: Sources that are not carried along but decide about an FMU's bytes.
+_BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "shim.py")
+_REQUIREMENTS = b"numpy>=1.26\nscipy>=1.11\n"
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
 
 _SCRIPT = '''"""Entry for pythonfmu. Generated; the name of this file holds the content hash."""
@@ -155,15 +165,22 @@ def fingerprint(wanted: Recipe) -> str:
     return _gather(wanted).fingerprint
 
 
-def build(wanted: Recipe, folder: Path) -> Path:
+def build(wanted: Recipe, folder: Path, shim: bool = False) -> Path:
     """Write ``folder/NAME.fmu`` and return its path; other builds may run at the same time.
+
+    Parameters
+    ----------
+    wanted : Recipe
+    folder : Path
+    shim : bool
+        Whether the Linux library is to bring Python into hosts that are not Python (``fmus.shim``).
 
     Raises
     ------
     BuildError
         If the definition or the sources do not make an FMU.
     """
-    data = archive(wanted)
+    data = archive(wanted, shim)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
     handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{wanted.name}.", suffix=".tmp")
@@ -178,9 +195,14 @@ def build(wanted: Recipe, folder: Path) -> Path:
     return path
 
 
-def archive(wanted: Recipe) -> bytes:
-    """Return the bytes of an FMU; the same sources give the same bytes."""
+def archive(wanted: Recipe, shim: bool = False) -> bytes:
+    """Return the bytes of an FMU; the same sources give the same bytes (with the shim: and the same compiler)."""
     files = _contents(wanted, _gather(wanted))
+    if shim:
+        try:
+            files = with_shim(files, wanted.name)
+        except ShimError as error:
+            raise BuildError(f"{wanted.name}: {error}") from error
     buffer = io.BytesIO()
     # Stored, not compressed: what a compressor makes of the same input differs between its versions.
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as package:
@@ -223,9 +245,15 @@ def _gather(wanted: Recipe) -> _Sources:
     binaries, licenses = _binaries(wanted.name), _licenses()
     pieces = {f"module/{n}": m.source.encode() for n, m in modules.items()} | binaries | licenses
     # The build itself decides about the bytes as well.
-    pieces |= {"build": Path(__file__).read_bytes(), "recipe": _recipe_bytes(wanted)}
+    pieces |= {"recipe": _recipe_bytes(wanted), **_builders()}
     pieces["definition"] = definition
     return _Sources(modules, definition, binaries, licenses, _hash(pieces))
+
+
+def _builders() -> dict[str, bytes]:
+    here = Path(__file__).parent
+    files = [here / name for name in _BUILDERS] + sorted(NATIVE.glob("*.*"))
+    return {f"build/{path.name}": path.read_bytes() for path in files}
 
 
 def _recipe_bytes(wanted: Recipe) -> bytes:
@@ -262,7 +290,7 @@ def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:
         "slavemodule.txt": script.encode(),
         f"{script}.py": _script(wanted, sources).encode(),
         "definition.toml": sources.definition,
-        "requirements.txt": b"numpy\nscipy\n",
+        "requirements.txt": _REQUIREMENTS,
         f"{sources.package}/__init__.py": f'"""Sources of {wanted.name}."""\n'.encode(),
     }
     try:
@@ -271,9 +299,9 @@ def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:
             resources[f"{sources.package}/{module.inner_path()}"] = text.encode()
     except BundleError as error:
         raise BuildError(f"{wanted.name}: {error}") from error
-    description = _describe(wanted, sources.package, script, resources)
     files = {f"resources/{name}": data for name, data in resources.items()}
-    return files | {"modelDescription.xml": description, **sources.binaries, **sources.licenses}
+    files["model.png"] = icon(wanted.name.partition("_")[0].lower())
+    return {**files, **_describe(wanted, sources, script, resources), **sources.binaries, **sources.licenses}
 
 
 def _script(wanted: Recipe, sources: _Sources) -> str:
@@ -292,27 +320,41 @@ def _script(wanted: Recipe, sources: _Sources) -> str:
     )
 
 
-def _describe(wanted: Recipe, package: str, script: str, resources: Mapping[str, bytes]) -> bytes:
-    """Return the model description, made by the packed sources themselves: so they are known to import."""
+def _describe(
+    wanted: Recipe, sources: _Sources, script: str, resources: Mapping[str, bytes]
+) -> dict[str, bytes]:
+    """Return model description and page, made by the packed sources themselves: so they are known to import."""
     with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
         for name, data in resources.items():
             path = Path(folder) / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
-        with _importable(folder, (package, script)):
-            root = _instance_description(wanted, script, folder)
+        with _importable(folder, (sources.package, script)):
+            slave = _instance(wanted, script, folder)
+            return {
+                "modelDescription.xml": _description(slave.to_xml()),
+                "documentation/index.html": _page(wanted, sources, slave),
+            }
+
+
+def _instance(wanted: Recipe, script: str, folder: str) -> Any:
+    try:
+        slave_class = getattr(importlib.import_module(script), wanted.name)
+        return slave_class(instance_name=wanted.name, resources=folder)
+    except Exception as error:
+        raise BuildError(f"{wanted.name} cannot be built: {error}") from error
+
+
+def _description(root: Element) -> bytes:
     indent(root)
     text = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _instance_description(wanted: Recipe, script: str, folder: str) -> Element:
-    try:
-        slave_class = getattr(importlib.import_module(script), wanted.name)
-        root: Element = slave_class(instance_name=wanted.name, resources=folder).to_xml()
-    except Exception as error:
-        raise BuildError(f"{wanted.name} cannot be built: {error}") from error
-    return root
+def _page(wanted: Recipe, sources: _Sources, slave: Any) -> bytes:
+    definition = sources.definition.decode("utf-8")
+    said = About(wanted.name, wanted.title, sources.fingerprint, slave.models, slave.limits, definition)
+    return page(said, slave.table, slave.parameters)
 
 
 @contextmanager

@@ -6,11 +6,10 @@ from operator import attrgetter
 from pathlib import Path
 from typing import ClassVar
 
-from models.catenary.part import CatenaryPart
-
 from fmus.adapter import Adapter
 from fmus.ports import Port, Ports, Signal, vector
 from models.catenary.parameters import CatenaryDefinition, load
+from models.catenary.part import CatenaryPart
 from models.part import FloatArray
 
 #: An unconnected port is a strip far below the wire, which touches nothing.
@@ -22,6 +21,25 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     """Overhead contact line: collector strips in, contact forces and points out."""
 
     pantographs: ClassVar[int] = 1
+    models: ClassVar[str] = (
+        "An overhead contact line of several spans in three dimensions: contact wire and messenger wire (and stitch "
+        "wires, where the definition has them) as tensioned Euler-Bernoulli beams, droppers that carry tension only, "
+        "steady arms, stagger, clamps as lumped masses, proportional damping. The static shape is found first (given "
+        "contact-wire height and pre-sag, the dropper lengths follow); the dynamics are linear about it, but for the "
+        "slackening droppers and the contact, and are integrated with constant steps. The pantograph tells the ends "
+        "of its collector strip; the line finds where the wire crosses the strip, the contact force from the "
+        "interpenetration, and its point of application. Between communication points the strip is continued from "
+        "its last positions and velocities, so hosts that hold inputs lose no accuracy."
+    )
+    limits: ClassVar[tuple[str, ...]] = (
+        "Displacements are small against the spans: geometry is linearised about the static shape.",
+        "The contact is unilateral, without friction along the strip.",
+        "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
+        "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
+        "definition.",
+        "A strip beyond the modelled length finds no wire.",
+        "All that the definition marks as a choice is not taken from the source.",
+    )
 
     def _read_definition(self, path: Path) -> CatenaryDefinition:
         return load(path)
@@ -35,7 +53,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
             local=(_dropper_port(part),),
-            calculated=_geometry_ports(part),
+            calculated=(*_geometry_ports(part), *_section_ports(part), _wave_port()),
         )
 
     def _initialise(self, part: CatenaryPart, time: float, inputs: FloatArray) -> None:
@@ -112,6 +130,25 @@ def _geometry_ports(part: CatenaryPart) -> tuple[Port, ...]:
         *(_length_port("support", len(part.supports), *row) for row in supports),
         *(_length_port("dropper", len(part.droppers), *row) for row in droppers),
     )
+
+
+def _section_ports(part: CatenaryPart) -> tuple[Port, ...]:
+    """Say of every support and dropper which section it belongs to, where there are several."""
+    if part.section_count == 1:
+        return ()
+    counts = (("support", len(part.supports)), ("dropper", len(part.droppers)))
+    return tuple(
+        Port(
+            tuple(Signal(f"{thing}[{i}].section", "1", f"section of {thing} {i}") for i in range(1, count + 1)),
+            attrgetter(f"geometry.{thing}_section"),
+        )
+        for thing, count in counts
+    )
+
+
+def _wave_port() -> Port:
+    signal = Signal("contact_wire.wave_speed", "m/s", "speed of transverse waves in the contact wire, longest span")
+    return Port((signal,), attrgetter("contact_wire_wave_speed"))
 
 
 def _length_port(thing: str, count: int, name: str, attribute: str, text: str) -> Port:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from operator import attrgetter, methodcaller
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from fmus.adapter import Adapter
 from fmus.ports import Port, Ports, Signal, vector
@@ -15,6 +15,20 @@ from models.part import FloatArray
 
 class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     """Pantograph of lumped masses: contact force and point in, collector strip out."""
+
+    models: ClassVar[str] = (
+        "A pantograph as a chain of masses above each other, joined by springs and dampers, the lowest to the "
+        "vehicle's roof, the highest carrying the collector strip; it moves along the track at constant speed. A "
+        "static force lifts the lowest mass, raised smoothly from raise_start over raise_duration. It starts at rest "
+        "at reference_height, where the springs carry the weights. The contact force acts on the highest mass; "
+        "between communication points it is continued from its last values, so hosts that hold inputs lose no accuracy."
+    )
+    limits: ClassVar[tuple[str, ...]] = (
+        "Vertical motion only: the strip does not roll, and the lateral point of application has no effect.",
+        "Linear springs and dampers, identified at one working height; no friction, no stops.",
+        "No aerodynamic uplift of its own: add it to static_force.",
+        "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
+    )
 
     def _read_definition(self, path: Path) -> LumpedDefinition:
         return load_lumped(path)

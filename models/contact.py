@@ -11,10 +11,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from models.part import FloatArray
 
 #: Below this penetration velocity an impact has no velocity to refer to [m/s].
 _SLOWEST_IMPACT = 1e-6
+#: Widths over which a contact sets in and fades [m]: of the strip, from its ends, as its horns bend down there; of the
+#: wire, from its ends. They keep the force continuous where a wire slides off a strip or ends under it.
+STRIP_EDGE = 0.05
+WIRE_EDGE = 1.0
 
 
 class ContactParameters(Protocol):
@@ -40,6 +46,12 @@ class NormalForce:
     force: float
     by_penetration: float
     by_velocity: float
+
+    def scaled(self, share: float) -> NormalForce:
+        """Return a share of the force."""
+        if share == 1.0:
+            return self
+        return NormalForce(share * self.force, share * self.by_penetration, share * self.by_velocity)
 
 
 def continuous_contact(
@@ -104,3 +116,47 @@ def crossing(a: FloatArray, b: FloatArray, i: tuple[float, float], j: tuple[floa
         return None
     dx, dy = i[0] - float(a[0]), i[1] - float(a[1])
     return (dy * wire_x - dx * wire_y) / determinant, (strip_x * dy - strip_y * dx) / determinant
+
+
+def engagement(from_strip_end: float, from_wire_end: float) -> float:
+    """Return the share of the contact law that acts so near to the ends of strip and wire [m].
+
+    Examples
+    --------
+    >>> engagement(0.4, 200.0), engagement(0.4, 0.25), engagement(0.0, 200.0)
+    (1.0, 0.25, 0.0)
+    """
+    return min(1.0, from_strip_end / STRIP_EDGE) * min(1.0, from_wire_end / WIRE_EDGE)
+
+
+def application_point(force: FloatArray, point: FloatArray, strip: FloatArray) -> FloatArray:
+    """Return where the resultant of the vertical forces on one strip acts, shape (3,) [m].
+
+    Without force it is the place where the strip crosses a wire, or else the strip's middle.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_sections,)
+        Per wire, none negative [N].
+    point : ndarray, shape (n_sections, 3)
+        Points of contact [m]; NaN where strip and wire do not cross.
+    strip : ndarray, shape (2, 2, 3)
+        Ends A and B; position and velocity.
+
+    Examples
+    --------
+    >>> point = np.array([[10.0, 0.2, 5.1], [10.0, -0.1, 5.1]])
+    >>> application_point(np.array([100.0, 50.0]), point, np.zeros((2, 2, 3))).round(6).tolist()
+    [10.0, 0.1, 5.1]
+    """
+    total = float(force.sum())
+    if total > 0.0:
+        touched = force > 0.0
+        result: FloatArray = force[touched] @ point[touched] / total
+        return result
+    crossed = np.flatnonzero(~np.isnan(point[:, 0]))
+    if crossed.size:
+        found: FloatArray = point[crossed[0]]
+        return found
+    middle: FloatArray = strip[:, 0].mean(axis=0)
+    return middle

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.catenary.model import CatenaryModel, StripMotion
+from models.catenary.model import CatenaryModel, ContactResult, StripMotion
+from models.contact import application_point
 from models.pantograph.lumped import LumpedModel, LumpedState
 from models.pantograph.parameters import LumpedDefinition
 from models.part import FloatArray
@@ -27,9 +28,11 @@ class CoupledRecord:
     position : ndarray, shape (n, P)
         Of the strips along the track [m].
     contact_force : ndarray, shape (n, P)
-        [N].
+        Resultants [N].
     contact_point : ndarray, shape (n, P, 3)
-        [m]; NaN where strip and wire do not cross.
+        Where the resultants act [m]; without contact as `application_point` says; NaN at the start.
+    section_force : ndarray, shape (n, P, n_sections)
+        Per wire [N].
     strip_height : ndarray, shape (n, P)
         [m].
     uplift : ndarray, shape (n, n_supports)
@@ -42,6 +45,7 @@ class CoupledRecord:
     position: FloatArray
     contact_force: FloatArray
     contact_point: FloatArray
+    section_force: FloatArray
     strip_height: FloatArray
     uplift: FloatArray
     dropper_force: FloatArray
@@ -69,9 +73,10 @@ class CoupledModel:
 
         Returns
         -------
-        force : ndarray, shape (P,)
-            Contact forces at the end of the step [N].
+        force : ndarray, shape (P, n_sections)
+            Contact forces per wire at the end of the step [N].
         point : ndarray, shape (P, 3)
+            Where their resultants act [m].
         """
         loads = [p.load(end, np.zeros(2)) for p in self.pantographs]
         free = [
@@ -86,7 +91,7 @@ class CoupledModel:
         for i, (model, state) in enumerate(zip(self.pantographs, self.states, strict=True)):
             model.advance(state, step, free[i] - force[i] * model.compliance(step))
         self.time = end
-        return force, result.point[:, 0]
+        return result.force, _points(result, motion.strip)
 
     def run(
         self, stop: float, step: float, progress: Callable[[float], None] | None = None
@@ -97,7 +102,8 @@ class CoupledModel:
         for n in range(count + 1):
             if n:
                 force, point = self.step(step, n * step)
-                record.contact_force[n], record.contact_point[n] = force, point
+                record.section_force[n], record.contact_point[n] = force, point
+                record.contact_force[n] = force.sum(axis=1)
             record.strip_height[n] = [self._height(i) for i in range(len(self.states))]
             record.uplift[n] = self.line.uplift(self.line_state)
             record.dropper_force[n] = self.line.dropper_force(self.line_state)
@@ -127,7 +133,12 @@ class CoupledModel:
             position=position,
             contact_force=np.zeros((rows, P)),
             contact_point=np.full((rows, P, 3), np.nan),
+            section_force=np.zeros((rows, P, len(line.wires))),
             strip_height=np.zeros((rows, P)),
             uplift=np.zeros((rows, len(line.uplift_dofs))),
             dropper_force=np.zeros((rows, len(line.dropper_stiffness))),
         )
+
+
+def _points(result: ContactResult, strips: FloatArray) -> FloatArray:
+    return np.array([application_point(*each) for each in zip(result.force, result.point, strips, strict=True)])

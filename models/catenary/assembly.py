@@ -36,7 +36,7 @@ class BeamProperties:
 
 @dataclass(frozen=True)
 class Matrices:
-    """Matrices of the line's beams, droppers excluded, over all degrees of freedom (fixed ones too).
+    """Matrices of the line's beams and supports, droppers excluded, over all degrees of freedom (fixed ones too).
 
     Attributes
     ----------
@@ -55,7 +55,11 @@ class Matrices:
 def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamProperties:
     """Return the properties of every beam element by its component type."""
     table = np.array([_component(definition, name) for name in COMPONENTS])
-    return BeamProperties(*table[mesh.component].T.copy())
+    properties = BeamProperties(*table[mesh.component].T.copy())
+    if definition.stitch_wire is not None:
+        # Balance along the track at the clamps: what the stitch wire pulls, the messenger wire between them lacks.
+        properties.tension[mesh.beside_stitch] -= definition.stitch_wire.tension
+    return properties
 
 
 def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> Matrices:
@@ -80,7 +84,29 @@ def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatAr
     load = _gravity(M) + _tensioning(mesh, axes, properties.tension, size)
     load += _kinks(K_e, axes, dofs, properties.tension > 0.0, size)
     C = _assembled(C_e, dofs, size) + _dropper_mass_damping(definition, mesh, points)
-    return Matrices(_assembled(K_e, dofs, size), M, C, load)
+    support = definition.messenger_support
+    K = _assembled(K_e, dofs, size)
+    if support is not None:
+        load[mesh.sprung * NODE_DOFS + 2] += support.stiffness * (mesh.seat - points[mesh.sprung, 2])
+        K += support.stiffness * _on_supports(mesh, size)
+        C += support.damping * _on_supports(mesh, size)
+    return Matrices(K, M, C, load)
+
+
+def _on_supports(mesh: CatenaryMesh, size: int) -> sp.csc_matrix:
+    """Return 1 on the diagonal at the vertical displacements of the messenger wire's supports."""
+    dofs = mesh.sprung * NODE_DOFS + 2
+    return sp.csc_matrix((np.ones(len(dofs)), (dofs, dofs)), shape=(size, size))
+
+
+def axial_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
+    """Return the part of K that is the beams' stiffness along their axes, EA/l."""
+    start, end = mesh.beams.T
+    axes, length = frames(points[start], points[end])
+    EA = beam_properties(definition, mesh).EA
+    none = np.zeros_like(EA)
+    K_e = to_global(beam_stiffness(EA, none, none, length), axes)
+    return _assembled(K_e, element_dofs(mesh.beams), NODE_DOFS * len(points))
 
 
 def element_dofs(nodes: IntArray) -> IntArray:
@@ -113,6 +139,14 @@ def dropper_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points
     result = _stiffness(definition.dropper, length)
     if definition.hanger is not None:
         result[mesh.is_hanger] = _stiffness(definition.hanger, length)[mesh.is_hanger]
+    return result
+
+
+def compression_ratio(definition: CatenaryDefinition, mesh: CatenaryMesh) -> FloatArray:
+    """Return every dropper's stiffness in compression over that in tension, shape (n_droppers,)."""
+    result = np.full(len(mesh.droppers), definition.dropper.compression_ratio)
+    if definition.hanger is not None:
+        result[mesh.is_hanger] = definition.hanger.compression_ratio
     return result
 
 

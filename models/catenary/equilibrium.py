@@ -1,9 +1,9 @@
 """Static equilibrium and form finding.
 
-The wanted geometry is prescribed (the contact wire's height at every dropper, the auxiliary wire's at every
-hanger); the unknowns are the droppers' forces and with them their unstrained lengths. For given reference
-points this is one linear saddle-point system; the points are then moved to the solution and the system is
-solved again, until the deformed mesh is the wanted one.
+Either the wanted geometry is prescribed (the contact wire's height at every dropper, the auxiliary wire's at every
+hanger) and the droppers' lengths follow, or a dropper's unstrained length is given and the height follows. The
+unknowns are displacements and dropper forces. For given reference points this is one linear saddle-point system;
+the points are then moved to the solution and the system is solved again, until the deformed mesh is its reference.
 """
 
 from __future__ import annotations
@@ -17,10 +17,13 @@ from scipy.sparse.linalg import splu
 from models.catenary.assembly import (
     Matrices,
     assemble,
+    axial_stiffness,
+    compression_ratio,
     dropper_lengths,
     dropper_rows,
     dropper_stiffness,
 )
+from models.catenary.condensation import attachments
 from models.catenary.elements import NODE_DOFS
 from models.catenary.mesh import CatenaryMesh
 from models.catenary.parameters import GRAVITY, CatenaryDefinition
@@ -29,6 +32,8 @@ from models.part import FloatArray
 #: Form finding ends when no reference point moves by more than this [m].
 _TOLERANCE = 1e-9
 _MAX_ITERATIONS = 30
+#: Given lengths: droppers are let slack only once the first guess of the shape, far from equilibrium, is left behind.
+_TAUT_ITERATIONS = 3
 #: First guess of the droppers' forces [N]; only the path to the solution depends on it.
 _FIRST_FORCE = 80.0
 
@@ -49,6 +54,8 @@ class StaticState:
         Static displacement from the reference: axial stretch, rotations of the wires [m, rad].
     dropper_force, dropper_length, unstrained_length : ndarray, shape (n_droppers,)
         Tension [N], length under tension and without it [m].
+    elastic_force : ndarray, shape (n_droppers,)
+        Stiffness times stretch [N]: the tension, but negative where a given length leaves the dropper slack.
     matrices : Matrices
         About ``points``.
     residual : float
@@ -60,6 +67,7 @@ class StaticState:
     dropper_force: FloatArray
     dropper_length: FloatArray
     unstrained_length: FloatArray
+    elastic_force: FloatArray
     matrices: Matrices
     residual: float
 
@@ -70,7 +78,7 @@ class StaticState:
 
 
 def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState:
-    """Find the dropper lengths that give the wanted contact-wire profile.
+    """Find the dropper lengths that give the wanted contact-wire profile, or the profile that given lengths give.
 
     Returns
     -------
@@ -79,19 +87,32 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
     Raises
     ------
     EquilibriumError
-        If a dropper would have to push, or the iteration does not settle.
+        If a dropper would have to push to give the wanted profile, or the iteration does not settle.
     """
     points = mesh.points.copy()
     movable = _movable(mesh)
+    unstretched = np.zeros(mesh.fixed.shape)
+    unstretched[:, :3] = movable
     force = np.full(len(mesh.droppers), _FIRST_FORCE)
-    for _ in range(_MAX_ITERATIONS):
+    slack = np.zeros(len(mesh.droppers), dtype=bool)
+    for iteration in range(_MAX_ITERATIONS):
         matrices = assemble(definition, mesh, points)
-        displacement, force = _solve(mesh, points, matrices, force)
+        # Moving a reference point re-defines a wire's length, so it does not stretch the wire.
+        stretch = axial_stiffness(definition, mesh, points) @ sp.diags(unstretched.ravel())
+        K = matrices.K - stretch + _swing(mesh, points, force)
+        conditions = _conditions(definition, mesh, points, slack)
+        displacement, force = _solve(mesh, points, K, matrices.load, conditions)
         move = np.where(movable, displacement.reshape(-1, NODE_DOFS)[:, :3], 0.0)
-        if np.abs(move).max() < _TOLERANCE:
-            return _static_state(definition, mesh, points, matrices, displacement, force)
+        now_slack = _slack(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
+        if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
+            # Without the guides of the iteration: what is left of them is below its tolerance, now it is gone.
+            displacement, force = _solve(mesh, points, matrices.K, matrices.load, conditions)
+            return _static_state(definition, mesh, points, matrices, displacement, force, slack)
+        _straighten(mesh, points, move)
         points = points + move
         _carry_arms(mesh, points, move)
+        if iteration >= _TAUT_ITERATIONS:
+            slack = now_slack
     raise EquilibriumError(
         f"form finding of line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
         f"a point still moves by {np.abs(move).max():.2g} m"
@@ -101,13 +122,23 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
 def _movable(mesh: CatenaryMesh) -> np.ndarray:
     """Return which coordinates of the reference form finding may move.
 
-    Not x (the wires' stretch stays a displacement), and not the lateral position of registered nodes, whose
-    displacement is what loads the steady arm.
+    Not x (the wires' stretch stays a displacement); not the lateral position of registered nodes, whose
+    displacement is what loads the steady arm; and not that of nodes between two attachments, which follow these on
+    a straight line.
     """
     movable = ~mesh.fixed[:, :3]
     movable[:, 0] = False
     movable[mesh.arms[:, 1], 1] = False
+    movable[~attachments(mesh), 1] = False
     return movable
+
+
+def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
+    """Move the inner nodes of every interval so that the reference stays straight in plan between attachments."""
+    held = attachments(mesh)
+    for chain in mesh.chains:
+        fixed, x = held[chain.nodes], points[chain.nodes, 0]
+        move[chain.nodes, 1] = np.interp(x, x[fixed], move[chain.nodes[fixed], 1])
 
 
 def _carry_arms(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
@@ -115,22 +146,62 @@ def _carry_arms(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> Non
     points[mesh.arms[:, 0], 2] += move[mesh.arms[:, 1], 2]
 
 
+@dataclass(frozen=True)
+class _Conditions:
+    """What holds at every dropper: rows @ d - flexibility * N = right.
+
+    Attributes
+    ----------
+    rows : sparse, shape (n_droppers, 6 n)
+    flexibility, right : ndarray, shape (n_droppers,)
+    """
+
+    rows: sp.csr_matrix
+    flexibility: FloatArray
+    right: FloatArray
+
+
+def _conditions(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, slack: np.ndarray
+) -> _Conditions:
+    """Return the droppers' conditions: wanted height of the lower end, or elongation of a given length by the force."""
+    lower = mesh.droppers[:, 0]
+    n = len(lower)
+    heights = sp.csr_matrix((np.ones(n), (np.arange(n), lower * NODE_DOFS + 2)), shape=(n, mesh.fixed.size))
+    given = ~np.isnan(mesh.given_length)
+    stiffness = dropper_stiffness(definition, mesh, points)
+    stiffness[slack] *= compression_ratio(definition, mesh)[slack]
+    limp = given & (stiffness == 0.0)
+    stiffness[limp] = 1.0  # N / 1 = 0
+    rows = sp.diags(np.where(given, 0.0, 1.0)) @ heights
+    rows = rows + sp.diags(np.where(given & ~limp, 1.0, 0.0)) @ dropper_rows(mesh, points)
+    too_short = np.where(limp, 0.0, np.nan_to_num(mesh.given_length) - dropper_lengths(mesh, points))
+    return _Conditions(
+        rows.tocsr(),
+        np.where(given, 1.0 / stiffness, 0.0),
+        np.where(given, too_short, mesh.target - points[lower, 2]),
+    )
+
+
+def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
+    """Return which droppers of given length are longer than the distance that they span."""
+    with np.errstate(invalid="ignore"):
+        result: np.ndarray = dropper_lengths(mesh, positions) < mesh.given_length
+    return result
+
+
 def _solve(
-    mesh: CatenaryMesh, points: FloatArray, matrices: Matrices, force: FloatArray
+    mesh: CatenaryMesh, points: FloatArray, K: sp.csc_matrix, load: FloatArray, conditions: _Conditions
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve [[K, B^T], [S, 0]] [d; N] = [load; wanted - actual height of the droppers' lower ends]."""
+    """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], R, D and right of the droppers' conditions."""
     free = np.flatnonzero(~mesh.fixed.ravel())
     B = dropper_rows(mesh, points)[:, free]
-    lower_z = mesh.droppers[:, 0] * NODE_DOFS + 2
-    n = len(lower_z)
-    S = sp.csr_matrix((np.ones(n), (np.arange(n), lower_z)), shape=(n, matrices.load.size))[:, free]
-    K = (matrices.K + _swing(mesh, points, force))[free][:, free]
-    # Scaled so that the rows of the constraints compare with those of the stiffness.
+    # Scaled so that the rows of the conditions compare with those of the stiffness.
     scale = 1e4
-    system = sp.bmat([[K, scale * B.T], [scale * S, None]], format="csc")
-    height = mesh.target - points[mesh.droppers[:, 0], 2]
-    solution = splu(system).solve(np.concatenate([matrices.load[free], scale * height]))
-    displacement = np.zeros(matrices.load.size)
+    D = sp.diags(-(scale**2) * conditions.flexibility)
+    system = sp.bmat([[K[free][:, free], scale * B.T], [scale * conditions.rows[:, free], D]], format="csc")
+    solution = splu(system).solve(np.concatenate([load[free], scale * conditions.right]))
+    displacement = np.zeros(load.size)
     displacement[free] = solution[: len(free)]
     return displacement, solution[len(free) :] * scale
 
@@ -156,15 +227,22 @@ def _static_state(
     matrices: Matrices,
     displacement: FloatArray,
     force: FloatArray,
+    slack: np.ndarray,
 ) -> StaticState:
     _check_tension(definition, mesh, points, force)
     length = dropper_lengths(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
+    stiffness = dropper_stiffness(definition, mesh, points)
+    given = ~np.isnan(mesh.given_length)
+    unstrained = np.where(given, mesh.given_length, length - force / stiffness)
+    elastic = np.where(slack, stiffness * (length - unstrained), force)
+    force = np.where(slack, compression_ratio(definition, mesh) * elastic, force)
     return StaticState(
         points=points,
         displacement=displacement,
         dropper_force=force,
         dropper_length=length,
-        unstrained_length=length - force / dropper_stiffness(definition, mesh, points),
+        unstrained_length=unstrained,
+        elastic_force=elastic,
         matrices=matrices,
         residual=_residual(mesh, points, matrices, displacement, force),
     )
@@ -178,7 +256,7 @@ def weight(matrices: Matrices) -> float:
 
 
 def _check_tension(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> None:
-    slack = np.flatnonzero(force <= 0.0)
+    slack = np.flatnonzero((force <= 0.0) & np.isnan(mesh.given_length))
     if slack.size:
         x = points[mesh.droppers[slack, 0], 0]
         listed = ", ".join(f"{a:.2f} m ({f:.1f} N)" for a, f in list(zip(x, force[slack], strict=True))[:8])

@@ -47,6 +47,8 @@ class OpenContact:
         At the end of the step without contact force [m, m/s].
     impact_velocity : float
         delta'(-) of a contact that is closed already; 0 otherwise.
+    engagement : float
+        Share of the contact law that acts; less than 1 near the ends of strip and wire.
     load : ndarray, shape (m,)
         What a unit contact force does at the element's degrees of freedom ``dofs``.
     weights : ndarray, shape (4,)
@@ -60,6 +62,7 @@ class OpenContact:
     penetration: float
     velocity: float
     impact_velocity: float
+    engagement: float
     dofs: IntArray
     load: FloatArray
     weights: FloatArray
@@ -102,8 +105,8 @@ class LocalProblem:
     ----------
     measure : ndarray, shape (n_droppers,)
         Dropper force per elongation [N/m].
-    unilateral : float
-        1 - r, with r the droppers' stiffness ratio in compression.
+    unilateral : ndarray, shape (n_droppers,)
+        1 - r, with r a dropper's stiffness ratio in compression.
     dropper_columns : sequence of Columns
         Response of the line to a unit force in each dropper.
     velocity_factor : float
@@ -111,7 +114,7 @@ class LocalProblem:
     """
 
     measure: FloatArray
-    unilateral: float
+    unilateral: FloatArray
     dropper_columns: Sequence[Columns]
     velocity_factor: float
     law: ContactLaw
@@ -143,6 +146,10 @@ class LocalProblem:
         """
         if not contacts and not slack.size and free_force.min(initial=0.0) >= 0.0:
             return _nothing(free_force)
+        if len(contacts) == 1 and not slack.size:
+            found = self._single_contact(free_force, contacts[0], float(strip_compliance[0, 0]))
+            if found is not None:
+                return found
         coupling = _Coupling(self, contacts, strip_compliance)
         forces = np.array([_estimate(self, c) for c in contacts])
         compensation = np.zeros(slack.size)
@@ -165,6 +172,39 @@ class LocalProblem:
         raise LocalSolutionError(
             f"slack and contact forces have not settled after {_MAX_ITERATIONS} iterations "
             f"({slack.size} slack droppers, {len(contacts)} contacts); use a smaller time step"
+        )
+
+
+    def law_of(self, contact: OpenContact, penetration: float, velocity: float) -> NormalForce:
+        """Return the contact law of one contact; its first closed instant is its impact."""
+        impact = contact.impact_velocity or max(velocity, 0.0)
+        return self.law(penetration, velocity, impact, self.parameters).scaled(contact.engagement)
+
+    def _single_contact(
+        self, free_force: FloatArray, contact: OpenContact, strip_compliance: float
+    ) -> LocalForces | None:
+        """Return the solution for one contact if it leaves no dropper slack, which is what most steps are."""
+        columns, weights, slope_of_velocity = contact.columns, contact.weights, self.velocity_factor
+        compliance = strip_compliance + float(contact.load @ (columns.at(contact.dofs) @ weights))
+        force = 0.0
+        for _ in range(_MAX_ITERATIONS):
+            penetration = contact.penetration - compliance * force
+            velocity = contact.velocity - slope_of_velocity * compliance * force
+            law = self.law_of(contact, penetration, velocity)
+            slope = compliance * (law.by_penetration + slope_of_velocity * law.by_velocity)
+            before, force = force, (law.force + slope * force) / (1.0 + slope)
+            if abs(force - before) <= _TOLERANCE * (1.0 + force):
+                break
+        else:
+            return None
+        elastic = free_force.copy()
+        near = columns.dropper_index
+        elastic[near] += self.measure[near] * (columns.dropper_stretch @ (force * weights))
+        if elastic.min(initial=0.0) < 0.0:
+            return None
+        none = np.zeros(0, dtype=np.int64)
+        return LocalForces(
+            np.array([force]), np.array([velocity]), np.array([penetration > 0.0]), none, np.zeros(0), elastic
         )
 
 
@@ -199,7 +239,9 @@ class _Coupling:
                 result[i, k] = contact.load @ self.problem.dropper_columns[j].at(contact.dofs)[:, 0]
         return result
 
-    def penetration(self, forces: FloatArray, slack: IntArray, compensation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def penetration(
+        self, forces: FloatArray, slack: IntArray, compensation: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return penetrations and their velocities under given forces."""
         change = -self.contact_contact @ forces
         if slack.size and len(self.contacts):
@@ -221,7 +263,7 @@ class _Coupling:
         """Return the contact law and its slopes at the present penetrations."""
         penetration, velocity = self.penetration(forces, slack, compensation)
         return [
-            self.problem.law(float(d), float(v), c.impact_velocity or max(float(v), 0.0), self.problem.parameters)
+            self.problem.law_of(c, float(d), float(v))
             for d, v, c in zip(penetration, velocity, self.contacts, strict=True)
         ]
 
@@ -249,9 +291,9 @@ class _Coupling:
             value = np.array([a.force for a in laws])
             right[:n] = value - slope * (by_contact @ forces + by_slack @ compensation)
         if m:
-            share = self.problem.unilateral
-            system[n:, :n] += share * self.dropper_contact[slack]
-            system[n:, n:] -= share * self.dropper_dropper(slack, slack)
+            share = self.problem.unilateral[slack]
+            system[n:, :n] += share[:, None] * self.dropper_contact[slack]
+            system[n:, n:] -= share[:, None] * self.dropper_dropper(slack, slack)
             right[n:] = -share * free[slack]
         solution = np.asarray(np.linalg.solve(system, right) if n + m else right, dtype=np.float64)
         return solution[:n], solution[n:]
@@ -259,8 +301,7 @@ class _Coupling:
 
 def _estimate(problem: LocalProblem, contact: OpenContact) -> float:
     """Return a first guess of a contact force: the law's secant over the free penetration."""
-    impact = contact.impact_velocity or max(contact.velocity, 0.0)
-    law = problem.law(contact.penetration, contact.velocity, impact, problem.parameters)
+    law = problem.law_of(contact, contact.penetration, contact.velocity)
     local = float(contact.load @ contact.columns.at(contact.dofs) @ contact.weights)
     return law.force / (1.0 + law.by_penetration * local)
 

@@ -1,6 +1,7 @@
 """Mesh of a line: definition -> points, wires as chains of nodes, droppers, steady arms, fixed degrees of freedom.
 
-Nodes are numbered along the track, all wires interleaved, which keeps every matrix banded.
+Nodes are numbered section by section and within a section along the track, its wires interleaved, which keeps every
+matrix banded: sections do not act on each other, so their matrices are blocks on the diagonal.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ class CatenaryMesh:
         Nodes of the beam elements: wires, then steady arms.
     component : ndarray, shape (n_beams,)
         Index into ``COMPONENTS``.
+    beside_stitch : ndarray, shape (n_beams,)
+        True for the messenger wire between the clamps of a stitch wire, which takes over a part of its tension.
     chains : tuple of Chain
         Every wire.
     droppers : ndarray, shape (n_droppers, 2)
@@ -49,30 +52,40 @@ class CatenaryMesh:
         True between auxiliary and messenger wire of a compound line.
     target : ndarray, shape (n_droppers,)
         Wanted static height of the lower node [m].
+    given_length : ndarray, shape (n_droppers,)
+        Unstrained length where it is given instead of the height, NaN elsewhere [m].
     fixed : ndarray, shape (n, 6)
         Degrees of freedom held at zero.
     sprung : ndarray, shape (n_supports,)
-        Nodes of the messenger wire on supports that may be elastic.
+        Nodes of the messenger wire on supports, elastic ones if the line has a ``MessengerSupport``.
+    seat : ndarray, shape (n_supports,)
+        Height of the supports' seats, where an elastic one is unloaded [m].
     clamp_mass : ndarray, shape (n,)
         Lumped mass [kg].
     support_nodes : ndarray, shape (n_supports,)
         Contact-wire node at every support between the anchors.
     arms : ndarray, shape (n_arms, 2)
         Registration node and contact-wire node of the steady arms.
+    section : ndarray, shape (n,)
+        Section of every node, from 0.
     """
 
     points: FloatArray
     beams: IntArray
     component: IntArray
+    beside_stitch: BoolArray
     chains: tuple[Chain, ...]
     droppers: IntArray
     is_hanger: BoolArray
     target: FloatArray
+    given_length: FloatArray
     fixed: BoolArray
     sprung: IntArray
+    seat: FloatArray
     clamp_mass: FloatArray
     support_nodes: IntArray
     arms: IntArray
+    section: IntArray
 
     def contact_chains(self) -> tuple[Chain, ...]:
         """Return the contact wire of every section."""
@@ -92,19 +105,25 @@ class _Draft:
     droppers: list[tuple[int, int]] = field(default_factory=list)
     is_hanger: list[bool] = field(default_factory=list)
     target: list[float] = field(default_factory=list)
+    given_length: list[float] = field(default_factory=list)
+    beside_stitch: list[bool] = field(default_factory=list)
     sprung: list[int] = field(default_factory=list)
     supports: list[int] = field(default_factory=list)
     arms: list[tuple[int, int]] = field(default_factory=list)
+    section: list[int] = field(default_factory=list)
+    current: int = 0
 
     def node(self, x: float, y: float, z: float, held: str = "") -> int:
         self.points.append((x, y, z))
         self.fixed.append(tuple(name in held.split() for name in ("x", "y", "z", "rx", "ry", "rz")))
         self.mass.append(0.0)
+        self.section.append(self.current)
         return len(self.points) - 1
 
     def beam(self, i: int, j: int, component: str) -> None:
         self.beams.append((i, j))
         self.component.append(COMPONENTS.index(component))
+        self.beside_stitch.append(False)
 
     def hold(self, node: int, names: str) -> None:
         held = names.split()
@@ -119,9 +138,11 @@ class _Wire:
         self.draft, self.component, self.section = draft, component, section
         self.x: list[float] = []
         self.nodes: list[int] = []
+        self.beams: list[int] = []
 
     def append(self, x: float, node: int) -> None:
         if self.nodes:
+            self.beams.append(len(self.draft.beams))
             self.draft.beam(self.nodes[-1], node, self.component)
         self.x.append(x)
         self.nodes.append(node)
@@ -140,6 +161,7 @@ def build_mesh(definition: CatenaryDefinition) -> CatenaryMesh:
     """Return the mesh of a line, contact wire at its wanted profile, other wires at a first guess."""
     draft = _Draft()
     for index, section in enumerate(definition.sections):
+        draft.current = index
         _SectionMesher(definition, section, index, draft).build()
     return _numbered(draft)
 
@@ -179,6 +201,8 @@ class _SectionMesher:
         self.supports = [s.x for s in section.supports]
         self.droppers = [x for span in section.spans for x in span.droppers]
         self.hangers = [x for span in section.spans for x in span.hangers]
+        self.lengths = _given_lengths((s.droppers, s.dropper_lengths) for s in section.spans)
+        self.hanger_lengths = _given_lengths((s.hangers, s.hanger_lengths) for s in section.spans)
 
     def build(self) -> None:
         contact = self._wire("contact_wire", [*self.supports, *self.droppers], self._contact_height)
@@ -189,7 +213,7 @@ class _SectionMesher:
         messenger = self._wire("messenger_wire", [*self.supports, *on_messenger, *ends], self._messenger_height)
         self._supports(contact, messenger)
         self._arms(contact)
-        upper = {x: messenger for x in on_messenger}
+        upper = dict.fromkeys(on_messenger, messenger)
         if self.definition.auxiliary_wire is not None:
             auxiliary = self._auxiliary()
             self._hang(auxiliary, dict.fromkeys(self.hangers, messenger), hanger=True)
@@ -235,8 +259,9 @@ class _SectionMesher:
         return wire
 
     def _supports(self, contact: _Wire, messenger: _Wire) -> None:
+        held = "y z" if self.definition.messenger_support is None else "y"
         for x in self.supports[1:-1]:
-            self.draft.hold(messenger.at(x), "y z")
+            self.draft.hold(messenger.at(x), held)
             self.draft.sprung.append(messenger.at(x))
             self.draft.supports.append(contact.at(x))
 
@@ -280,19 +305,33 @@ class _SectionMesher:
             wire.close()
             for x in (start, end):
                 self.draft.mass[messenger.at(x)] += self.definition.clamps.stitch_wire
+            self._relieve(messenger, start, end)
             result.append((wire, hung))
         return result
 
+    def _relieve(self, messenger: _Wire, start: float, end: float) -> None:
+        """Mark the messenger wire between the clamps of a stitch wire."""
+        inside = (bisect_right(messenger.x, x + _SAME) - 1 for x in (start, end))
+        for k in range(*inside):
+            self.draft.beside_stitch[messenger.beams[k]] = True
+
     def _hang(self, lower: _Wire, upper: dict[float, _Wire], *, hanger: bool) -> None:
         height = self._auxiliary_height if hanger else self._contact_height
+        lengths = self.hanger_lengths if hanger else self.lengths
         clamps = self.definition.clamps
         for x in sorted(upper):
             low, up = lower.at(x), upper[x].at(x)
             self.draft.droppers.append((low, up))
             self.draft.is_hanger.append(hanger)
             self.draft.target.append(height(x))
+            self.draft.given_length.append(lengths.get(x, math.nan))
             self.draft.mass[low] += clamps.dropper_lower
             self.draft.mass[up] += clamps.dropper_upper
+
+
+def _given_lengths(spans: Iterable[tuple[tuple[float, ...], tuple[float, ...]]]) -> dict[float, float]:
+    """Return position -> given length of the droppers that have one."""
+    return {x: length for positions, lengths in spans for x, length in zip(positions, lengths, strict=False)}
 
 
 def _inside(x: float, intervals: Sequence[tuple[float, float]]) -> bool:
@@ -309,20 +348,24 @@ def _subdivide(breaks: Iterable[float], elements: int) -> list[float]:
 
 def _numbered(draft: _Draft) -> CatenaryMesh:
     points = np.array(draft.points)
-    order = np.argsort(points[:, 0], kind="stable")
+    order = np.lexsort((points[:, 0], np.array(draft.section)))  # stable, by section and then along the track
     new = np.empty_like(order)
     new[order] = np.arange(len(order))
     return CatenaryMesh(
         points=points[order],
         beams=new[np.array(draft.beams)],
         component=np.array(draft.component),
+        beside_stitch=np.array(draft.beside_stitch, dtype=bool),
         chains=tuple(Chain(c, s, new[np.array(nodes)]) for c, s, nodes in draft.chains),
         droppers=new[np.array(draft.droppers, dtype=np.int64).reshape(-1, 2)],
         is_hanger=np.array(draft.is_hanger, dtype=bool),
         target=np.array(draft.target),
+        given_length=np.array(draft.given_length),
         fixed=np.array(draft.fixed)[order],
         sprung=new[np.array(draft.sprung, dtype=np.int64)],
+        seat=points[np.array(draft.sprung, dtype=np.int64), 2],
         clamp_mass=np.array(draft.mass)[order],
         support_nodes=new[np.array(draft.supports, dtype=np.int64)],
         arms=new[np.array(draft.arms, dtype=np.int64).reshape(-1, 2)],
+        section=np.array(draft.section, dtype=np.int64)[order],
     )

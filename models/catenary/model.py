@@ -8,8 +8,16 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.assembly import dropper_rows, dropper_stiffness
+from models.catenary.assembly import compression_ratio, dropper_rows, dropper_stiffness
 from models.catenary.compliance import Columns, EffectiveStiffness
+from models.catenary.condensation import (
+    Blocks,
+    attachments,
+    order_by_blocks,
+    plan_angles,
+    plan_rotation,
+    without_rounding,
+)
 from models.catenary.contact_wire import ContactWire, Crossing
 from models.catenary.elements import NODE_DOFS
 from models.catenary.equilibrium import StaticState, find_form
@@ -32,8 +40,10 @@ class CatenaryState:
 
     Attributes
     ----------
-    displacement, velocity, acceleration : ndarray, shape (n_free,)
-        From the static shape [m, m/s, m/s2].
+    motion : ndarray, shape (2, n_free)
+        Displacement from the static shape [m] and velocity [m/s].
+    load : ndarray, shape (n_free,)
+        Forces of the contacts and of what slack droppers lack [N].
     slack : ndarray of int
         Slack droppers.
     compensation : ndarray
@@ -44,13 +54,22 @@ class CatenaryState:
         Velocity at impact of the closed contacts [m/s], 0 where open.
     """
 
-    displacement: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
+    motion: FloatArray
+    load: FloatArray
     slack: IntArray
     compensation: FloatArray
     element: IntArray
     impact_velocity: FloatArray
+
+    @property
+    def displacement(self) -> FloatArray:
+        """Return the displacement, a view of ``motion``, shape (n_free,)."""
+        return self.motion[0]
+
+    @property
+    def velocity(self) -> FloatArray:
+        """Return the velocity, a view of ``motion``, shape (n_free,)."""
+        return self.motion[1]
 
     def snapshot(self) -> Snapshot:
         """Return copies of all arrays."""
@@ -96,21 +115,19 @@ class StripMotion:
 
 @dataclass(frozen=True)
 class _Stepper:
-    """What belongs to one step size."""
+    """What belongs to one step size.
+
+    Attributes
+    ----------
+    product : sparse, shape (n_free, 2 n_free)
+        [-2 K, a2 M], what displacement and velocity contribute to the next increment.
+    """
 
     newmark: Newmark
+    product: sp.csr_matrix
     stiffness: EffectiveStiffness
     local: LocalProblem
     contact_columns: dict[tuple[int, int], Columns] = field(default_factory=dict)
-
-
-@dataclass
-class _Work:
-    """Preallocated arrays of the step."""
-
-    inertia: FloatArray
-    damping: FloatArray
-    new: FloatArray
 
 
 class CatenaryModel:
@@ -130,32 +147,36 @@ class CatenaryModel:
         self.definition = definition
         self.mesh: CatenaryMesh = build_mesh(definition)
         self.static: StaticState = find_form(definition, self.mesh)
-        fixed = self.mesh.fixed.copy()
-        if definition.messenger_support is not None:
-            fixed[self.mesh.sprung, 2] = False
-        self.free = np.flatnonzero(~fixed.ravel())
-        self.free_index = np.full(fixed.size, -1)
+        self._angles = plan_angles(self.mesh, self.static.points)
+        self._rotation = plan_rotation(self._angles)
+        self.free, self._blocks = self._numbering()
+        self.free_index = np.full(self.mesh.fixed.size, -1)
         self.free_index[self.free] = np.arange(len(self.free))
+        # Droppers hang on attachments, where nodal axes are the global ones.
         self.B = dropper_rows(self.mesh, self.static.positions)[:, self.free]
         self.dropper_stiffness = dropper_stiffness(definition, self.mesh, self.static.positions)
+        #: What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
+        self.rest_compensation = self.static.dropper_force - self.static.elastic_force
+        self._rest_load = self.B.T @ self.rest_compensation
+        self.unilateral = 1.0 - compression_ratio(definition, self.mesh)
+        self._stretch = self.B.T.tocsc()
         self.K, self.M, self.C = self._matrices()
         self.wires = tuple(
-            ContactWire(chain, self.static, self.free_index) for chain in self.mesh.contact_chains()
+            ContactWire(chain, self.static, self.free_index, self._angles) for chain in self.mesh.contact_chains()
         )
         self.uplift_dofs = self.free_index[self.mesh.support_nodes * NODE_DOFS + 2]
         self._steppers: dict[float, _Stepper] = {}
         n = len(self.free)
-        self._work = _Work(np.empty(n), np.empty(n), np.empty(n))
+        self._work = np.empty(n)
 
     def initial_state(self, pantographs: int = 1) -> CatenaryState:
         """Return the line at rest in its static shape."""
         n, sections = len(self.free), len(self.wires)
         return CatenaryState(
-            displacement=np.zeros(n),
-            velocity=np.zeros(n),
-            acceleration=np.zeros(n),
-            slack=np.zeros(0, dtype=np.int64),
-            compensation=np.zeros(0),
+            motion=np.zeros((2, n)),
+            load=np.zeros(n),
+            slack=np.flatnonzero(self.rest_compensation),
+            compensation=self.rest_compensation[self.rest_compensation > 0.0],
             element=np.full((pantographs, sections), -1),
             impact_velocity=np.zeros((pantographs, sections)),
         )
@@ -182,10 +203,11 @@ class CatenaryModel:
             If slack and contact forces are not found.
         """
         stepper = self._stepper(step)
-        new = self._free_response(stepper, state)
+        new = self._free_response(stepper, state)  # an increment until here, a displacement from here
+        new += state.displacement
         contacts, crossings = self._open_contacts(stepper, state, motion, new)
         compliance = self._strip_compliance(contacts, motion)
-        free_force = self.static.dropper_force + self.dropper_stiffness * (self.B @ new)
+        free_force = self.static.elastic_force + self.dropper_stiffness * (self.B @ new)
         forces = stepper.local.solve(free_force, contacts, compliance, state.slack)
         _superpose(new, contacts, forces, stepper.local.dropper_columns)
         self._advance(stepper.newmark, state, new)
@@ -205,16 +227,19 @@ class CatenaryModel:
                 if found is None:
                     continue
                 state.element[p, s] = found.element
-                penetration, velocity = self._penetration(wire, found, strip, state.displacement, state.velocity)
+                dofs = wire.elements[found.element].dofs
+                penetration, velocity = self._penetration(
+                    wire, found, strip, state.displacement[dofs], state.velocity[dofs]
+                )
                 impact = max(velocity, 0.0)
                 law = CONTACT_LAWS["continuous"](penetration, velocity, impact, self.definition.contact)
-                result.force[p, s] = law.force
+                result.force[p, s] = law.scaled(found.engagement).force
                 result.point[p, s] = self._point(wire, found, state.displacement)
         return result
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
         """Return the force that every dropper carries [N], shape (n_droppers,): 0 where slack."""
-        force = self.static.dropper_force + self.dropper_stiffness * (self.B @ state.displacement)
+        force = self.static.elastic_force + self.dropper_stiffness * (self.B @ state.displacement)
         force[state.slack] += state.compensation
         return force
 
@@ -227,22 +252,28 @@ class CatenaryModel:
         d, v = state.displacement, state.velocity
         return float(0.5 * (v @ (self.M @ v) + d @ (self.K @ d)))
 
-    def _matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
-        matrices, free = self.static.matrices, self.free
-        K, M, C = (matrix[free][:, free] for matrix in (matrices.K, matrices.M, matrices.C))
-        droppers = self.B.T @ sp.diags(self.dropper_stiffness) @ self.B
-        support_K, support_C = self._elastic_supports()
-        K = K + droppers + support_K
-        C = C + self.definition.damping.of("dropper").alpha * droppers + support_C
-        return K.tocsr(), M.tocsr(), C.tocsr()
+    def _rotated(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+        """Return K, M and C of beams and supports in nodal axes, over all degrees of freedom."""
+        matrices, Q = self.static.matrices, self._rotation
+        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (matrices.K, matrices.M, matrices.C))
+        stiff, heavy = np.sqrt(K.diagonal()), np.sqrt(M.diagonal())
+        damped = np.sqrt(np.maximum(C.diagonal(), 0.0))
+        return without_rounding(K, stiff), without_rounding(M, heavy), without_rounding(C, damped)
 
-    def _elastic_supports(self) -> tuple[sp.spmatrix, sp.spmatrix]:
-        diagonal = np.zeros(len(self.free))
-        support = self.definition.messenger_support
-        if support is None:
-            return sp.diags(diagonal), sp.diags(diagonal)
-        diagonal[self.free_index[self.mesh.sprung * NODE_DOFS + 2]] = 1.0
-        return sp.diags(support.stiffness * diagonal), sp.diags(support.damping * diagonal)
+    def _numbering(self) -> tuple[IntArray, Blocks]:
+        """Return the free degrees of freedom, those inside the intervals first, block by block."""
+        free = np.flatnonzero(~self.mesh.fixed.ravel())
+        inner = np.repeat(~attachments(self.mesh), NODE_DOFS)[free]
+        K, M, _ = self._rotated()
+        order, blocks = order_by_blocks((abs(K) + abs(M))[free][:, free], inner)
+        return free[order], blocks
+
+    def _matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+        K, M, C = (matrix[self.free][:, self.free] for matrix in self._rotated())
+        droppers = self.B.T @ sp.diags(self.dropper_stiffness) @ self.B
+        K = K + droppers
+        C = C + self.definition.damping.of("dropper").alpha * droppers
+        return K.tocsr(), M.tocsr(), C.tocsr()
 
     def _stepper(self, step: float) -> _Stepper:
         found = self._steppers.get(step)
@@ -255,36 +286,37 @@ class CatenaryModel:
 
     def _new_stepper(self, step: float) -> _Stepper:
         newmark = Newmark(step)
-        K_hat = (self.K + newmark.a0 * self.M + newmark.a1 * self.C).tocsc()
-        stiffness = EffectiveStiffness(K_hat, self.B)
+        K_hat = (self.K + newmark.a0 * self.M + newmark.a1 * self.C).tocsr()
+        stiffness = EffectiveStiffness(K_hat, self.B, self._blocks)
         local = LocalProblem(
             measure=self.dropper_stiffness,
-            unilateral=1.0 - self.definition.dropper.compression_ratio,
+            unilateral=self.unilateral,
             dropper_columns=stiffness.dropper_columns,
             velocity_factor=newmark.a1,
             law=CONTACT_LAWS["continuous"],
             parameters=self.definition.contact,
         )
-        return _Stepper(newmark, stiffness, local)
+        product = sp.hstack([-2.0 * self.K, newmark.a2 * self.M], format="csr")
+        return _Stepper(newmark, product, stiffness, local)
 
     def _free_response(self, stepper: _Stepper, state: CatenaryState) -> FloatArray:
-        """Solve K_hat d = M (a0 d + a2 v + a3 a) + C (a1 d + a4 v + a5 a) [2.27]."""
-        n, work = stepper.newmark, self._work
-        d, v, a = state.displacement, state.velocity, state.acceleration
-        np.multiply(d, n.a0, out=work.inertia)
-        work.inertia += n.a2 * v
-        work.inertia += n.a3 * a
-        np.multiply(d, n.a1, out=work.damping)
-        work.damping += n.a4 * v
-        if n.a5 != 0.0:
-            work.damping += n.a5 * a
-        return stepper.stiffness.solve(self.M @ work.inertia + self.C @ work.damping)
+        """Return the increment of displacement without forces of contacts and slack droppers at the step's end.
+
+        The trapezoidal rule in increments: with a0 ... a5 of [2.28], M a_n = f_n - C v_n - K d_n and
+        gamma = 1/2, beta = 1/4, the step [2.25-2.27] is K_hat (d_n+1 - d_n) = f_n + f_n+1 - 2 K d_n + a2 M v_n: the
+        damping matrix drops out of the right-hand side, and accelerations are not needed.
+
+        What a dropper that is slack at rest lacks is part of the static state, so it is added here once.
+        """
+        right = stepper.product @ state.motion.ravel()
+        right += state.load
+        right += self._rest_load
+        return stepper.stiffness.solve(right)
 
     def _open_contacts(
         self, stepper: _Stepper, state: CatenaryState, motion: StripMotion, new: FloatArray
     ) -> tuple[list[OpenContact], list[tuple[int, int, Crossing | None]]]:
         contacts, crossings = [], []
-        velocity = None
         for p, strip in enumerate(motion.strip):
             for s, wire in enumerate(self.wires):
                 found = wire.find(strip, new, int(state.element[p, s]))
@@ -292,37 +324,25 @@ class CatenaryModel:
                 if found is None:
                     continue
                 state.element[p, s] = found.element
-                if velocity is None:
-                    velocity = self._velocity_of(stepper.newmark, state, new)
-                delta, delta_dot = self._penetration(wire, found, strip, new, velocity)
-                if delta > 0.0 or self._may_close(state, p, s):
+                dofs = wire.elements[found.element].dofs
+                velocity = stepper.newmark.a1 * (new[dofs] - state.displacement[dofs]) - state.velocity[dofs]
+                delta, delta_dot = self._penetration(wire, found, strip, new[dofs], velocity)
+                # One that was closed stays among the candidates: other forces of the step may keep it so.
+                if delta > 0.0 or state.impact_velocity[p, s] > 0.0:
                     contacts.append(self._open_contact(stepper, state, (p, s), found, delta, delta_dot))
         return contacts, crossings
-
-    def _may_close(self, state: CatenaryState, p: int, s: int) -> bool:
-        """Whether a contact open without force may close by what droppers and other contacts do."""
-        return bool(state.impact_velocity[p, s] > 0.0)
-
-    def _velocity_of(self, newmark: Newmark, state: CatenaryState, new: FloatArray) -> FloatArray:
-        """Return the velocity that belongs to a new displacement."""
-        result = self._work.inertia
-        np.subtract(new, state.displacement, out=result)
-        result *= newmark.a1
-        result -= newmark.a4 * state.velocity
-        if newmark.a5 != 0.0:
-            result -= newmark.a5 * state.acceleration
-        return result
 
     def _penetration(
         self, wire: ContactWire, found: Crossing, strip: FloatArray, displacement: FloatArray, velocity: FloatArray
     ) -> tuple[float, float]:
+        """Return penetration and its velocity; ``displacement`` and ``velocity`` are those of the element."""
         element = wire.elements[found.element]
         powers = found.powers
         shape = powers @ element.rows
         z, z_dot = strip[0, :, 2] + found.share * (strip[1, :, 2] - strip[0, :, 2])
         radii = self.definition.contact.wire_radius + self.definition.contact.strip_radius
-        height = powers @ element.static + shape @ displacement[element.dofs]
-        return float(z - height + radii), float(z_dot - shape @ velocity[element.dofs])
+        height = powers @ element.static + shape @ displacement
+        return float(z - height + radii), float(z_dot - shape @ velocity)
 
     def _open_contact(
         self,
@@ -342,6 +362,7 @@ class CatenaryModel:
             penetration=penetration,
             velocity=velocity,
             impact_velocity=float(state.impact_velocity[p, s]),
+            engagement=found.engagement,
             dofs=element.dofs,
             load=powers @ element.rows,
             weights=powers,
@@ -369,16 +390,11 @@ class CatenaryModel:
         return np.where(same, motion.compliance[owners][:, None], 0.0) if len(contacts) else np.zeros((0, 0))
 
     def _advance(self, newmark: Newmark, state: CatenaryState, new: FloatArray) -> None:
-        """Replace displacement, velocity and acceleration [2.23, 2.24]."""
-        velocity = self._velocity_of(newmark, state, new)
-        # a_n+1 = (v_n+1 - v_n) / (gamma dt) - (1 - gamma) / gamma a_n; gamma = 1/2.
-        acceleration = state.acceleration
-        np.negative(acceleration, out=acceleration)
-        work = self._work.damping
-        np.subtract(velocity, state.velocity, out=work)
-        work *= 2.0 / newmark.step
-        acceleration += work
-        state.velocity[...] = velocity
+        """Replace displacement and velocity [2.21, 2.22]."""
+        change = self._work
+        np.subtract(new, state.displacement, out=change)
+        change *= newmark.a1
+        np.subtract(change, state.velocity, out=state.velocity)
         state.displacement[...] = new
 
     def _finish(
@@ -390,6 +406,7 @@ class CatenaryModel:
     ) -> ContactResult:
         result = self._empty_result(len(state.element))
         state.slack, state.compensation = forces.slack, forces.compensation
+        self._load(state, contacts, forces)
         was_closed = state.impact_velocity.copy()
         state.impact_velocity[...] = 0.0
         for contact, force, velocity, closed in zip(
@@ -403,6 +420,14 @@ class CatenaryModel:
             if found is not None:
                 result.point[p, s] = self._point(self.wires[s], found, state.displacement)
         return result
+
+    def _load(self, state: CatenaryState, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
+        """Note the forces at the end of the step; the next one begins with them."""
+        state.load[...] = self._rest_load
+        for contact, force in zip(contacts, forces.contact, strict=True):
+            state.load[contact.dofs] += force * contact.load
+        if forces.slack.size:
+            state.load -= self._stretch[:, forces.slack] @ forces.compensation
 
     def _point(
         self, wire: ContactWire, found: Crossing, displacement: FloatArray
@@ -424,7 +449,7 @@ def _superpose(
     """Add the response to contact and compensation forces to the free solution."""
     for contact, force in zip(contacts, forces.contact, strict=True):
         if force != 0.0:
-            new[contact.columns.window] += contact.columns.values @ (force * contact.weights)
+            new[contact.columns.index] += contact.columns.values @ (force * contact.weights)
     for j, compensation in zip(forces.slack, forces.compensation, strict=True):
         column = dropper_columns[j]
-        new[column.window] -= compensation * column.values[:, 0]
+        new[column.index] -= compensation * column.values[:, 0]

@@ -147,12 +147,24 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Span:
-    """A span: where it begins and ends, its droppers, and in a compound line the hangers of its auxiliary wire."""
+    """A span: where it begins and ends, its droppers, and in a compound line the hangers of its auxiliary wire.
+
+    Attributes
+    ----------
+    start, end : float
+        Supports [m].
+    droppers, hangers : tuple of float
+        Positions along the track [m].
+    dropper_lengths, hanger_lengths : tuple of float or empty
+        Given unstrained lengths [m]; empty where form finding is to find them.
+    """
 
     start: float
     end: float
     droppers: tuple[float, ...]
     hangers: tuple[float, ...] = ()
+    dropper_lengths: tuple[float, ...] = ()
+    hanger_lengths: tuple[float, ...] = ()
 
     @property
     def length(self) -> float:
@@ -222,7 +234,9 @@ class Profile:
 
     contact_wire_height: float = quantity("m", "height of the contact wire at the supports", positive=True)
     encumbrance: float = quantity("m", "messenger wire above contact wire at the supports", positive=True)
-    pre_sag: float = quantity("1", "sag of the contact wire over the span length", default=0.0, minimum=-0.01, maximum=0.01)
+    pre_sag: float = quantity(
+        "1", "sag of the contact wire over the span length", default=0.0, minimum=-0.01, maximum=0.01
+    )
     auxiliary_height: float | None = quantity(
         "m", "auxiliary wire above the contact wire", default=None, minimum=0.01
     )
@@ -305,7 +319,10 @@ def read(table: Table) -> CatenaryDefinition:
     hanger = table.table("hanger")
     profile_table = table.required_table("profile")
     profile = schema.read(Profile, profile_table)
-    sections = (_read_section(table, has_arms=arm is not None, has_hangers=line_type == "compound"),)
+    sections = tuple(
+        _read_section(t, has_arms=arm is not None, has_hangers=line_type == "compound")
+        for t in table.tables("section") or [table]
+    )
     _check_type(table, line_type, stitch, auxiliary, profile)
     definition = CatenaryDefinition(
         name=table.text("name"),
@@ -329,13 +346,51 @@ def read(table: Table) -> CatenaryDefinition:
         time_step=table.quantity("time_step", "s", default=1e-3, positive=True, maximum=0.1),
         provenance=table.provenance,
     )
+    _check_stitch(table, definition)
+    _check_auxiliary(table, profile)
     table.finish()
     return definition
+
+
+def _check_stitch(table: Table, definition: CatenaryDefinition) -> None:
+    stitch = definition.stitch_wire
+    if stitch is None:
+        return
+    if stitch.tension >= definition.messenger_wire.tension:
+        table.problem("stitch_wire.tension", "must be less than that of the messenger wire, which it relieves")
+    for section in definition.sections:
+        _check_stitch_length(table, section, stitch.length)
+
+
+def _check_stitch_length(table: Table, section: Section, length: float) -> None:
+    """Stitch wires must not meet, and must carry droppers on both sides of every support."""
+    half = length / 2.0
+    supports = [s.x for s in section.supports]
+    if any(b - a <= length for a, b in pairwise(supports)):
+        table.problem("stitch_wire.length", f"{length:g} m: the stitch wires of neighbouring supports overlap")
+        return
+    first, last = section.ends.working
+    droppers = [x for span in section.spans for x in span.droppers]
+    for support in (x for x in supports[1:-1] if first <= x <= last):
+        left = any(support - half < x < support for x in droppers)
+        if not (left and any(support < x < support + half for x in droppers)):
+            text = f"{length:g} m: no dropper hangs on one half of the stitch wire at {support:g} m"
+            table.problem("stitch_wire.length", text)
+            return
+
+
+def _check_auxiliary(table: Table, profile: Profile) -> None:
+    height = profile.auxiliary_height
+    if height is not None and height >= profile.encumbrance:
+        text = f"{height:g} m: the auxiliary wire must lie below the encumbrance, {profile.encumbrance:g} m"
+        table.problem("profile.auxiliary_height", text)
 
 
 def _check_type(
     table: Table, line_type: str, stitch: Table | None, auxiliary: Table | None, profile: Profile
 ) -> None:
+    if line_type not in LINE_TYPES:
+        return  # said already
     if (line_type == "stitched") != (stitch is not None):
         table.problem("stitch_wire", "a table [stitch_wire] is needed for type 'stitched', and only for it")
     if (line_type == "compound") != (auxiliary is not None):
@@ -362,15 +417,39 @@ def _read_damping(table: Table) -> Damping:
     )
 
 
+@dataclass(frozen=True)
+class _Hung:
+    """Droppers or hangers of one span: offsets from its start, given lengths (or none) [m]."""
+
+    offsets: tuple[float, ...] = ()
+    lengths: tuple[float, ...] = ()
+
+
 def _read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
     spans_table = table.required_table("spans")
     boundaries = _read_boundaries(spans_table)
-    droppers = _read_droppers(spans_table, boundaries, "droppers", "listed")
-    hangers = [()] * len(droppers) if not has_hangers else _read_droppers(spans_table, boundaries, "hangers", "listed_hangers")
+    droppers = _read_hung(spans_table, boundaries, "droppers", "listed")
+    hangers = [_Hung()] * len(droppers)
+    if has_hangers:
+        hangers = _read_hung(spans_table, boundaries, "hangers", "listed_hangers")
     free, ends = _read_ends(table.required_table("ends"), boundaries)
     supports = _read_supports(table, boundaries, free, has_arms=has_arms)
-    spans = tuple(Span(a, b, d, h) for (a, b), d, h in zip(pairwise(boundaries), droppers, hangers, strict=True))
-    return Section(supports, spans, ends, _read_measured(table, boundaries))
+    spans = tuple(_span(a, b, d, h) for (a, b), d, h in zip(pairwise(boundaries), droppers, hangers, strict=True))
+    measured = _read_measured(table, boundaries)
+    if measured and any(s.dropper_lengths for s in spans):
+        table.problem("measured", "gives the contact wire's profile, and so do the droppers' lengths: give one of them")
+    return Section(supports, spans, ends, measured)
+
+
+def _span(start: float, end: float, droppers: _Hung, hangers: _Hung) -> Span:
+    return Span(
+        start,
+        end,
+        droppers=tuple(start + x for x in droppers.offsets),
+        hangers=tuple(start + x for x in hangers.offsets),
+        dropper_lengths=droppers.lengths,
+        hanger_lengths=hangers.lengths,
+    )
 
 
 def _read_boundaries(table: Table) -> list[float]:
@@ -380,10 +459,10 @@ def _read_boundaries(table: Table) -> list[float]:
         lengths = [length] * table.integer("count", minimum=1, maximum=10000)
     else:
         lengths = list(table.quantities("lengths", "m", positive=True))
-        if not lengths:
+        if table.has("lengths") and not lengths:
             table.problem("lengths", "gives no span")
     boundaries = [start]
-    for length in lengths:
+    for length in lengths or [math.nan]:
         boundaries.append(round(boundaries[-1] + length, 9))
     if table.has("end"):
         end = table.quantity("end", "m")
@@ -392,56 +471,95 @@ def _read_boundaries(table: Table) -> list[float]:
     return boundaries
 
 
-def _read_droppers(
-    table: Table, boundaries: Sequence[float], rule_name: str, list_name: str
-) -> list[tuple[float, ...]]:
+def _read_hung(table: Table, boundaries: Sequence[float], rule_name: str, list_name: str) -> list[_Hung]:
+    """Read droppers (or hangers) of every span: by the rule, or as listed for the span."""
+    count = len(boundaries) - 1
+    listed = _read_listed(table, count, list_name)
     rule = table.table(rule_name)
-    listed = {}
-    for entry in table.tables(list_name):
-        index = entry.integer("span", minimum=1, maximum=len(boundaries) - 1)
-        listed[index] = (entry, entry.quantities("positions", "m"))
-    if rule is None and len(listed) < len(boundaries) - 1:
+    if rule is None and len(listed) < count:
         table.problem(rule_name, f"a table [{table.key(rule_name)}] is missing, and not every span lists its own")
     result = []
     for index, (a, b) in enumerate(pairwise(boundaries), 1):
-        if index in listed:
-            entry, offsets = listed[index]
-        else:
-            entry, offsets = rule, (_dropper_rule(rule, b - a) if rule is not None else ())
-        _check_droppers(entry or table, index, b - a, offsets)
-        result.append(tuple(a + x for x in offsets))
+        own = listed.get(index, rule)
+        result.append(_hung(own, index, b - a) if own is not None else _Hung())
     return result
+
+
+def _read_listed(table: Table, count: int, list_name: str) -> dict[int, Table]:
+    listed: dict[int, Table] = {}
+    for entry in table.tables(list_name):
+        first = entry.integer("span", minimum=1)
+        last = entry.integer("to", default=first, minimum=first)
+        if last > count:
+            entry.problem("span", f"there is no span {last}: the line has {count}")
+        if repeated := [i for i in range(first, last + 1) if i in listed]:
+            entry.problem("span", f"span {repeated[0]} is listed twice")
+        if last > count or repeated:
+            _hung(entry, first, math.nan)
+        else:
+            listed |= dict.fromkeys(range(first, last + 1), entry)
+    return listed
+
+
+def _hung(table: Table, index: int, length: float) -> _Hung:
+    """Read positions and given lengths of a span's droppers; ``length`` is the span's, NaN if it has none [m]."""
+    given = table.has("positions")
+    offsets = table.quantities("positions", "m") if given else _dropper_rule(table, length)
+    _check_droppers(table, index, length, offsets)
+    lengths = table.quantities("lengths", "m", default=(), positive=True)
+    if len(lengths) == 1:
+        lengths = lengths * len(offsets)
+    if lengths and len(lengths) != len(offsets):
+        text = f"gives {len(lengths)} lengths for the {len(offsets)} droppers of span {index}"
+        table.problem("lengths", f"{text}: give one for each, or one for all")
+        lengths = ()
+    return _Hung(offsets, lengths)
 
 
 def _dropper_rule(table: Table, length: float) -> tuple[float, ...]:
     first = table.quantity("first", "m", positive=True)
     if table.has("spacing"):
         spacing = table.quantity("spacing", "m", positive=True)
-        gaps = (length - 2.0 * first) / spacing
-        if not math.isfinite(gaps) or gaps < 0.0 or abs(gaps - round(gaps)) > 1e-6:
-            table.problem("spacing", f"droppers from {first:g} m every {spacing:g} m do not fit a span of {length:g} m")
-            return ()
-        number = round(gaps) + 1
+        number = _fitting_number(table, length, first, spacing)
     else:
         number = table.integer("count", minimum=2, maximum=1000)
         spacing = (length - 2.0 * first) / (number - 1)
     return tuple(first + i * spacing for i in range(number))
 
 
+def _fitting_number(table: Table, length: float, first: float, spacing: float) -> int:
+    """Return how many droppers fill a span; that they do not fit is a problem and gives 0."""
+    gaps = (length - 2.0 * first) / spacing if spacing else math.nan
+    if not math.isfinite(gaps):
+        return 0
+    if gaps < 0.0 or abs(gaps - round(gaps)) > 1e-6:
+        text = f"droppers from {first:g} m every {spacing:g} m do not fit a span of {length:g} m"
+        table.problem("spacing", text)
+        return 0
+    return round(gaps) + 1
+
+
 def _check_droppers(table: Table, index: int, length: float, offsets: Sequence[float]) -> None:
-    if any(not 0.0 < x < length for x in offsets if math.isfinite(x)):
-        outside = [f"{x:g}" for x in offsets if not 0.0 < x < length]
-        table.problem("", f"span {index} of {length:g} m: dropper at {', '.join(outside)} m lies outside it")
-    elif any(b <= a for a, b in pairwise(offsets)):
-        table.problem("", f"span {index}: droppers are not in rising order")
+    if not (length > 0.0 and all(map(math.isfinite, offsets))):
+        return  # said already
+    key = "positions" if table.has("positions") else "first"
+    outside = [f"{x:g}" for x in offsets if not 0.0 < x < length]
+    if outside:
+        table.problem(key, f"dropper at {', '.join(outside)} m lies outside its span, number {index} of {length:g} m")
+    elif any(b - a < 1e-3 for a, b in pairwise(offsets)):
+        table.problem(key, f"span {index}: droppers are not in rising order")
 
 
 def _read_ends(table: Table, boundaries: Sequence[float]) -> tuple[int, EndSpans]:
     """Return how many spans at each end are unregistered, and the wires' rise over them."""
     free = table.integer("spans", default=0, minimum=0, maximum=max(0, (len(boundaries) - 2) // 2))
     rise = table.quantity("rise", "m", default=0.0, minimum=0.0, maximum=5.0)
-    last = len(boundaries) - 1
-    return free, EndSpans((boundaries[0], boundaries[-1]), (boundaries[free], boundaries[last - free]), rise)
+    start, end = boundaries[0], boundaries[-1]
+    working = boundaries[free], boundaries[len(boundaries) - 1 - free]
+    if table.has("length"):
+        length = table.quantity("length", "m", positive=True, maximum=max(1e-3, 0.5 * (end - start)))
+        working = start + length, end - length
+    return free, EndSpans((start, end), working, rise)
 
 
 def _read_supports(table: Table, boundaries: Sequence[float], free: int, *, has_arms: bool) -> tuple[Support, ...]:

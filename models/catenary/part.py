@@ -6,20 +6,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.catenary.mesh import build_mesh
+from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.parameters import CatenaryDefinition
+from models.catenary.statics import wave_speed
+from models.contact import application_point
 from models.extrapolation import StripExtrapolation
-from models.part import FloatArray, Snapshot
+from models.part import FloatArray, IntArray, Snapshot
 from models.time_integration import steps_within
 
 
 @dataclass(frozen=True)
 class Site:
-    """A support or dropper: its name and place along the track [m]."""
+    """A support or dropper: its name, place along the track [m] and section, from 1.
+
+    Names count from 1 within a section, and say the section where there are several.
+    """
 
     name: str
     x: float
+    section: int
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,8 @@ class LineGeometry:
     dropper_x, dropper_lower_y, dropper_lower_z, dropper_upper_z : ndarray, shape (n_droppers,)
     dropper_length : ndarray, shape (n_droppers,)
         Unstrained length.
+    support_section, dropper_section : ndarray, shape (n_supports,), (n_droppers,)
+        Number of the section, from 1.
     """
 
     support_x: FloatArray
@@ -45,6 +53,8 @@ class LineGeometry:
     dropper_lower_z: FloatArray
     dropper_upper_z: FloatArray
     dropper_length: FloatArray
+    support_section: FloatArray
+    dropper_section: FloatArray
 
 
 class CatenaryPart:
@@ -72,12 +82,8 @@ class CatenaryPart:
         self.definition = definition
         mesh = build_mesh(definition)
         self.section_count = len(definition.sections)
-        self.supports = tuple(
-            Site(str(i), float(x)) for i, x in enumerate(mesh.points[mesh.support_nodes, 0], 1)
-        )
-        self.droppers = tuple(
-            Site(str(j), float(x)) for j, x in enumerate(mesh.points[mesh.droppers[:, 0], 0], 1)
-        )
+        self.supports = _sites(mesh, mesh.support_nodes)
+        self.droppers = _sites(mesh, mesh.droppers[:, 0])
         self.time = 0.0
         self.contact_force = np.zeros(pantographs)
         self.contact_point = np.zeros((pantographs, 3))
@@ -120,14 +126,24 @@ class CatenaryPart:
         support = static.positions[mesh.support_nodes]
         lower, upper = (static.positions[mesh.droppers[:, k]] for k in (0, 1))
         return LineGeometry(
-            *support.T.copy(),
+            support[:, 0].copy(),
+            support[:, 1].copy(),
+            support[:, 2].copy(),
             static.positions[mesh.sprung, 2],
             lower[:, 0].copy(),
             lower[:, 1].copy(),
             lower[:, 2].copy(),
             upper[:, 2].copy(),
             static.unstrained_length,
+            (mesh.section[mesh.support_nodes] + 1).astype(np.float64),
+            (mesh.section[mesh.droppers[:, 0]] + 1).astype(np.float64),
         )
+
+    @property
+    def contact_wire_wave_speed(self) -> FloatArray:
+        """Return the speed of waves in the contact wire, taken for the longest span [m/s], shape (1,)."""
+        longest = max(span.length for section in self.definition.sections for span in section.spans)
+        return np.array([wave_speed(self.definition.contact_wire, longest)])
 
     def initialise(self, time: float, strips: FloatArray) -> None:
         """Put the line to rest at ``time`` and find the contacts of the strips with it.
@@ -184,20 +200,16 @@ class CatenaryPart:
         self.section_force[...] = result.force
         np.sum(result.force, axis=1, out=self.contact_force)
         for p, strip in enumerate(strips):
-            self.contact_point[p] = _application(result.force[p], result.point[p], strip)
+            self.contact_point[p] = application_point(result.force[p], result.point[p], strip)
         self.support_uplift[...] = self.model.uplift(self.state)
 
 
-def _application(force: FloatArray, point: FloatArray, strip: FloatArray) -> FloatArray:
-    """Return where the resultant of parallel forces acts."""
-    total = float(force.sum())
-    if total > 0.0:
-        touched = force > 0.0
-        result: FloatArray = force[touched] @ point[touched] / total
-        return result
-    crossed = np.flatnonzero(~np.isnan(point[:, 0]))
-    if crossed.size:
-        found: FloatArray = point[crossed[0]]
-        return found
-    middle: FloatArray = strip[:, 0].mean(axis=0)
-    return middle
+def _sites(mesh: CatenaryMesh, nodes: IntArray) -> tuple[Site, ...]:
+    sections = mesh.section[nodes]
+    several = bool(mesh.section.any())
+    found, counts = [], dict.fromkeys(sections.tolist(), 0)
+    for x, section in zip(mesh.points[nodes, 0].tolist(), sections.tolist(), strict=True):
+        counts[section] += 1
+        name = f"{counts[section]} of section {section + 1}" if several else str(counts[section])
+        found.append(Site(name, x, section + 1))
+    return tuple(found)

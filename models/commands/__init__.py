@@ -8,17 +8,19 @@ from collections.abc import Sequence
 
 from models.catenary.equilibrium import EquilibriumError
 from models.catenary.local_response import LocalSolutionError
-from models.commands import couple
+from models.commands import couple, identify, pantograph, statics
 from models.definition import DefinitionError
 from models.library import UnknownNameError
+from models.pantograph.multibody.mechanism import MechanismError
 from models.part import ParameterError
 
-_VERBS = (couple,)
+_VERBS = (couple, statics, pantograph, identify)
 #: What a user can cause; everything else is a defect and keeps its traceback.
 _USER_ERRORS = (
     DefinitionError,
     EquilibriumError,
     LocalSolutionError,
+    MechanismError,
     ParameterError,
     UnknownNameError,
     OSError,

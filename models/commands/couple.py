@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from models.catenary.model import CatenaryModel
 from models.commands.options import add_settings, new_folder, print_table, settings
 from models.coupled import CoupledModel, CoupledRecord
-from models.library import load_line, load_pantograph
+from models.library import load_line, load_lumped
 from models.statistics import ContactFigures, contact_figures
 
 
@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     span = _span_of(arguments, line)
     speed = arguments.speed / 3.6
     wanted = {"speed": speed, "start_position": span[0]} | settings(arguments.set, "pantograph")
-    pantograph = load_pantograph(arguments.pantograph).with_values(wanted)
+    pantograph = load_lumped(arguments.pantograph).with_values(wanted)
     coupled = CoupledModel(line, [pantograph])
     stop = (span[1] - span[0]) / speed
     begin = time.perf_counter()

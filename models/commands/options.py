@@ -51,7 +51,8 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
         table.add_column(column, justify="left" if i == 0 else "right")
     for row in rows:
         table.add_row(*row)
-    Console(width=None if Console().is_terminal else 80).print(table)
+    # Without markup: "[m]" is a unit here.
+    Console(width=None if Console().is_terminal else 100, markup=False).print(table)
 
 
 def new_folder(path: Path) -> Path:

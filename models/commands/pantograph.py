@@ -71,7 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         ([f"{v:.3f}" if i == 0 else f"{v:.2f}" for i, v in enumerate(row)] for row in result.statics),
     )
     print_table("Modes, strip free", ("frequency [Hz]", "damping [%]"), _mode_rows(result))
-    print_table("Apparent mass of the strip", ("frequency [Hz]", "magnitude [kg]", "phase [deg]"), _response_rows(result))
+    response_columns = ("frequency [Hz]", "magnitude [kg]", "phase [deg]")
+    print_table("Apparent mass of the strip", response_columns, _response_rows(result))
     if arguments.out is not None:
         folder = new_folder(arguments.out)
         write(folder, result)

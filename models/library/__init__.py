@@ -6,7 +6,10 @@ from pathlib import Path
 
 from models.catenary.parameters import CatenaryDefinition
 from models.catenary.parameters import load as load_line_file
-from models.pantograph.parameters import LumpedDefinition, load_lumped
+from models.definition import Table
+from models.pantograph.multibody.definition import MechanismDefinition
+from models.pantograph.multibody.definition import parse as read_multibody
+from models.pantograph.parameters import LumpedDefinition, read_lumped
 
 _HERE = Path(__file__).parent
 
@@ -52,9 +55,26 @@ def load_line(name: str) -> CatenaryDefinition:
     return load_line_file(line_path(name))
 
 
-def load_pantograph(name: str) -> LumpedDefinition:
-    """Read a lumped pantograph by its name or file; raises ``UnknownNameError`` or ``DefinitionError``."""
-    return load_lumped(pantograph_path(name))
+def load_pantograph(name: str) -> LumpedDefinition | MechanismDefinition:
+    """Read a pantograph of any kind by its name or file; raises ``UnknownNameError`` or ``DefinitionError``."""
+    table = Table.load(pantograph_path(name))
+    return read_multibody(table) if table.data.get("type") == "multibody" else read_lumped(table)
+
+
+def load_lumped(name: str) -> LumpedDefinition:
+    """Read a lumped pantograph by its name or file.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of the name, or it is of another kind.
+    DefinitionError
+        With every mistake of the file.
+    """
+    definition = load_pantograph(name)
+    if not isinstance(definition, LumpedDefinition):
+        raise UnknownNameError(f"pantograph '{name}' is a multibody model where a lumped one is needed")
+    return definition
 
 
 def _names(folder: str) -> tuple[str, ...]:

@@ -153,12 +153,12 @@ class LumpedPantographPart:
         self._force.receive_at(self.time, force, float(point[0]), self._x(self.time), self.definition.speed, step)
         count = steps_within(step, self.definition.time_step)
         start, h = self.time, step / count
-        base_change = (base - self._base) / count
+        self._base[...] = base
         for k in range(1, count + 1):
-            self._base += base_change
+            # Received for the step's beginning; the roof goes on with its velocity.
+            self._base[0] = base[0] + k * h * base[1]
             self._substep(start + k * h, h)
         self.time = start + step
-        self._base[...] = base
         self._place_strip()
 
     def observation_values(self) -> FloatArray:

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
-from models.catenary.parameters import CatenaryDefinition, read
-from models.definition import Table
-from models.library import load_line, load_pantograph
-from models.pantograph.parameters import LumpedDefinition
 
 import models
+from models.catenary.parameters import CatenaryDefinition, read
+from models.definition import Table
+from models.library import load_line, load_lumped
+from models.pantograph.parameters import LumpedDefinition
 
 LIBRARY = Path(models.__file__).parent / "library"
 
@@ -84,4 +84,4 @@ def ln2() -> CatenaryDefinition:
 
 @pytest.fixture(scope="session")
 def cx() -> LumpedDefinition:
-    return load_pantograph("CX")
+    return load_lumped("CX")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.parameters import Contact
 from models.contact import continuous_contact, crossing

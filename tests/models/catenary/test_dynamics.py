@@ -6,13 +6,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu, spsolve
+
 from models.catenary.assembly import assemble
 from models.catenary.elements import NODE_DOFS
 from models.catenary.equilibrium import weight
 from models.catenary.mesh import CatenaryMesh, Chain
 from models.catenary.model import CatenaryModel, StripMotion
 from models.time_integration import Newmark, steps_within
-from scipy.sparse.linalg import splu, spsolve
 
 GRAVITY = 9.81
 
@@ -28,14 +29,18 @@ def _single_wire(length, elements):
     nodes = np.arange(n)
     return CatenaryMesh(
         points=points,
+        section=np.zeros(n, dtype=np.int64),
         beams=np.stack([nodes[:-1], nodes[1:]], axis=1),
         component=np.zeros(elements, dtype=np.int64),
         chains=(Chain("contact_wire", 0, nodes),),
         droppers=np.zeros((0, 2), dtype=np.int64),
         is_hanger=np.zeros(0, dtype=bool),
+        beside_stitch=np.zeros(elements, dtype=bool),
         target=np.zeros(0),
+        given_length=np.zeros(0),
         fixed=fixed,
         sprung=np.zeros(0, dtype=np.int64),
+        seat=np.zeros(0),
         clamp_mass=np.zeros(n),
         support_nodes=np.zeros(0, dtype=np.int64),
         arms=np.zeros((0, 2), dtype=np.int64),
@@ -157,7 +162,6 @@ def test_undamped_line_keeps_its_energy(line_maker):
     state = model.initial_state()
     rng = np.random.default_rng(1)
     state.velocity[:] = 1e-2 * rng.standard_normal(len(state.velocity))
-    state.acceleration[:] = splu(model.M.tocsc()).solve(-(model.K @ state.displacement) - model.C @ state.velocity)
     before = model.energy(state)
     motion = StripMotion(_below(100.0), np.zeros(1))
     for _ in range(300):
@@ -278,12 +282,11 @@ def test_free_vibration_converges_with_the_second_order_of_the_step(short_line):
         field = np.zeros((len(x), NODE_DOFS))
         field[:, 2] = 0.05 * np.sin(np.pi * x / 300.0) ** 4
         state.velocity[:] = field.ravel()[model.free]
-        state.acceleration[:] = splu(model.M.tocsc()).solve(-(model.C @ state.velocity))
         for _ in range(round(0.2 / dt)):
             model.step(state, dt, StripMotion(_below(100.0), np.zeros(1)))
-        results.append(state.displacement.copy())
+        results.append(state.displacement[model.free % NODE_DOFS == 2].copy())
     changes = [np.abs(b - a).max() for a, b in pairwise(results)]
-    assert np.log2(changes[1] / changes[2]) == pytest.approx(2.0, abs=0.3)
+    assert np.log2(changes[1] / changes[2]) == pytest.approx(2.0, abs=0.1)
 
 
 @pytest.mark.parametrize(("duration", "longest", "count"), [(1e-3, 1e-3, 1), (5e-4, 1e-3, 1), (1e-2, 1e-3, 10)])

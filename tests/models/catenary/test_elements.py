@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
+
 from models.catenary.elements import (
     beam_geometric_stiffness,
     beam_mass,
@@ -10,7 +12,6 @@ from models.catenary.elements import (
     hermite_rows,
     to_global,
 )
-from scipy.linalg import eigh
 
 EA, GJ, EI, F, MASS = 1.8e7, 300.0, 215.0, 20000.0, 1.334
 LENGTH = 1.125

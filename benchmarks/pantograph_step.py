@@ -1,0 +1,50 @@
+"""What a step of each pantograph costs: ``python benchmarks/pantograph_step.py``.
+
+Lumped and multibody parts at 1 ms under a contact force that changes, times real time and against the lumped CX.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from timing import by_turns, table
+
+from models.library import load_pantograph, pantograph_names
+from models.pantograph.lumped import LumpedPantographPart
+from models.pantograph.multibody.definition import MechanismDefinition
+from models.pantograph.multibody.part import MultibodyPantographPart
+
+STEP = 1e-3
+STEPS = 500
+
+
+def steps(name: str) -> Callable[[], None]:
+    """Return a function that steps a pantograph under a swinging force."""
+    definition = load_pantograph(name)
+    multibody = isinstance(definition, MechanismDefinition)
+    part = MultibodyPantographPart(definition) if multibody else LumpedPantographPart(definition)
+    base = np.zeros(2)
+    part.initialise(0.0, 0.0, np.zeros(3), base)
+    clock = {"n": 0}
+
+    def run() -> None:
+        for _ in range(STEPS):
+            t = clock["n"] * STEP
+            point = np.array([part.strip[0, 0, 0], 0.2 * np.sin(5.0 * t), 5.0])
+            part.step(150.0 + 40.0 * np.sin(20.0 * t), point, base, STEP)
+            clock["n"] += 1
+
+    return run
+
+
+def main() -> None:
+    best = by_turns({name: steps(name) for name in pantograph_names()}, rounds=5)
+    rows = [
+        (name, f"{1e6 * t / STEPS:.0f}", f"{STEP * STEPS / t:.1f}", f"{t / best['CX']:.1f}") for name, t in best.items()
+    ]
+    table("Pantographs at 1 ms", ("", "us per step", "times real time", "ratio to CX"), rows)
+
+
+if __name__ == "__main__":
+    main()

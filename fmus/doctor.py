@@ -1,0 +1,202 @@
+"""What a machine lacks for running an FMU, in words: ``python -m fmus doctor X.fmu``."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+from xml.etree import ElementTree
+
+from fmus.shim import INNER_SUFFIX, probe_text
+
+Level = Literal["ok", "note", "missing"]
+#: (system, machine) -> folder and suffix of an FMU's library.
+_PLATFORMS: Final = {
+    ("Linux", "x86_64"): ("linux64", ".so"),
+    ("Windows", "AMD64"): ("win64", ".dll"),
+    ("Darwin", "x86_64"): ("darwin64", ".dylib"),
+}
+_SECONDS: Final = 300
+_TRIAL: Final = """
+import sys
+folder, script, name = sys.argv[1:]
+sys.path.insert(0, folder)
+import importlib, scipy.linalg
+slave = getattr(importlib.import_module(script), name)(instance_name="trial", resources=folder)
+slave.setup_experiment(0.0)
+slave.enter_initialization_mode()
+slave.exit_initialization_mode()
+sys.exit(0 if slave.do_step(0.0, 1e-3) else 1)
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at: in order (ok), worth knowing (note), or in the way (missing)."""
+
+    level: Level
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.level:8} {self.text}"
+
+
+@dataclass(frozen=True)
+class Interpreter:
+    """The Python that a tool would run the FMU with, in its own words (``native/probe.py``)."""
+
+    executable: str
+    version: str
+    library: str
+    lack: str
+
+
+@dataclass(frozen=True)
+class Package:
+    """What an FMU's archive holds, as far as it matters here."""
+
+    path: Path
+    names: frozenset[str]
+    script: str
+    identifier: str
+
+    def library(self) -> str:
+        """Return the name of this platform's library, empty if FMUs have none for it."""
+        folder, suffix = _PLATFORMS.get((platform.system(), platform.machine()), ("", ""))
+        return f"binaries/{folder}/{self.identifier}{suffix}" if folder else ""
+
+    @property
+    def has_shim(self) -> bool:
+        """Whether it brings Python into hosts that are not Python."""
+        return f"binaries/linux64/{self.identifier}{INNER_SUFFIX}" in self.names
+
+
+def examine(path: Path) -> list[Finding]:
+    """Look at an FMU and at this machine; return all that was found."""
+    try:
+        package = read_package(path)
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile, ElementTree.ParseError) as error:
+        return [Finding("missing", f"{path} is not an FMU of this kind ({error})")]
+    python = ask()
+    found = [*_platform(package), *_python(python)]
+    if python is None or python.lack:
+        return found
+    found += _trial(package, python)
+    return found + list(_other_hosts(package, python))
+
+
+def read_package(path: Path) -> Package:
+    """Return what an FMU's archive holds.
+
+    Raises
+    ------
+    ValueError
+        If it is no FMI 2.0 co-simulation FMU made with pythonfmu; zipfile's and the XML parser's errors too.
+    """
+    with zipfile.ZipFile(path) as file:
+        names = frozenset(file.namelist())
+        root = ElementTree.fromstring(file.read("modelDescription.xml"))
+        node = root.find("CoSimulation")
+        if root.get("fmiVersion") != "2.0" or node is None:
+            raise ValueError("not FMI 2.0 for co-simulation")
+        if "resources/slavemodule.txt" not in names:
+            raise ValueError("it holds no Python code")
+        script = file.read("resources/slavemodule.txt").decode().strip()
+    return Package(path, names, script, node.get("modelIdentifier", ""))
+
+
+def ask(name: str | None = None) -> Interpreter | None:
+    """Ask an interpreter (default: the one that tools take) what it has; None if it cannot be run."""
+    command = [name or interpreter_name(), "-c", probe_text()]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    lines = [*done.stdout.splitlines(), "", "", "", ""]
+    return Interpreter(*lines[:4]) if done.returncode == 0 and lines[1] else None
+
+
+def interpreter_name() -> str:
+    """Return what tools take: what OPENPANTO_PYTHON names, or the first python3 on PATH."""
+    default = "python" if platform.system() == "Windows" else "python3"
+    return os.environ.get("OPENPANTO_PYTHON") or default
+
+
+def _platform(package: Package) -> Iterator[Finding]:
+    here = f"{platform.system()} on {platform.machine()}"
+    library = package.library()
+    if library in package.names:
+        yield Finding("ok", f"the FMU has a library for this platform ({here})")
+    else:
+        have = ", ".join(sorted({n.split("/")[1] for n in package.names if n.startswith("binaries/")}))
+        yield Finding("missing", f"the FMU has no library for this platform ({here}), only for {have or 'none'}")
+
+
+def _python(python: Interpreter | None) -> Iterator[Finding]:
+    if python is None:
+        yield Finding(
+            "missing",
+            f"no Python found: '{interpreter_name()}' cannot be run; install Python 3.11 or newer with numpy and "
+            "scipy and put it first on PATH, or name it in the environment variable OPENPANTO_PYTHON",
+        )
+    elif python.lack:
+        yield Finding("missing", f"{python.executable} {python.lack}; {_remedy(python)}")
+    else:
+        yield Finding("ok", f"{python.executable} is Python {python.version} with numpy and scipy")
+
+
+def _remedy(python: Interpreter) -> str:
+    if "packages" in python.lack:
+        return f"install them: {python.executable} -m pip install numpy scipy"
+    return "name another one in the environment variable OPENPANTO_PYTHON"
+
+
+def _trial(package: Package, python: Interpreter) -> Iterator[Finding]:
+    with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
+        with zipfile.ZipFile(package.path) as file:
+            file.extractall(folder, [n for n in package.names if n.startswith("resources/")])
+        resources = str(Path(folder) / "resources")
+        command = [python.executable, "-c", _TRIAL, resources, package.script, package.identifier]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
+    if done.returncode == 0:
+        yield Finding("ok", "the FMU's code was initialised there and made a step")
+    else:
+        lines = done.stderr.strip().splitlines() or ["no reason given"]
+        yield Finding("missing", f"the FMU's code does not run there: {lines[-1]}")
+
+
+def _other_hosts(package: Package, python: Interpreter) -> Iterator[Finding]:
+    yield Finding("ok", "tools that are Python themselves (FMPy, Ecos and libcosim from Python) can run it")
+    if platform.system() == "Windows":
+        yield Finding("note", f"tools that are not Python need the python3.dll of {python.executable} on PATH")
+    elif not python.library:
+        yield Finding(
+            "missing",
+            f"tools that are not Python cannot: {python.executable} has no shared library; install libpython "
+            f"(Debian: apt-get install libpython{python.version}), or a Python built with --enable-shared",
+        )
+    elif package.has_shim:
+        yield Finding("ok", f"tools that are not Python can run it too: its shim will load {python.library}")
+    else:
+        first = Path(python.executable).parent
+        yield Finding(
+            "note",
+            "tools that are not Python need it built with --shim, or to be started like this: "
+            f"PATH={first}:$PATH LD_PRELOAD={python.library} the-tool",
+        )
+
+
+def main(path: Path) -> int:
+    """Print what was found; 1 if something is missing."""
+    found = examine(path)
+    for finding in found:
+        print(finding)
+    sys.stdout.flush()
+    return 1 if any(f.level == "missing" for f in found) else 0

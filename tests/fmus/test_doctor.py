@@ -1,0 +1,97 @@
+"""What the doctor says of machines that lack something."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from fmus import doctor
+from fmus.__main__ import main
+from fmus.shim import INNER_SUFFIX, probe_text
+
+
+@pytest.fixture(autouse=True)
+def this_python(monkeypatch):
+    monkeypatch.setenv("OPENPANTO_PYTHON", sys.executable)
+
+
+def _said(path):
+    found = doctor.examine(path)
+    return {level: " | ".join(f.text for f in found if f.level == level) for level in ("ok", "note", "missing")}
+
+
+def _changed(fmu, folder, change):
+    """A copy of an FMU: ``change`` maps a member's name and bytes to new ones, or to None."""
+    copy = folder / fmu.name
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(copy, "w") as new:
+        for name in old.namelist():
+            if (member := change(name, old.read(name))) is not None:
+                new.writestr(*member)
+    return copy
+
+
+def test_a_machine_that_has_all(toy_fmu, capsys):
+    assert main(["doctor", str(toy_fmu)]) == 0
+    out = capsys.readouterr().out
+    assert "made a step" in out
+    assert "missing" not in out
+
+
+def test_no_python(toy_fmu, monkeypatch, capsys):
+    monkeypatch.setenv("OPENPANTO_PYTHON", "/nowhere/python3")
+    assert main(["doctor", str(toy_fmu)]) == 1
+    assert "no Python found: '/nowhere/python3' cannot be run" in capsys.readouterr().out
+
+
+def test_python_without_the_packages(toy_fmu, tmp_path, monkeypatch):
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "bare")], check=True)
+    monkeypatch.setenv("OPENPANTO_PYTHON", str(tmp_path / "bare" / "bin" / "python"))
+    assert "lacks the packages numpy and scipy; install them: " in _said(toy_fmu)["missing"]
+
+
+def test_no_library_for_this_platform(toy_fmu, tmp_path):
+    copy = _changed(toy_fmu, tmp_path, lambda n, d: None if n.startswith("binaries/linux64") else (n, d))
+    assert "no library for this platform" in _said(copy)["missing"]
+
+
+def test_no_shared_library_of_python(toy_fmu, monkeypatch):
+    static = doctor.Interpreter(sys.executable, "3.11", "", "")
+    monkeypatch.setattr(doctor, "ask", lambda: static)
+    assert "has no shared library; install libpython" in _said(toy_fmu)["missing"]
+
+
+def test_with_and_without_shim(toy_fmu, tmp_path):
+    assert doctor.ask().library == "" or "LD_PRELOAD=" in _said(toy_fmu)["note"]
+    inner = f"binaries/linux64/Toy{INNER_SUFFIX}"
+    copy = _changed(toy_fmu, tmp_path, lambda n, d: (n, d))
+    with zipfile.ZipFile(copy, "a") as file:
+        file.writestr(inner, b"")
+    assert doctor.ask().library == "" or "its shim will load" in _said(copy)["ok"]
+
+
+def test_code_that_does_not_run(toy_fmu, tmp_path):
+    def spoil(name, data):
+        return name, data.replace(b"GAIN = 1.0", b"import nothing_of_this_name") if name.endswith("law.py") else data
+
+    assert "No module named 'nothing_of_this_name'" in _said(_changed(toy_fmu, tmp_path, spoil))["missing"]
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x05\x06" + bytes(18), b"no archive"])
+def test_what_is_no_fmu(tmp_path, content):
+    path = tmp_path / "x.fmu"
+    path.write_bytes(content)
+    assert "is not an FMU of this kind" in _said(path)["missing"]
+    assert "is not an FMU of this kind" in _said(tmp_path / "none.fmu")["missing"]
+
+
+def test_the_probe_is_understood_by_a_shell_and_an_old_python():
+    compile(probe_text(), "probe", "exec", dont_inherit=True)
+    answer = subprocess.run(f"'{sys.executable}' -c '{probe_text()}'", shell=True, capture_output=True, text=True)
+    lines = answer.stdout.splitlines()
+    assert Path(lines[0]).resolve() == Path(sys.executable).resolve()
+    assert lines[1] == f"{sys.version_info.major}.{sys.version_info.minor}"
+    assert lines[3] == ""

@@ -1,0 +1,228 @@
+"""Form finding: equilibrium checked independently, heights, tensions, published lengths."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
+
+from models.catenary.assembly import (
+    assemble,
+    dropper_lengths,
+    dropper_rows,
+    dropper_stiffness,
+)
+from models.catenary.elements import NODE_DOFS
+from models.catenary.equilibrium import EquilibriumError, find_form, weight
+from models.catenary.mesh import build_mesh
+from models.catenary.model import CatenaryModel, StripMotion
+from models.catenary.parameters import COMPONENTS, GRAVITY
+from models.library import line_names, load_line
+
+
+@pytest.fixture(scope="module", params=line_names())
+def found(request):
+    line = load_line(request.param)
+    mesh = build_mesh(line)
+    return line, mesh, find_form(line, mesh)
+
+
+def droppers_as_springs(line, mesh, state):
+    """Return the displacement of the line about its static points, droppers as springs of their unstrained lengths."""
+    matrices = assemble(line, mesh, state.points)
+    B = dropper_rows(mesh, state.points)
+    k = dropper_stiffness(line, mesh, state.points)
+    stretch = dropper_lengths(mesh, state.points) - state.unstrained_length
+    free = np.flatnonzero(~mesh.fixed.ravel())
+    K = matrices.K + B.T @ sp.diags(k) @ B
+    load = matrices.load - B.T @ (k * stretch)
+    displacement = np.zeros(load.size)
+    displacement[free] = spsolve(K[free][:, free].tocsc(), load[free])
+    return displacement, k * (stretch + B @ displacement)
+
+
+def test_forces_balance_at_every_node(found):
+    line, mesh, state = found
+    matrices = assemble(line, mesh, state.points)
+    unbalanced = matrices.K @ state.displacement + dropper_rows(mesh, state.positions).T @ state.dropper_force
+    unbalanced = (unbalanced - matrices.load).reshape(-1, NODE_DOFS)[~mesh.fixed]
+    assert np.abs(unbalanced).max() < 1e-6 * weight(matrices)
+    assert state.residual < 1e-6
+
+
+def test_the_line_stands_still_on_droppers_of_the_lengths_found(found):
+    line, mesh, state = found
+    displacement, force = droppers_as_springs(line, mesh, state)
+    moved = (displacement - state.displacement).reshape(-1, NODE_DOFS)[:, :3]
+    assert np.abs(moved).max() < 1e-6
+    assert np.abs(force - state.dropper_force).max() < 1e-6 * weight(state.matrices)
+
+
+def test_supports_carry_the_weight(found):
+    line, mesh, state = found
+    M = state.matrices.M
+    internal = state.matrices.K @ state.displacement + dropper_rows(mesh, state.points).T @ state.dropper_force
+    reactions = (internal - state.matrices.load).reshape(-1, NODE_DOFS)
+    held = np.where(mesh.fixed, reactions, 0.0)[:, :3].sum(axis=0)
+    if line.messenger_support is not None:
+        held[2] += (line.messenger_support.stiffness * (mesh.seat - state.positions[mesh.sprung, 2])).sum()
+    total = weight(state.matrices)
+    mass = GRAVITY * M.diagonal().reshape(-1, NODE_DOFS)[:, 2].sum()
+    assert total > mass > 0.5 * total  # a consistent mass has the rest beside its diagonal
+    assert held == pytest.approx([0.0, 0.0, total], abs=1e-6 * total)
+
+
+def test_weight_is_that_of_the_parts(found):
+    line, mesh, state = found
+    per_length = np.array([getattr(getattr(line, c), "mass", 0.0) for c in COMPONENTS])
+    start, end = (state.points[mesh.beams[:, k]] for k in (0, 1))
+    wires = per_length[mesh.component] @ np.linalg.norm(end - start, axis=1)
+    hung = np.where(mesh.is_hanger, getattr(line.hanger, "mass", 0.0), line.dropper.mass)
+    parts = wires + hung @ dropper_lengths(mesh, state.points) + mesh.clamp_mass.sum()
+    assert weight(state.matrices) == pytest.approx(GRAVITY * parts, rel=1e-6)
+
+
+def test_wires_stand_at_the_wanted_heights(found):
+    _, mesh, state = found
+    assert np.abs(state.positions[mesh.droppers[:, 0], 2] - mesh.target).max() < 1e-4
+
+
+def test_every_dropper_is_in_tension(found):
+    _, mesh, state = found
+    assert state.dropper_force.min() > 10.0
+    assert state.unstrained_length.min() > 0.0
+    stiffness = dropper_stiffness(found[0], mesh, state.points)
+    assert stiffness * (state.dropper_length - state.unstrained_length) == pytest.approx(state.dropper_force, rel=1e-6)
+
+
+def test_wires_keep_the_tension_that_they_are_strung_with(found):
+    """Not so, were the tension of the messenger wire the same on both sides of a stitch wire's clamp."""
+    line, mesh, state = found
+    stretch = np.abs(state.displacement.reshape(-1, NODE_DOFS)[:, 0]).max()
+    assert stretch < 1e-4
+    for chain in mesh.chains:
+        wire = getattr(line, chain.component)
+        points, move = state.points[chain.nodes], state.displacement.reshape(-1, NODE_DOFS)[chain.nodes, :3]
+        along = np.diff(points, axis=0)
+        strain = np.einsum("ij,ij->i", along, np.diff(move, axis=0)) / (along**2).sum(axis=1)
+        assert np.abs(wire.youngs_modulus * wire.area * strain).max() < 0.01 * wire.tension
+
+
+def test_a_regular_span_is_symmetric(found):
+    line, mesh, state = found
+    spans = line.sections[0].spans
+    span = next(s for s in spans[len(spans) // 2 :] if s.length == spans[len(spans) // 2].length)
+    x = mesh.points[mesh.droppers[:, 0], 0]
+    inside = (x > span.start) & (x < span.end) & ~mesh.is_hanger
+    force = state.dropper_force[inside][np.argsort(x[inside])]
+    assert force == pytest.approx(force[::-1], rel=2e-3)
+
+
+def test_compound_line_has_its_three_wires_at_their_heights():
+    line = load_line("Shinkansen")
+    mesh = build_mesh(line)
+    state = find_form(line, mesh)
+    z = state.positions[:, 2]
+    working = (mesh.points[:, 0] > 200.0) & (mesh.points[:, 0] < 1000.0)
+    lower = mesh.droppers[:, 0]
+    contact, auxiliary = (lower[working[lower] & (mesh.is_hanger == h)] for h in (False, True))
+    assert z[contact] == pytest.approx(np.full(len(contact), 5.0), abs=1e-4)
+    assert z[auxiliary] == pytest.approx(np.full(len(auxiliary), 5.25), abs=1e-4)
+    supports = mesh.sprung[working[mesh.sprung]]
+    assert z[supports] == pytest.approx(np.full(len(supports), 6.5), abs=1e-4)
+
+
+def test_dropper_lengths_of_EN_50318_2018():
+    """AC simple: the standard's lengths within 4 mm."""
+    line = load_line("EN50318_2018_AC_simple")
+    mesh = build_mesh(line)
+    state = find_form(line, mesh)
+    x = mesh.points[mesh.droppers[:, 0], 0]
+    inside = (x > 550.0) & (x < 605.0)
+    given = [1.017, 0.896, 0.810, 0.758, 0.741, 0.758, 0.810, 0.896, 1.017]
+    assert state.unstrained_length[inside] == pytest.approx(given, abs=4e-3)
+
+
+def test_dropper_lengths_of_LN2():
+    """Lengths printed 1.25 to 1.075 m (Table 5.2), independently found 1.27 to 1.06 m."""
+    line = load_line("LN2")
+    mesh = build_mesh(line)
+    state = find_form(line, mesh)
+    x = mesh.points[mesh.droppers[:, 0], 0]
+    inside = (x > 501.7) & (x < 551.2)
+    assert state.unstrained_length[inside].max() == pytest.approx(1.27, abs=0.01)
+    assert state.unstrained_length[inside].min() == pytest.approx(1.06, abs=0.01)
+
+
+def test_stitch_wire_carries_its_droppers_like_a_string():
+    """Slope change at a dropper times the stitch wire's tension is the dropper's force and what hangs there."""
+    fine = 24
+    line = load_line("Re330").with_values({"mesh.elements_between_droppers": fine})
+    mesh = build_mesh(line)
+    state = find_form(line, mesh)
+    stitch = [c for c in mesh.chains if c.component == "stitch_wire"][6]
+    x, _, z = state.positions[stitch.nodes].T
+    middles = [fine // 2, fine + fine // 2]  # away from the dropper and from the clamp, where bending rounds the kinks
+    slopes = [(z[i + 1] - z[i]) / (x[i + 1] - x[i]) for i in middles]
+    force = state.dropper_force[np.isin(mesh.droppers[:, 1], stitch.nodes)]
+    wire = (x[middles[1]] - x[middles[0]]) * line.stitch_wire.mass * GRAVITY
+    hung = GRAVITY * (line.clamps.dropper_upper + 0.5 * line.dropper.mass * state.dropper_length.mean())
+    assert line.stitch_wire.tension * (slopes[1] - slopes[0]) == pytest.approx(force[0] + wire + hung, rel=5e-3)
+
+
+@pytest.mark.parametrize("name", ["LN2", "Re330", "Shinkansen", "EN50318_2018_AC_simple"])
+def test_given_lengths_reproduce_the_profile_that_they_were_found_for(name):
+    line = load_line(name)
+    mesh = build_mesh(line)
+    state = find_form(line, mesh)
+    again = find_form(line, dataclasses.replace(mesh, given_length=state.unstrained_length))
+    assert again.positions == pytest.approx(state.positions, abs=1e-6)
+    assert again.dropper_force == pytest.approx(state.dropper_force, abs=1e-3)
+
+
+def with_lengths(line, *lengths):
+    """Return a line whose spans have droppers of given lengths, the last given repeated."""
+    section = line.sections[0]
+    wanted = [*lengths, *([lengths[-1]] * (len(section.spans) - len(lengths)))]
+    spans = tuple(dataclasses.replace(s, dropper_lengths=d) for s, d in zip(section.spans, wanted, strict=True))
+    return dataclasses.replace(line, sections=(dataclasses.replace(section, spans=spans),))
+
+
+def test_longer_droppers_lower_the_wire(short_line):
+    lines = [with_lengths(short_line, (length,) * 7) for length in (1.10, 1.15)]
+    states = [find_form(line, build_mesh(line)) for line in lines]
+    lower = build_mesh(lines[0]).droppers[:, 0]
+    inner = np.abs(states[0].points[lower, 0] - 150.0) < 40.0
+    drop = (states[0].positions - states[1].positions)[lower[inner], 2]
+    assert drop == pytest.approx(np.full(inner.sum(), 0.05), abs=1e-3)
+
+
+def test_a_dropper_much_too_long_hangs_slack_and_stays_so(short_line):
+    mesh = build_mesh(short_line)
+    lengths = find_form(short_line, mesh).unstrained_length.copy()
+    middle = len(lengths) // 2
+    lengths[middle] += 0.1
+    state = find_form(short_line, dataclasses.replace(mesh, given_length=lengths))
+    assert state.dropper_force[middle] == 0.0
+    assert state.elastic_force[middle] < 0.0
+    assert (np.delete(state.dropper_force, middle) > 0.0).all()
+    assert state.residual < 1e-6
+
+
+def test_a_line_with_a_slack_dropper_is_at_rest(short_line):
+    regular = (1.25, 1.15, 1.09, 1.07, 1.09, 1.15, 1.25)
+    model = CatenaryModel(with_lengths(short_line, regular, regular, (*regular[:3], 1.17, *regular[4:]), regular))
+    state = model.initial_state()
+    assert state.slack.size == 1
+    for _ in range(3):
+        model.step(state, 1e-3, StripMotion(np.full((1, 2, 2, 3), -100.0), np.zeros(1)))
+    assert np.abs(state.displacement).max() < 1e-9
+    assert model.dropper_force(state) == pytest.approx(model.static.dropper_force, abs=1e-6)
+
+
+def test_too_much_pre_sag_makes_droppers_push(short_line):
+    line = short_line.with_values({"profile.pre_sag": 0.009})
+    mesh = build_mesh(line)
+    with pytest.raises(EquilibriumError, match="would have to push"):
+        find_form(line, mesh)

@@ -1,0 +1,213 @@
+"""Definition files: what they may say, and that every mistake in them is reported at once."""
+
+import tomllib
+
+import pytest
+
+import models.library
+from models.catenary.parameters import Rayleigh, load, read
+from models.definition import DefinitionError, Table
+from models.library import line_names, line_path, load_line
+from models.part import ParameterError
+
+SOURCE = "test"
+
+
+def definition_of(name: str, **changes: object) -> dict:
+    data = tomllib.loads(line_path(name).read_text(encoding="utf-8"))
+    for dotted, value in changes.items():
+        *path, key = dotted.split("__")
+        table = data
+        for part in path:
+            table = table.setdefault(part, {})
+        if value is None:
+            del table[key]
+        else:
+            table[key] = value
+    return data
+
+
+def problems(data: dict) -> dict[str, str]:
+    with pytest.raises(DefinitionError) as caught:
+        read(Table.from_dict(data, "line.toml"))
+    assert all(p.file == "line.toml" for p in caught.value.problems)
+    texts = [str(p) for p in caught.value.problems]
+    assert len(texts) == len(set(texts)), "a mistake is told once"
+    return {p.key: p.text for p in caught.value.problems}
+
+
+def test_values_come_in_SI_with_their_sources():
+    line = load_line("C270")
+    assert line.contact_wire.area == pytest.approx(150e-6)
+    assert line.steady_arm.angle == pytest.approx(-0.19199, abs=1e-5)
+    assert line.provenance["contact_wire.tension"].source == "Table 5.3"
+    assert line.provenance["profile.encumbrance"].is_choice
+    assert len(line.sections[0].spans) == 25
+
+
+def test_damping_by_component_type():
+    damping = load_line("Re330").damping
+    assert damping.of("contact_wire") == Rayleigh(7.5e-7, 0.0)
+    assert damping.of("steady_arm") == Rayleigh(1.0, 0.0)
+    assert load_line("C270").damping.of("steady_arm") == Rayleigh(0.0272, 0.0)
+
+
+def test_every_mistake_is_told_at_once_with_key_and_value():
+    found = problems(
+        definition_of(
+            "LN2",
+            contact_wire__tension=[-20000, "N", SOURCE],
+            messenger_wire__area=[65.5, "kg", SOURCE],
+            contact_wire__colour="red",
+            spans__end=[1140.0, "m", SOURCE],
+            steady_arm__length=None,
+            damping=None,
+            clamps__steady_arm=[0.2, "kg", " "],
+            contact__exponent=["one", "1", SOURCE],
+        )
+    )
+    assert "-20000 N must be greater than 0" in found["contact_wire.tension"]
+    assert "'kg'" in found["messenger_wire.area"]
+    assert "unknown key" in found["contact_wire.colour"]
+    assert "1136.9" in found["spans.end"]
+    assert "1140" in found["spans.end"]
+    assert "missing" in found["steady_arm.length"]
+    assert "missing" in found["damping"]
+    assert "source" in found["clamps.steady_arm"]
+    assert "'one'" in found["contact.exponent"]
+    assert len(found) == 8
+
+
+def test_dropper_outside_its_span():
+    listed = [{"span": 3, "positions": [[4.5, 20.0, 46.0], "m", SOURCE]}]
+    found = problems(definition_of("LN2", spans__listed=listed))
+    assert found == {"spans.listed[1].positions": "dropper at 46 m lies outside its span, number 3 of 45.3 m"}
+
+
+def test_a_rule_that_leaves_the_span_is_told_once_for_every_length():
+    found = problems(definition_of("C270", spans__droppers__first=[30.0, "m", SOURCE]))
+    assert list(found) == ["spans.droppers.first"]
+    assert "rising order" in found["spans.droppers.first"]
+
+
+def test_spacing_that_does_not_fit():
+    found = problems(definition_of("EN50318_2018_AC_simple", spans__droppers__spacing=[6.0, "m", SOURCE]))
+    assert found == {"spans.droppers.spacing": "droppers from 4.5 m every 6 m do not fit a span of 55 m"}
+
+
+def test_listed_spans_must_exist_and_only_once():
+    positions = [[4.5, 20.0, 40.0], "m", SOURCE]
+    listed = [{"span": 30, "positions": positions}, {"span": 2, "positions": positions}]
+    listed.append({"span": 2, "positions": positions})
+    found = problems(definition_of("LN2", spans__listed=listed))
+    assert found["spans.listed[1].span"] == "there is no span 30: the line has 24"
+    assert found["spans.listed[3].span"] == "span 2 is listed twice"
+    assert len(found) == 2
+
+
+def test_spans_without_droppers_need_a_rule():
+    found = problems(definition_of("LN2", spans__droppers=None))
+    assert "spans.droppers" in found
+
+
+def test_lengths_fit_the_droppers():
+    found = problems(definition_of("LN2", spans__droppers__lengths=[[1.2, 1.1], "m", SOURCE]))
+    assert "2 lengths for the 7 droppers" in found["spans.droppers.lengths"]
+
+
+def test_lengths_and_measured_heights_exclude_each_other():
+    data = definition_of("LN2", spans__droppers__lengths=[1.2, "m", SOURCE])
+    data["measured"] = {"positions": [[-3.1, 1136.9], "m", SOURCE], "heights": [[5.08, 5.08], "m", SOURCE]}
+    assert "lengths" in problems(data)["measured"]
+
+
+def test_listed_droppers_replace_the_rule_and_keep_their_lengths():
+    listed = [{"span": 3, "positions": [[5.0, 20.0, 40.0], "m", SOURCE], "lengths": [[1.2, 1.1, 1.2], "m", SOURCE]}]
+    line = read(Table.from_dict(definition_of("LN2", spans__listed=listed)))
+    span = line.sections[0].spans[2]
+    assert span.droppers == pytest.approx([span.start + 5.0, span.start + 20.0, span.start + 40.0])
+    assert span.dropper_lengths == (1.2, 1.1, 1.2)
+    assert line.sections[0].spans[3].dropper_lengths == ()
+
+
+def test_one_length_for_all_droppers():
+    line = read(Table.from_dict(definition_of("LN2", spans__droppers__lengths=[110, "cm", SOURCE])))
+    assert line.sections[0].spans[0].dropper_lengths == pytest.approx((1.1,) * 7)
+
+
+@pytest.mark.parametrize(
+    ("name", "missing", "key"),
+    [
+        ("Re330", "stitch_wire", "stitch_wire"),
+        ("Shinkansen", "auxiliary_wire", "auxiliary_wire"),
+        ("Shinkansen", "hanger", "hanger"),
+    ],
+)
+def test_a_type_needs_its_wires(name, missing, key):
+    assert key in problems(definition_of(name, **{missing: None}))
+
+
+def test_wires_of_another_type_are_mistakes():
+    stitch = definition_of("Re330")["stitch_wire"]
+    assert "stitch_wire" in problems(definition_of("LN2", stitch_wire=stitch))
+
+
+def test_stitch_wires_fit_between_the_supports():
+    found = problems(definition_of("Re330", stitch_wire__length=[60.0, "m", SOURCE]))
+    assert "overlap" in found["stitch_wire.length"]
+    found = problems(definition_of("Re330", stitch_wire__length=[8.0, "m", SOURCE]))
+    assert "no dropper" in found["stitch_wire.length"]
+    found = problems(definition_of("Re330", stitch_wire__tension=[21.0, "kN", SOURCE]))
+    assert "messenger" in found["stitch_wire.tension"]
+
+
+def test_auxiliary_wire_lies_below_the_messenger_wire():
+    found = problems(definition_of("Shinkansen", profile__auxiliary_height=[1.6, "m", SOURCE]))
+    assert "encumbrance" in found["profile.auxiliary_height"]
+
+
+def test_measured_heights_cover_the_line():
+    data = definition_of("LN2")
+    data["measured"] = {"positions": [[0.0, 1136.9], "m", SOURCE], "heights": [[5.08, 5.08], "m", SOURCE]}
+    assert "must reach from -3.1 m" in problems(data)["measured.positions"]
+
+
+def test_unreadable_files(tmp_path):
+    with pytest.raises(DefinitionError, match="cannot be read"):
+        load(tmp_path / "none.toml")
+    bad = tmp_path / "bad.toml"
+    bad.write_text("name = \n", encoding="utf-8")
+    with pytest.raises(DefinitionError, match="line 1"):
+        load(bad)
+    bad.write_bytes(b"name = '\xff'")
+    with pytest.raises(DefinitionError, match="UTF-8"):
+        load(bad)
+
+
+def test_an_empty_file_names_every_missing_table():
+    found = problems({})
+    tables = {"profile", "spans", "stagger", "ends", "contact_wire", "messenger_wire", "dropper", "damping"}
+    assert tables | {"type", "name"} <= set(found)
+
+
+def test_parameters_can_be_changed_within_their_range():
+    line = load_line("Re330")
+    changed = line.with_values({"stitch_wire.tension": 3000.0, "damping.contact_wire.alpha": 1e-6})
+    assert changed.stitch_wire.tension == 3000.0
+    assert changed.damping.of("contact_wire").alpha == 1e-6
+    assert line.stitch_wire.tension == 3500.0
+    with pytest.raises(ParameterError, match="must be greater than 0"):
+        line.with_values({"contact_wire.tension": -1.0})
+    with pytest.raises(ParameterError, match="none of this name"):
+        line.with_values({"contact_wire.colour": 1.0})
+
+
+@pytest.mark.parametrize("name", line_names())
+def test_changing_every_parameter_to_its_own_value_changes_nothing(name):
+    line = load_line(name)
+    assert line.with_values({p.name: p.value for p in line.parameters()}) == line
+
+
+def test_unknown_lines_are_told_with_the_known_ones():
+    with pytest.raises(models.library.UnknownNameError, match="Re330"):
+        load_line("LN7")

@@ -6,7 +6,7 @@ To add one, write a class with ``name`` and ``step`` and put it into `make_algor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, Protocol
 
 import numpy as np
@@ -35,8 +35,25 @@ class Algorithm(Protocol):
         ``network.inputs`` holds what the slaves were told for this step.
         """
 
+    def memory(self) -> FloatArray:
+        """Return what it remembers from step to step, as a flat array."""
 
-class Jacobi:
+    def recall(self, memory: FloatArray) -> None:
+        """Take such a memory back."""
+
+
+class _Forgetful:
+    """A scheme that remembers nothing from step to step."""
+
+    def memory(self) -> FloatArray:
+        """See `Algorithm.memory`."""
+        return np.zeros(0)
+
+    def recall(self, memory: FloatArray) -> None:
+        """See `Algorithm.recall`."""
+
+
+class Jacobi(_Forgetful):
     """All slaves step with the outputs of the beginning of the step; order does not matter."""
 
     name = "jacobi"
@@ -50,7 +67,7 @@ class Jacobi:
         network.read()
 
 
-class GaussSeidel:
+class GaussSeidel(_Forgetful):
     """Slaves step one after the other, each told the latest outputs, also those of the step's end.
 
     Parameters
@@ -115,6 +132,14 @@ class Iterative:
             for slave, state in zip(network.slaves, states, strict=True):
                 slave.release(state)
 
+    def memory(self) -> FloatArray:
+        """See `Algorithm.memory`."""
+        return np.zeros(0) if self._scale is None else self._scale.copy()
+
+    def recall(self, memory: FloatArray) -> None:
+        """See `Algorithm.recall`."""
+        self._scale = memory.copy() if len(memory) else None
+
     def _iterate(self, network: Network, states: Sequence[object], time: float, step: float) -> None:
         start = network.outputs.copy()
         end = start.copy()
@@ -157,8 +182,16 @@ def make_algorithm(coupling: Coupling) -> Algorithm:
     return Iterative(coupling.tolerance, coupling.max_iterations, coupling.weight)
 
 
-def initialise(network: Network, start: float, stop: float) -> int:
+def initialise(network: Network, start: float, stop: float, starts: Mapping[str, float] | None = None) -> int:
     """Start the slaves and exchange values until they are consistent; returns the number of exchanges.
+
+    Parameters
+    ----------
+    network : Network
+    start, stop : float
+        Start and stop time [s].
+    starts : mapping, optional
+        Other start times [s] by the names of slaves.
 
     Raises
     ------
@@ -166,7 +199,7 @@ def initialise(network: Network, start: float, stop: float) -> int:
         If the values have not settled after `MAX_INITIAL_EXCHANGES` exchanges.
     """
     for slave in network.slaves:
-        slave.start(start, stop)
+        slave.start((starts or {}).get(slave.name, start), stop)
     network.read()
     exchanges = _settle(network)
     for slave in network.slaves:

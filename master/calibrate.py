@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -70,6 +70,51 @@ def find_value(
         value = _first_step(trials[0], target, guess) if len(trials) == 1 else _next(trials, target)
         trials.append(Trial(value, function(value)))
     return Found(trials[-1].value, trials[-1].result, tuple(trials))
+
+
+def find_values(
+    function: Callable[[tuple[float, ...]], tuple[float, ...]],
+    target: float,
+    starts: Sequence[float],
+    tolerance: float,
+) -> tuple[Found, ...]:
+    """Find the values at which every result of ``function`` is ``target``, all of them in the same runs.
+
+    Each result must depend mainly on the value in the same place: every value takes its own secant steps.
+
+    Parameters
+    ----------
+    function : callable
+        Values -> as many results; each call is a whole run.
+    target, tolerance : float
+        Wanted result and how near is near enough.
+    starts : sequence of float
+        First values tried.
+
+    Raises
+    ------
+    MasterError
+        If they are not found within `MAX_RUNS` runs, or a result does not depend on its value.
+    """
+    values = tuple(starts)
+    trials: list[list[Trial]] = [[] for _ in values]
+    for _ in range(MAX_RUNS):
+        for own, value, result in zip(trials, values, function(values), strict=True):
+            own.append(Trial(value, result))
+        if all(abs(own[-1].result - target) <= tolerance for own in trials):
+            return tuple(Found(own[-1].value, own[-1].result, tuple(own)) for own in trials)
+        values = tuple(_next_of_several(own, target, tolerance) for own in trials)
+    last = ", ".join(f"{own[-1].value:g} giving {own[-1].result:g}" for own in trials)
+    raise MasterError(f"no values found after {MAX_RUNS} runs; the last were {last}; widen the tolerance")
+
+
+def _next_of_several(trials: list[Trial], target: float, tolerance: float) -> float:
+    """Return the next value; a good one stays, and runs in which only the others changed tell nothing."""
+    last = trials[-1]
+    if abs(last.result - target) <= 0.5 * tolerance:
+        return last.value
+    others = [t for t in trials if t.value != last.value]
+    return _next([*others, last], target) if others else _first_step(last, target, None)
 
 
 def _first_step(first: Trial, target: float, guess: float | None) -> float:

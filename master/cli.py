@@ -6,21 +6,21 @@ Exit codes: 0 done, 1 the run failed or the scenario is invalid, 2 the command l
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
 
-from master import calibrate, report, results
-from master.compare import Comparison, compare
-from master.errors import MasterError, Problem, ScenarioError, UsageError
+from master import calibrate, checkpoint, export, report, results
+from master.checkpoint import Continuation
+from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
 from master.progress import ProgressObserver
+from master.report import commands
 from master.results import Results
 from master.run import run
 from master.scenario import Overrides, find_parameter, open_scenario
@@ -29,9 +29,11 @@ from master.ssp.archive import SSD_NAME, Package
 from master.ssp.pack import pack
 from master.ssp.ssd import read_structure
 from master.ssp.xml import Reader
+from master.study import command as study_command
 from master.system import System
+from master.verify import command as verify_command
 
-VERBS: Final = ("run", "pack", "validate", "compare", "report", "calibrate")
+VERBS: Final = ("run", "pack", "validate", "compare", "report", "calibrate", "verify", "study")
 _WIDTH: Final = 80
 
 
@@ -73,13 +75,11 @@ def _parser() -> argparse.ArgumentParser:
     _add(verbs, "validate", "check a scenario without running it", _validate, scenario=True)
     packing = _add(verbs, "pack", "write a scenario as a .ssp archive, FMUs included", _pack, scenario=True)
     packing.add_argument("--out", type=Path, metavar="FILE", help="default: dist/NAME.ssp")
-    comparing = _add(verbs, "compare", "two runs side by side", _compare)
-    comparing.add_argument("first", type=Path, metavar="RUN", help="results folder")
-    comparing.add_argument("second", type=Path, metavar="RUN", help="results folder")
-    comparing.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    reporting = _add(verbs, "report", "write plots and report of a run again", _report)
-    reporting.add_argument("run", type=Path, metavar="RUN", help="results folder")
+    commands.add_compare_arguments(_add(verbs, "compare", commands.COMPARE_HELP, commands.run_compare))
+    commands.add_report_arguments(_add(verbs, "report", commands.REPORT_HELP, commands.run_report))
     _add_calibrate(verbs)
+    verify_command.add_arguments(_add(verbs, "verify", verify_command.HELP, verify_command.run))
+    study_command.add_arguments(_add(verbs, "study", study_command.HELP, study_command.run))
     return parser
 
 
@@ -99,6 +99,12 @@ def _add_run(verbs: Any) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress bar, no tables")
     parser.add_argument("--no-report", action="store_true", help="no plots, no report.html")
     parser.add_argument("--json", action="store_true", help="print summary.json instead of tables")
+    parser.add_argument("--checkpoint", type=_number, metavar="T", help="write the whole state at time T to DIR")
+    parser.add_argument("--resume", type=Path, metavar="FILE", help="go on from a checkpoint instead of the start")
+    parser.add_argument(
+        "--renew", action="append", default=[], metavar="COMPONENT", help="with --resume: this component starts anew"
+    )
+    parser.add_argument("--parquet", action="store_true", help="write the time series as Parquet too")
 
 
 def _add_overrides(parser: argparse.ArgumentParser) -> None:
@@ -163,9 +169,16 @@ def _run(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, _overrides(options), tell, not options.no_build) as scenario:
         folder = options.out or Path("results") / scenario.system.name
         _protect(folder, scenario.package)
-        done = _run_shown(scenario.system, folder, options.quiet)
+        try:
+            done = _run_shown(scenario.system, folder, options.quiet, options.checkpoint, _continuation(options))
+        except RunError:
+            if not options.no_report:
+                commands.report_what_there_is(folder)
+            raise
     if not options.no_report:
         report.write(done)
+    if options.parquet:
+        export.write_parquet(folder)
     if options.json:
         print((folder / results.SUMMARY).read_text(encoding="utf-8"), end="")
     elif not options.quiet:
@@ -180,12 +193,26 @@ def _protect(folder: Path, package: Package) -> None:
         )
 
 
-def _run_shown(system: System, folder: Path, quiet: bool) -> Results:
+def _continuation(options: argparse.Namespace) -> Continuation | None:
+    if options.resume is not None:
+        return Continuation(checkpoint.read(options.resume), str(options.resume), tuple(options.renew))
+    if options.renew:
+        raise UsageError("--renew says what a run does not take from its checkpoint; it needs --resume FILE")
+    return None
+
+
+def _run_shown(
+    system: System,
+    folder: Path,
+    quiet: bool,
+    save_at: float | None = None,
+    continuation: Continuation | None = None,
+) -> Results:
     if quiet:
-        return run(system, folder)
+        return run(system, folder, (), save_at, continuation)
     progress = ProgressObserver(Console(stderr=True), system.start, system.stop)
     try:
-        return run(system, folder, [progress])
+        return run(system, folder, [progress], save_at, continuation)
     finally:
         progress.finish()
 
@@ -202,6 +229,8 @@ def _show(done: Results) -> None:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
     if line := report.uplift_line(done):
         console.print(line)
+    for following in done.followings:
+        console.print(following.sentence, markup=False, soft_wrap=True)
     for line in _closing_lines(done):
         console.print(line, markup=False, soft_wrap=True)
 
@@ -236,35 +265,6 @@ def _pack(options: argparse.Namespace) -> int:
             raise UsageError(f"{archive} is a folder; choose another name with --out")
         print(pack(scenario.package.root, archive))
     return 0
-
-
-def _report(options: argparse.Namespace) -> int:
-    done = results.read(options.run)
-    assessments = done.assessments()
-    summary = {**done.summary, **results.figures(assessments, done.uplifts)}
-    results.write_json(done.folder / results.SUMMARY, summary)
-    print(report.write(replace(done, summary=summary)))
-    return 0
-
-
-def _compare(options: argparse.Namespace) -> int:
-    compared = compare(results.read(options.first), results.read(options.second))
-    if options.json:
-        print(json.dumps([_comparison(c) for c in compared], indent=1))
-        return 0
-    console = Console(width=_WIDTH, highlight=False)
-    for c in compared:
-        console.print(report.figures_table([c.first.quality, c.second.quality], ["first", "second"]))
-        if c.rms is not None and c.largest is not None:
-            console.print(f"0-20 Hz forces differ by {c.rms:.3g} N (rms), {c.largest:.3g} N (largest)")
-    return 0
-
-
-def _comparison(c: Comparison) -> Mapping[str, Any]:
-    names = ("mean", "sigma", "minimum", "maximum")
-    one, two = c.first.quality, c.second.quality
-    difference = {n: getattr(two, n) - getattr(one, n) for n in names}
-    return {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
 
 
 def _calibrate(options: argparse.Namespace) -> int:

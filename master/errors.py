@@ -52,5 +52,9 @@ class RunError(MasterError):
     """A run that stopped before its end; what was computed is on disk."""
 
 
+class InterruptedRunError(RunError):
+    """A run that the user stopped."""
+
+
 class UsageError(MasterError):
     """A wrong command line."""

@@ -35,6 +35,7 @@ def read_fmu(path: Path) -> Fmu:
         can_restore=bool(description.coSimulation.canGetAndSetFMUstate),
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         tool=description.generationTool or "",
+        can_serialise=bool(description.coSimulation.canSerializeFMUstate),
     )
 
 
@@ -50,6 +51,7 @@ def _variable(v: Any) -> Variable:
         start=v.start,
         minimum=_number(v.min),
         maximum=_number(v.max),
+        description=v.description or "",
     )
 
 

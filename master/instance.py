@@ -10,7 +10,8 @@ import ctypes
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
-from ctypes import byref, c_double, c_int, c_uint, c_void_p
+from ctypes import byref, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
+from time import perf_counter
 from typing import Any, Final
 
 import fmpy
@@ -70,6 +71,11 @@ class Instance:
     component : Component
         What to load.
 
+    Attributes
+    ----------
+    stepping_time : float
+        Wall time spent in steps so far [s].
+
     Raises
     ------
     SlaveError
@@ -82,6 +88,7 @@ class Instance:
         self.input_names = component.inputs
         self.output_names = component.outputs
         self.time = float("nan")
+        self.stepping_time = 0.0
         self._dead = False
         fmi_log.clear(self.name)
         self._folder = tempfile.mkdtemp(prefix="fmu-")
@@ -125,7 +132,9 @@ class Instance:
     def step(self, time: float, step: float) -> None:
         """Advance from ``time`` to ``time + step``."""
         self.time = time
+        began = perf_counter()
         status = self._do_step(self.handle, time, step, 1)
+        self.stepping_time += perf_counter() - began
         if status > _WARNING:
             raise self.error("a step", status)
 
@@ -142,6 +151,27 @@ class Instance:
     def release(self, state: c_void_p) -> None:
         """Free a saved state."""
         self._call("freeing a state", "fmi2FreeFMUstate", byref(state))
+
+    def serialise(self) -> bytes:
+        """Return the state as bytes."""
+        state, size = self.save(), c_size_t()
+        try:
+            self._call("serialising its state", "fmi2SerializedFMUstateSize", state, byref(size))
+            data = (c_char * size.value)()
+            self._call("serialising its state", "fmi2SerializeFMUstate", state, data, size.value)
+            return data.raw
+        finally:
+            self.release(state)
+
+    def deserialise(self, data: bytes) -> None:
+        """Return to a state given as bytes."""
+        state = c_void_p()
+        buffer = (c_char * len(data)).from_buffer_copy(data)
+        self._call("reading a state", "fmi2DeSerializeFMUstate", buffer, len(data), byref(state))
+        try:
+            self.restore(state)
+        finally:
+            self.release(state)
 
     def remark(self) -> str:
         """Return the FMU's last warning or error message."""

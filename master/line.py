@@ -32,6 +32,8 @@ class Uplift:
         Number of the support.
     x : float, optional
         Its position along the track [m], if the FMU says it.
+    section : int, optional
+        The section that it belongs to, if the line has several.
     maximum : float
         Largest uplift [m].
     time : float
@@ -43,6 +45,13 @@ class Uplift:
     x: float | None
     maximum: float
     time: float
+    section: int | None = None
+
+    @property
+    def place(self) -> str:
+        """Where it stands, short and unambiguous, for tables and legends."""
+        where = f"{self.x:.0f} m" if self.x is not None else f"support {self.support}"
+        return where if self.section is None else f"{where} (section {self.section})"
 
 
 class GeometryObserver:
@@ -84,6 +93,24 @@ def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:
     return np.array([found[i] for i in sorted(found)])
 
 
+def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:
+    """Return the static geometry of each section of a line; a line of one section as it is.
+
+    Examples
+    --------
+    >>> two = {"support[1].x": 0.0, "support[1].section": 1.0, "support[2].x": 5.0, "support[2].section": 2.0}
+    >>> [indexed(one, "support", "x").tolist() for one in by_section(two)]
+    [[0.0], [5.0]]
+    """
+    owner = {(m[1], m[2]): v for k, v in geometry.items() if (m := _INDEXED.fullmatch(k)) and m[3] == "section"}
+    if not owner:
+        return (dict(geometry),)
+    return tuple(
+        {k: v for k, v in geometry.items() if (m := _INDEXED.fullmatch(k)) and owner.get((m[1], m[2])) == section}
+        for section in sorted(set(owner.values()))
+    )
+
+
 def support_uplifts(recordings: tuple[Recording, ...], geometry: Geometry) -> tuple[Uplift, ...]:
     """Return the largest uplift of every support that is recorded, in the order of the supports."""
     found = [
@@ -100,5 +127,9 @@ def _uplift(recording: Recording, full: str, geometry: Geometry) -> Uplift:
     number = int(name.partition("]")[0])
     values = recording[full]
     peak = int(np.argmax(values))
-    x = geometry.get(component, {}).get(f"support[{number}].x")
-    return Uplift(component, number, x, float(values[peak]), float(recording.time[peak]))
+    known = geometry.get(component, {})
+    x, section = known.get(f"support[{number}].x"), known.get(f"support[{number}].section")
+    peak_time = float(recording.time[peak])
+    return Uplift(
+        component, number, x, float(values[peak]), peak_time, None if section is None else round(section)
+    )

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
 from master.contacts import track_position
-from master.line import indexed
-from master.quality import low_pass
+from master.line import Uplift, by_section, indexed
+from master.quality import low_pass, settled
 from master.recorder import Recording
 from master.results import Results
 
@@ -42,7 +42,7 @@ def contact_force(results: Results) -> Figure | None:
     figure, rows = _figure(len(contacts), height=3.4)
     for i, (axes, contact) in enumerate(zip(rows, contacts, strict=True)):
         x, force = track_position(recording, contact), recording[contact.force]
-        filtered = low_pass(force, _step(recording))
+        filtered = np.where(settled(force, _step(recording)), low_pass(force, _step(recording)), np.nan)
         _mark_line(axes, results, contact.catenary, (float(x.min()), float(x.max())))
         axes.plot(x, force, color=_GREY, linewidth=0.6, label="raw")
         axes.plot(x, filtered, color=_COLOURS[i % len(_COLOURS)], linewidth=1.3, label="0-20 Hz")
@@ -59,12 +59,17 @@ def uplift(results: Results) -> Figure | None:
     if not uplifts:
         return None
     figure, (axes,) = _figure(1, height=3.0)
-    labels = [f"{u.x:.0f}" if u.x is not None else str(u.support) for u in uplifts]
+    labels = [_support_label(u) for u in uplifts]
     axes.bar(range(len(uplifts)), [1e3 * u.maximum for u in uplifts], color=_COLOURS[0], width=0.7)
     axes.set_xticks(range(len(uplifts)), labels, rotation=60, ha="right", fontsize=8)
     axes.set_xlabel("support at [m]" if uplifts[0].x is not None else "support number")
     axes.set_ylabel("largest uplift [mm]")
     return figure
+
+
+def _support_label(u: Uplift) -> str:
+    where = f"{u.x:.0f}" if u.x is not None else str(u.support)
+    return where if u.section is None else f"{where} ({u.section})"
 
 
 def uplift_history(results: Results, most: int = 8) -> Figure | None:
@@ -76,8 +81,7 @@ def uplift_history(results: Results, most: int = 8) -> Figure | None:
     for u in chosen[:: max(1, -(-len(chosen) // most))]:
         name = f"{u.component}.support[{u.support}].uplift"
         recording = next(r for r in results.recordings if name in r)
-        label = f"{u.x:.0f} m" if u.x is not None else f"support {u.support}"
-        axes.plot(recording.time, 1e3 * recording[name], linewidth=1.0, label=label)
+        axes.plot(recording.time, 1e3 * recording[name], linewidth=1.0, label=u.place)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("uplift [mm]")
     axes.legend(loc="upper left", ncols=2, frameon=False, fontsize=8)
@@ -104,14 +108,16 @@ def contact_height(results: Results) -> Figure | None:
 
 
 def geometry(values: dict[str, float]) -> Figure | None:
-    """Return static line geometry: elevation and plan."""
-    droppers = {n: indexed(values, "dropper", n) for n in ("x", "upper.z", "lower.z", "lower.y")}
-    supports = {n: indexed(values, "support", n) for n in ("x", "y", "z", "messenger_wire.z")}
-    if not len(supports["x"]) or not len(droppers["x"]):
+    """Return static line geometry: elevation and plan, of every section."""
+    if not len(indexed(values, "support", "x")) or not len(indexed(values, "dropper", "x")):
         return None
     figure, (elevation, plan) = _figure(2, height=2.6)
-    _draw_elevation(elevation, droppers, supports)
-    _draw_plan(plan, droppers, supports)
+    for section in by_section(values):
+        droppers = {n: indexed(section, "dropper", n) for n in ("x", "upper.z", "lower.z", "lower.y")}
+        supports = {n: indexed(section, "support", n) for n in ("x", "y", "z", "messenger_wire.z")}
+        _draw_elevation(elevation, droppers, supports)
+        _draw_plan(plan, droppers, supports)
+    _one_legend(elevation)
     plan.set_xlabel("track position [m]")
     return figure
 
@@ -130,7 +136,14 @@ def _draw_elevation(axes: Any, droppers: dict[str, FloatArray], supports: dict[s
         axes.plot(xs, zs, color=colour, linewidth=1.1, label=label)
     axes.plot(supports["x"], supports["z"], "v", color="black", markersize=4, label="support")
     axes.set_ylabel("height [m]")
-    axes.legend(loc="upper right", ncols=3, frameon=False, fontsize=8, bbox_to_anchor=(1.0, 1.18))
+
+
+def _one_legend(axes: Any) -> None:
+    """Draw the legend of the elevation, which names a thing once though every section has it."""
+    handles, labels = axes.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))
+    place = {"loc": "upper right", "bbox_to_anchor": (1.0, 1.18)}
+    axes.legend(list(named.values()), list(named), ncols=3, frameon=False, fontsize=8, **place)
 
 
 def _draw_plan(axes: Any, droppers: dict[str, FloatArray], supports: dict[str, FloatArray]) -> None:
@@ -193,8 +206,9 @@ def _force_range(
 ) -> tuple[float, float]:
     """Return limits that show the whole filtered force and the raw force of the interval."""
     inside = (x >= (interval[0] or -np.inf)) & (x <= (interval[1] or np.inf))
-    top = max(float(filtered.max()), float(force[inside].max(initial=0.0)), 1.0)
-    return min(0.0, float(filtered.min())), 1.05 * top
+    shown = filtered[np.isfinite(filtered)]
+    top = max(float(shown.max(initial=1.0)), float(force[inside].max(initial=0.0)))
+    return min(0.0, float(shown.min(initial=0.0))), 1.05 * top
 
 
 def _within(x: float | None, interval: tuple[float | None, float | None]) -> bool:

@@ -23,6 +23,8 @@ BANDS: Final = ((0.0, 2.0), (0.0, 5.0), (5.0, 20.0))
 SHORTEST_ARC: Final = 5e-3
 #: Time by which the record is continued on both sides before filtering [s].
 _PADDING: Final = 2.0
+#: Time after the first contact in which the filter rings visibly [s]: two periods of its cut-off.
+FILTER_REACH: Final = 2.0 / CUTOFF
 #: Half the width of the filter's edge [Hz].
 _HALF_EDGE: Final = 0.25
 
@@ -120,6 +122,28 @@ def low_pass(signal: FloatArray, step: float, cutoff: float = CUTOFF) -> FloatAr
     )
     filtered: FloatArray = (np.fft.irfft(spectrum, len(padded)) + line)[pad : pad + len(signal)]
     return filtered
+
+
+def settled(force: FloatArray, step: float) -> BoolArray:
+    """Return where the filtered force means something, shape (n,).
+
+    A record that begins without contact has a jump where contact is made, and a filter of 20 Hz rings on both
+    sides of it. What lies before the first contact plus `FILTER_REACH` is left out.
+
+    Examples
+    --------
+    >>> settled(np.array([0.0, 0.0, 9.0, 9.0, 9.0]), 0.05).tolist()
+    [False, False, False, False, True]
+    >>> settled(np.array([9.0, 0.0, 9.0]), 0.05).all()
+    np.True_
+    """
+    found = force > 0.0
+    if not found.any():
+        return np.zeros(len(force), dtype=np.bool_)
+    first = int(np.argmax(found))
+    if first:
+        first += round(FILTER_REACH / step)
+    return np.arange(len(force)) >= first
 
 
 def band_pass(signal: FloatArray, step: float, low: float, high: float) -> FloatArray:

@@ -20,13 +20,14 @@ from master.errors import MasterError
 from master.line import Geometry, Uplift, support_uplifts
 from master.quality import FILTER_NOTE, Criterion, Quality, assess, judge
 from master.recorder import Recording, load
+from master.trains import Following, followings
 
 GENERATOR: Final = "openpanto master"
 SUMMARY: Final = "summary.json"
 GEOMETRY: Final = "geometry.json"
 TIMESERIES: Final = "timeseries.csv"
 REPORT: Final = "report.html"
-_OURS: Final = ("timeseries*.csv", SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
+_OURS: Final = ("timeseries*.csv", "timeseries*.parquet", SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,12 @@ class Results:
     def assessments(self) -> tuple[Assessment, ...]:
         """Return figures and verdict of every contact that has samples in the interval."""
         return assess_contacts(self.recordings, self.contacts, self.interval, self.uplifts)
+
+    @property
+    def followings(self) -> tuple[Following, ...]:
+        """Every pantograph beside the one ahead of it."""
+        assessments = self.assessments()
+        return followings(self.recordings[0], assessments) if assessments else ()
 
 
 def assess_contacts(
@@ -164,9 +171,13 @@ def is_ours(folder: Path) -> bool:
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
     """Write a JSON file in one go: readers see the old one or the new one, never half of it."""
-    text = json.dumps(_finite(data), indent=1, ensure_ascii=False, allow_nan=False)
+    write_text(path, json.dumps(_finite(data), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file in one go."""
     temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text + "\n", encoding="utf-8")
+    temporary.write_text(text, encoding="utf-8")
     temporary.replace(path)
 
 
@@ -189,13 +200,16 @@ def read(folder: Path) -> Results:
     return Results(folder, summary, recordings, geometry)
 
 
-def figures(assessments: Sequence[Assessment], uplifts: Sequence[Uplift]) -> dict[str, Any]:
+def figures(
+    assessments: Sequence[Assessment], uplifts: Sequence[Uplift], following: Sequence[Following] = ()
+) -> dict[str, Any]:
     """Return the figures and verdicts for summary.json."""
     return {
         "filter": FILTER_NOTE,
         "quality": [
             {**asdict(a.quality), "criteria": [asdict(c) for c in a.criteria], "passed": a.passed} for a in assessments
         ],
+        "following": [asdict(f) for f in following],
         "uplift": [asdict(u) for u in uplifts],
     }
 

@@ -12,8 +12,10 @@ from typing import Any, Final
 
 from master import results
 from master.algorithm import make_algorithm
+from master.checkpoint import NAME as CHECKPOINT
+from master.checkpoint import CheckpointObserver, Continuation, index_at
 from master.contacts import Contact, find_contacts
-from master.errors import MasterError, RunError
+from master.errors import InterruptedRunError, MasterError, RunError
 from master.instance import Instance
 from master.interface import PowerObserver
 from master.line import GeometryObserver
@@ -52,7 +54,13 @@ class Timing:
     stepping: float
 
 
-def run(system: System, folder: Path, observers: Sequence[Observer] = ()) -> Results:
+def run(
+    system: System,
+    folder: Path,
+    observers: Sequence[Observer] = (),
+    checkpoint: float | None = None,
+    continuation: Continuation | None = None,
+) -> Results:
     """Run a system and leave its results in ``folder``.
 
     Parameters
@@ -63,26 +71,35 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = ()) -> Res
         Results folder; made, or emptied if it is ours.
     observers : sequence of Observer
         Further observers (progress).
+    checkpoint : float, optional
+        When the whole state is to be written to the folder [s].
+    continuation : Continuation, optional
+        Where the run goes on from, instead of its beginning.
 
     Raises
     ------
     RunError
         If the run stops before its end; what was computed is in the folder then.
+    UsageError
+        If checkpoint or continuation do not fit the system.
     """
+    save_at = None if checkpoint is None else index_at(system, checkpoint)
+    if continuation is not None:
+        continuation.check(system)
     results.prepare(folder)
     results.write_json(folder / results.SUMMARY, {**_description(system, ()), "status": "running"})
     with _failure_noted(system, folder), loaded(system) as network, interruptible() as stop_wanted:
-        session = _Session(system, network, folder)
-        outcome = simulate(
-            network,
-            make_algorithm(system.settings.coupling),
-            TimeGrid(system.start, system.step, system.step_count),
-            [*session.observers, *observers],
-            stop_wanted,
-        )
+        session = _Session(system, network, folder, continuation)
+        algorithm = make_algorithm(system.settings.coupling)
+        watchers = [*session.observers, *observers]
+        if save_at is not None:
+            watchers.append(CheckpointObserver(system, algorithm, folder / CHECKPOINT, save_at))
+        way_in = {} if continuation is None else {"prepare": continuation.prepare}
+        outcome = simulate(network, algorithm, session.grid, watchers, stop_wanted, **way_in)
     done = session.conclude(outcome)
     if outcome.status != "complete":
-        raise RunError(_what_happened(outcome, folder)) from outcome.error
+        kind = InterruptedRunError if outcome.status == "interrupted" else RunError
+        raise kind(_what_happened(outcome, folder)) from outcome.error
     return done
 
 
@@ -170,8 +187,14 @@ class Stopwatch:
 class _Session:
     """The observers of a run and what is made of them in the end."""
 
-    def __init__(self, system: System, network: Network, folder: Path) -> None:
+    def __init__(
+        self, system: System, network: Network, folder: Path, continuation: Continuation | None = None
+    ) -> None:
         self._system = system
+        self._continuation = continuation
+        whole = TimeGrid(system.start, system.step, system.step_count)
+        self.grid = whole if continuation is None else continuation.grid(system)
+        self._network = network
         self._folder = folder
         self._contacts = find_contacts(system.connections)
         self._plans = recording_plans(system)
@@ -194,14 +217,25 @@ class _Session:
         summary = {
             **description,
             **_ending(outcome),
-            **results.figures(done.assessments(), done.uplifts),
+            **_origin(self._continuation),
+            **results.figures(done.assessments(), done.uplifts, done.followings),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
-            "performance": _performance(self._stopwatch.timing, outcome.time - self._system.start),
+            "performance": {
+                **_performance(self._stopwatch.timing, outcome.time - self.grid.begin),
+                "component_time": {s.name: s.stepping_time for s in self._network.slaves if isinstance(s, Instance)},
+            },
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
         }
         results.write_json(self._folder / results.GEOMETRY, self._geometry.geometry)
         results.write_json(self._folder / results.SUMMARY, summary)
         return replace(done, summary=summary)
+
+
+def _origin(continuation: Continuation | None) -> dict[str, Any]:
+    if continuation is None:
+        return {}
+    c = continuation
+    return {"resumed": {"file": c.file, "time": c.checkpoint.time, "renewed": list(c.renewed)}}
 
 
 def _performance(timing: Timing, simulated: float) -> dict[str, float]:
@@ -257,6 +291,17 @@ def _component(component: Component) -> dict[str, Any]:
         "sha256": fmu.sha256,
         "tool": fmu.tool,
         "parameters": component.parameters,
+        "inputs": [_input(component, v) for v in fmu.variables.values() if v.causality == "parameter"],
+    }
+
+
+def _input(component: Component, variable: Variable) -> dict[str, Any]:
+    return {
+        "name": variable.name,
+        "value": component.parameters.get(variable.name, variable.start),
+        "unit": variable.unit,
+        "description": variable.description,
+        "changed": variable.name in component.parameters,
     }
 
 

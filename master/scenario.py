@@ -14,7 +14,7 @@ from master.errors import Problem, ScenarioError, UsageError
 from master.fmu_file import read_fmu
 from master.ssp.annotation import RunSettings, Scheme
 from master.ssp.archive import SSD_NAME, Package, inside, open_package
-from master.ssp.ssd import Component as SsdComponent
+from master.ssp.elements import Component as SsdComponent
 from master.ssp.ssd import Structure, read_structure
 from master.ssp.validation import Checker, out_of_range, settable
 from master.ssp.xml import Reader

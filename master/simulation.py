@@ -35,15 +35,21 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Communication points t_n = start + n step, never summed up."""
+    """Communication points t_n = start + n step, never summed up; a run goes from ``first`` to ``count``."""
 
     start: float
     step: float
     count: int
+    first: int = 0
 
     def time(self, index: int) -> float:
         """Return t_n."""
         return self.start + index * self.step
+
+    @property
+    def begin(self) -> float:
+        """Return the communication point that the run begins with."""
+        return self.time(self.first)
 
     @property
     def stop(self) -> float:
@@ -73,25 +79,30 @@ class Outcome:
     error: MasterError | None = None
 
 
+def _initialise(network: Network, _algorithm: Algorithm, grid: TimeGrid) -> None:
+    initialise(network, grid.start, grid.stop)
+
+
 def simulate(
     network: Network,
     algorithm: Algorithm,
     grid: TimeGrid,
     observers: Sequence[Observer] = (),
     stop_wanted: Callable[[], bool] = lambda: False,
+    prepare: Callable[[Network, Algorithm, TimeGrid], None] = _initialise,
 ) -> Outcome:
-    """Initialise and step the network over the grid.
+    """Initialise (or otherwise prepare) and step the network over the grid.
 
     A failure does not raise: it ends the run, and the outcome carries it, so that what was computed is kept.
     """
-    index = 0
+    index = grid.first
     try:
-        initialise(network, grid.start, grid.stop)
-        check_finite(network, grid.start, None)
+        prepare(network, algorithm, grid)
+        check_finite(network, grid.begin, None)
         for observer in observers:
-            observer.begin(grid.start, network)
+            observer.begin(grid.begin, network)
         previous = network.outputs.copy()
-        for index in range(grid.count):
+        for index in range(grid.first, grid.count):
             if stop_wanted():
                 return Outcome("interrupted", index, grid.time(index))
             _advance(network, algorithm, grid, index, observers, previous)

@@ -28,6 +28,7 @@ class Variable:
     start: str | None
     minimum: float | None
     maximum: float | None
+    description: str = ""
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Fmu:
         Declared variables by name.
     can_restore : bool
         Whether it can save and restore its state.
+    can_serialise : bool
+        Whether it can do so as bytes.
     sha256 : str
         Hash of the file.
     tool : str
@@ -57,6 +60,7 @@ class Fmu:
     can_restore: bool
     sha256: str
     tool: str
+    can_serialise: bool = False
 
 
 @dataclass(frozen=True)

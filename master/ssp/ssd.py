@@ -5,15 +5,18 @@ What the master does not honour is reported with its line, never skipped silentl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from master.ssp.annotation import Annotations, RunSettings, parse_annotations
 from master.ssp.archive import SSD_NAME, inside
+from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, SystemNode
+from master.ssp.flatten import flatten
+from master.ssp.ssm import Entry, apply, parse_mapping, parse_transformation, read_mapping_file
 from master.ssp.ssv import Parameter, ParameterSet, parse_parameter_set, read_parameter_file
-from master.ssp.units import Conversion, Unit, parse_units
-from master.ssp.xml import SSC, SSD, SSV, Reader, child, children, elements, tag
+from master.ssp.units import Unit, parse_units
+from master.ssp.xml import SSC, SSD, SSM, SSV, VERSIONS, Reader, child, children, elements, tag
 
 FMU_TYPES: Final = ("application/x-fmu-sharedlibrary",)
 CONNECTOR_TYPES: Final = ("Real", "Integer", "Boolean", "String", "Enumeration", "Binary")
@@ -22,50 +25,6 @@ TRANSFORMATIONS: Final = (
     "IntegerMappingTransformation",
     "EnumerationMappingTransformation",
 )
-
-
-@dataclass(frozen=True)
-class Connector:
-    """A declared variable of a component; ``type`` is empty when the file leaves it to the FMU."""
-
-    name: str
-    kind: str
-    type: str
-    unit: str
-    line: int
-
-
-@dataclass(frozen=True)
-class Binding:
-    """A parameter binding: values for parameters named relative to its element, after ``prefix``."""
-
-    prefix: str
-    parameters: ParameterSet
-    line: int
-
-
-@dataclass(frozen=True)
-class Component:
-    """An FMU in the system."""
-
-    name: str
-    source: str
-    connectors: tuple[Connector, ...]
-    bindings: tuple[Binding, ...]
-    line: int
-
-
-@dataclass(frozen=True)
-class Connection:
-    """Connection of two connectors as written: its direction follows from the connectors' kinds."""
-
-    start_element: str
-    start_connector: str
-    end_element: str
-    end_connector: str
-    transformation: Conversion
-    suppress_unit_conversion: bool
-    line: int
 
 
 @dataclass(frozen=True)
@@ -91,28 +50,25 @@ def read_structure(root: Path, reader: Reader) -> Structure:
     if node is None:
         return EMPTY
     reader.check_schema(node, "ssd")
-    if tag(node) != "SystemStructureDescription" or node.get("version") != "1.0":
-        reader.problem(
-            node,
-            "version",
-            f"is not an SSP 1.0 description (version='{node.get('version')}'); only 1.0 is supported",
-        )
+    if tag(node) != "SystemStructureDescription" or node.get("version") not in VERSIONS:
+        text = f"is not an SSP description of version {' or '.join(VERSIONS)} (version='{node.get('version')}')"
+        reader.problem(node, "version", text)
     return parse_structure(node, root, reader)
 
 
 def parse_structure(node: Any, root: Path, reader: Reader) -> Structure:
-    """Parse ``ssd:SystemStructureDescription``."""
+    """Parse ``ssd:SystemStructureDescription``; nested systems are flattened."""
     system = child(node, SSD, "System")
     experiment = child(node, SSD, "DefaultExperiment")
     if child(node, SSD, "Enumerations") is not None:
         reader.problem(child(node, SSD, "Enumerations"), "unsupported", "enumerations are not supported")
-    refuse_in_system(system, reader)
     annotated = [a for n in (experiment, node) if n is not None for a in children(n, SSD, "Annotations")]
+    flat = flatten(NO_SYSTEM if system is None else parse_system(system, root, reader), reader)
     return Structure(
         reader.text(node, "name"),
-        parse_elements(child(system, SSD, "Elements"), root, reader),
-        tuple(parse_connection(c, reader) for c in children(child(system, SSD, "Connections"), SSD, "Connection")),
-        parse_bindings(system, root, reader),
+        flat.components,
+        flat.connections,
+        flat.bindings,
         parse_units(child(node, SSD, "Units"), reader),
         0.0 if experiment is None else reader.number(experiment, "startTime", 0.0),
         None if experiment is None or experiment.get("stopTime") is None else reader.number(experiment, "stopTime"),
@@ -120,26 +76,23 @@ def parse_structure(node: Any, root: Path, reader: Reader) -> Structure:
     )
 
 
-def refuse_in_system(system: Any | None, reader: Reader) -> None:
-    """Report what a system may contain by the standard but the master does not honour."""
-    for name, what in (
-        ("Connectors", "connectors of the system as a whole are not supported; connect components directly"),
-        ("SignalDictionaries", "signal dictionaries are not supported; connect components directly"),
-    ):
-        if (found := child(system, SSD, name)) is not None:
-            reader.problem(found, "unsupported", what)
-
-
-def parse_elements(node: Any | None, root: Path, reader: Reader) -> tuple[Component, ...]:
-    """Parse ``ssd:Elements``; nested systems and signal dictionaries are refused."""
-    components = []
-    for element in elements(node):
-        if tag(element) == "Component":
-            components.append(parse_component(element, root, reader))
-        else:
+def parse_system(node: Any, root: Path, reader: Reader) -> SystemNode:
+    """Parse ``ssd:System``; signal dictionaries are refused."""
+    if (found := child(node, SSD, "SignalDictionaries")) is not None:
+        reader.problem(found, "unsupported", "signal dictionaries are not supported; connect components directly")
+    inside_it = list(elements(child(node, SSD, "Elements")))
+    for element in inside_it:
+        if tag(element) not in ("Component", "System"):
             what = f"element '{element.get('name')}' is a {tag(element)}, which is not supported"
-            reader.problem(element, "unsupported", f"{what}; use a flat list of components")
-    return tuple(components)
+            reader.problem(element, "unsupported", f"{what}; use components and systems")
+    return SystemNode(
+        reader.text(node, "name"),
+        parse_connectors(node, reader),
+        tuple(parse_component(e, root, reader) for e in inside_it if tag(e) == "Component"),
+        tuple(parse_system(e, root, reader) for e in inside_it if tag(e) == "System"),
+        tuple(parse_connection(c, reader) for c in children(child(node, SSD, "Connections"), SSD, "Connection")),
+        parse_bindings(node, root, reader),
+    )
 
 
 def parse_component(node: Any, root: Path, reader: Reader) -> Component:
@@ -157,14 +110,19 @@ def parse_component(node: Any, root: Path, reader: Reader) -> Component:
             "unsupported",
             f"component '{name}' asks for model exchange; only co-simulation is supported",
         )
-    connectors = children(child(node, SSD, "Connectors"), SSD, "Connector")
     return Component(
         name,
         reader.text(node, "source"),
-        tuple(parse_connector(c, reader) for c in connectors),
+        parse_connectors(node, reader),
         parse_bindings(node, root, reader),
         int(node.sourceline or 0),
     )
+
+
+def parse_connectors(node: Any, reader: Reader) -> tuple[Connector, ...]:
+    """Parse the ``ssd:Connectors`` of a component or system."""
+    found = children(child(node, SSD, "Connectors"), SSD, "Connector")
+    return tuple(parse_connector(c, reader) for c in found)
 
 
 def parse_connector(node: Any, reader: Reader) -> Connector:
@@ -195,13 +153,6 @@ def parse_connection(node: Any, reader: Reader) -> Connection:
     )
 
 
-def parse_transformation(node: Any | None, reader: Reader) -> Conversion:
-    """Parse ``ssc:LinearTransformation``: factor (default 1) times the value plus offset (default 0)."""
-    if node is None:
-        return Conversion()
-    return Conversion(reader.number(node, "factor", 1.0), reader.number(node, "offset", 0.0))
-
-
 def parse_bindings(node: Any | None, root: Path, reader: Reader) -> tuple[Binding, ...]:
     """Parse the ``ssd:ParameterBindings`` of a component or system, in order."""
     nodes = children(child(node, SSD, "ParameterBindings"), SSD, "ParameterBinding")
@@ -210,16 +161,48 @@ def parse_bindings(node: Any | None, root: Path, reader: Reader) -> tuple[Bindin
 
 
 def parse_binding(node: Any, root: Path, reader: Reader) -> Binding | None:
-    """Parse ``ssd:ParameterBinding``, inline or with its ``.ssv`` file."""
-    if (mapping := child(node, SSD, "ParameterMapping")) is not None:
-        reader.problem(
-            mapping, "unsupported", "parameter mappings are not supported; use the FMU's own parameter names"
-        )
-    if reader.text(node, "sourceBase", "SSD") != "SSD":
-        reader.problem(node, "unsupported", "sourceBase='component' is not supported; put the file beside the SSD")
+    """Parse ``ssd:ParameterBinding``, inline or with its ``.ssv`` file, and apply its mapping if it has one."""
+    if not _beside_the_ssd(node, reader):
         return None
     found = _inline_set(node, reader) if node.get("source") is None else _file_set(node, root, reader)
-    return None if found is None else Binding(reader.text(node, "prefix"), found, int(node.sourceline or 0))
+    if found is None:
+        return None
+    binding = Binding(reader.text(node, "prefix"), found, int(node.sourceline or 0))
+    mapping = child(node, SSD, "ParameterMapping")
+    return binding if mapping is None else _mapped(binding, mapping, root, reader)
+
+
+def _mapped(binding: Binding, node: Any, root: Path, reader: Reader) -> Binding | None:
+    """Return the binding with its parameters under the names that the mapping gives them."""
+    entries = _mapping(node, root, reader)
+    if entries is None:
+        return None
+    parameters = replace(binding.parameters, parameters=apply(entries, parameter_names(binding), reader))
+    return replace(binding, prefix="", parameters=parameters)
+
+
+def _mapping(node: Any, root: Path, reader: Reader) -> tuple[Entry, ...] | None:
+    if not _beside_the_ssd(node, reader):
+        return None
+    source = node.get("source")
+    if source is None:
+        inline = child(node, SSM, "ParameterMapping")
+        if inline is None:
+            reader.problem(node, "mapping", "the mapping has neither a source nor an inline ssm:ParameterMapping")
+            return None
+        return parse_mapping(inline, reader)
+    path = inside(root, source)
+    if path is None or not path.is_file():
+        reader.problem(node, "mapping", f"mapping file '{source}' does not exist in the scenario")
+        return None
+    return read_mapping_file(path, Reader(source, reader.problems))
+
+
+def _beside_the_ssd(node: Any, reader: Reader) -> bool:
+    if reader.text(node, "sourceBase", "SSD") == "SSD":
+        return True
+    reader.problem(node, "unsupported", "sourceBase='component' is not supported; put the file beside the SSD")
+    return False
 
 
 def parameter_names(binding: Binding) -> dict[str, Parameter]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from master.ssp.units import Unit, parse_units
+from master.ssp.units import Conversion, Unit, parse_units
 from master.ssp.xml import SSV, Reader, child, children, elements, tag
 
 Value = float | int | bool | str
@@ -28,6 +28,10 @@ class Parameter:
         Unit, empty when none is given.
     file, line : str, int
         Where it is written.
+    transformation : Conversion
+        Of the value in the FMU's unit, by a parameter mapping.
+    suppress_unit_conversion : bool
+        Whether a mapping wants the number as it is written.
     """
 
     name: str
@@ -36,6 +40,8 @@ class Parameter:
     unit: str
     file: str
     line: int
+    transformation: Conversion = field(default_factory=Conversion)
+    suppress_unit_conversion: bool = False
 
 
 @dataclass(frozen=True)

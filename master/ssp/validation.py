@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from master.errors import Problem
 from master.ssp.archive import SSD_NAME
-from master.ssp.ssd import Binding, Component, Connection, Connector, Structure, parameter_names
+from master.ssp.elements import Binding, Component, Connection, Connector, Leg
+from master.ssp.ssd import Structure, parameter_names
 from master.ssp.ssv import Parameter, Value
 from master.ssp.units import COMMON, Conversion, Unit, conversion
 from master.system import Component as SystemComponent
@@ -147,16 +148,14 @@ class Checker:
         fmu_units = [v.unit if v else "" for v in variables]
         written = [end.connector.unit or u for end, u in zip((source, target), fmu_units, strict=True)]
         units = self._structure.units
-        steps = [
-            self._convert(fmu_units[0], written[0], units, c.line, where),
-            Conversion() if c.suppress_unit_conversion else self._convert(written[0], written[1], units, c.line, where),
-            c.transformation,
-            self._convert(written[1], fmu_units[1], units, c.line, where),
-        ]
-        total = Conversion()
-        for step in steps:
-            total = total.then(step)
-        return total
+        total = self._convert(fmu_units[0], written[0], units, c.line, where)
+        unit = written[0]
+        for leg in (*c.before, Leg(written[1], c.transformation, c.suppress_unit_conversion, c.line)):
+            wanted = leg.unit or unit
+            if not leg.suppress_unit_conversion:
+                total = total.then(self._convert(unit, wanted, units, leg.line, where))
+            total, unit = total.then(leg.transformation), wanted
+        return total.then(self._convert(unit, fmu_units[1], units, c.line, where))
 
     def _variable(self, end: _Endpoint) -> Variable | None:
         fmu = self._fmus.get(end.component.name)
@@ -231,7 +230,8 @@ class Checker:
         if isinstance(p.value, str | bool):
             return p.value
         before = len(self._problems)
-        value = self._convert(p.unit, variable.unit, units, p.line, where)(p.value)
+        unit = "" if p.suppress_unit_conversion else p.unit
+        value = p.transformation(self._convert(unit, variable.unit, units, p.line, where)(p.value))
         if len(self._problems) > before:
             return None
         text = out_of_range(variable, value)

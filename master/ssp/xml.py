@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.resources
 import math
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -18,12 +19,15 @@ SSD: Final = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSV: Final = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSM: Final = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
 
+#: Versions of SSP that are read; 2.0 kept the namespaces of 1.0, and what it adds to 1.0 is refused.
+VERSIONS: Final = ("1.0", "2.0")
 #: The schema file of each kind of document, as shipped with FMPy.
 SCHEMAS: Final = {
     "ssd": "SystemStructureDescription.xsd",
     "ssv": "SystemStructureParameterValues.xsd",
     "ssm": "SystemStructureParameterMapping.xsd",
 }
+_VERSIONED: Final = ("SystemStructureDescription", "ParameterSet", "ParameterMapping")
 
 
 @dataclass
@@ -43,8 +47,11 @@ class Reader:
 
     def problem(self, node: Any, rule: str, text: str) -> None:
         """Record a problem at ``node`` (None: at the file as a whole)."""
-        line = 0 if node is None else int(node.sourceline or 0)
-        self.problems.append(Problem(self.file, line, rule, text))
+        self.report(0 if node is None else int(node.sourceline or 0), rule, text)
+
+    def report(self, line: int, rule: str, text: str, file: str | None = None) -> None:
+        """Record a problem in a line of this file, or of another one of the scenario."""
+        self.problems.append(Problem(file or self.file, line, rule, text))
 
     def parse(self, path: Path) -> Any | None:
         """Return the root element of ``path``; None (and a problem) if it is not well-formed XML."""
@@ -63,7 +70,12 @@ class Reader:
         return tree.getroot()
 
     def check_schema(self, root: Any, kind: str) -> None:
-        """Validate against the official SSP 1.0 schema of ``kind`` ('ssd', 'ssv' or 'ssm')."""
+        """Validate against the official SSP 1.0 schema of ``kind`` ('ssd', 'ssv' or 'ssm').
+
+        A document of version 2.0 has to be one of 1.0 but for its version: what 2.0 added is not supported.
+        """
+        if root.get("version") == "2.0":
+            root = _as_first_version(root)
         folder = importlib.resources.files("fmpy") / "ssp" / "schema" / SCHEMAS[kind]
         schema = etree.XMLSchema(file=str(folder))
         schema.validate(root)
@@ -121,6 +133,14 @@ def elements(node: Any | None) -> Iterator[Any]:
     """Iterate over the child elements, leaving out comments and processing instructions."""
     if node is not None:
         yield from node.iterchildren(etree.Element)
+
+
+def _as_first_version(root: Any) -> Any:
+    copy = deepcopy(root)
+    for node in copy.iter(etree.Element):
+        if node.get("version") == "2.0" and tag(node) in _VERSIONED:
+            node.set("version", "1.0")
+    return copy
 
 
 def _plain(message: str) -> str:

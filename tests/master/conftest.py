@@ -194,7 +194,7 @@ def toy_fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, source in (("ToyCatenary", CATENARY), ("ToyPantograph", PANTOGRAPH)):
         script = folder / f"toy_{name.lower()}_script.py"
         script.write_text(source)
-        FmuBuilder.build_FMU(script, dest=folder, canGetAndSetFMUstate=True)
+        FmuBuilder.build_FMU(script, dest=folder, canGetAndSetFMUstate=True, canSerializeFMUstate=True)
     return folder
 
 

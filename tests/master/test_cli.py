@@ -55,8 +55,10 @@ def test_run_says_figures_and_verdict_in_80_columns(toy, in_folder, capsys):
     folder = in_folder / "results" / "toy"
     text = (folder / "report.html").read_text()
     assert "EN 50367" in text
-    assert text.count("data:image/png;base64,") == len(list(folder.glob("*.png"))) == 5
-    assert "src='http" not in text
+    assert len(list(folder.glob("*.png"))) == len(list(folder.glob("*.svg"))) == 5
+    assert "Incomplete" not in text
+    assert "static_force" in text
+    assert "time in catenary" in text
 
 
 def test_quiet_says_nothing(toy, in_folder, capsys):
@@ -180,6 +182,54 @@ def test_report_is_written_again(toy, in_folder, capsys):
     assert main(["report", "a"]) == 0
     assert (in_folder / "a/report.html").is_file()
     assert (in_folder / "a/contact_force.svg").is_file()
+
+
+def test_report_with_a_measurement_a_film_and_parquet(toy, in_folder, capsys):
+    main([str(toy), "--out", "a", "--quiet", "--no-report", "--no-build"])
+    Path("m.csv").write_text("position [m],force [N]\n" + "".join(f"{x},{140 + x % 3}\n" for x in range(15, 48)))
+    pytest.importorskip("pyarrow", reason="Parquet needs pyarrow")
+    assert main(["report", "a", "--measured", "m.csv", "--film", "film.gif", "--parquet"]) == 0
+    out = capsys.readouterr().out
+    assert "correlation" in out
+    assert "Measured beside simulated" in (in_folder / "a/report.html").read_text()
+    assert (in_folder / "film.gif").stat().st_size > 1000
+    assert main(["report", "a", "--measured", "m.csv", "--contact", "7"]) == 1
+    assert "no contact 7" in capsys.readouterr().err
+
+
+def test_parquet_holds_the_columns_of_the_csv(toy, in_folder):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="Parquet needs pyarrow")
+    assert main([str(toy), "--out", "a", "--quiet", "--no-report", "--no-build", "--parquet"]) == 0
+    for name in ("timeseries", "timeseries_5ms"):
+        table = parquet.read_table(in_folder / f"a/{name}.parquet")
+        lines = (in_folder / f"a/{name}.csv").read_text().splitlines()
+        assert table.column_names == lines[0].split(",")
+        assert table.num_rows == len(lines) - 1
+    assert main([str(toy), "--out", "a", "--quiet", "--no-report", "--no-build"]) == 0
+    assert not list((in_folder / "a").glob("*.parquet"))
+
+
+def test_compare_writes_a_report_of_several_runs(toy, in_folder, capsys):
+    common = ["--quiet", "--no-report", "--no-build"]
+    for name, force in (("a", 130), ("b", 140), ("c", 150)):
+        main([str(toy), "--out", name, "--set", f"pantograph.static_force={force}", *common])
+    assert main(["compare", "a", "b", "c", "--report", "side.html"]) == 0
+    out = capsys.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert out.count("differ by") == 2
+    page = (in_folder / "side.html").read_text()
+    assert page.count("class='tiles'") == 3
+    assert "pantograph.static_force" in page
+
+
+def test_a_failed_run_leaves_a_report_marked_incomplete(toy, in_folder, capsys):
+    assert main([str(toy), "--out", "a", "--set", "catenary.fail_at=0.5", "--quiet", "--no-build"]) == 1
+    page = (in_folder / "a/report.html").read_text()
+    assert "<b>Incomplete.</b> This run is failed at t = 0.5 s of 1 s." in page
+    assert "the wire broke" in page
+    assert "id='chart-force_catenary_1'" in page
+    assert main([str(toy), "--out", "b", "--set", "catenary.fail_at=0.5", "--quiet", "--no-build", "--no-report"]) == 1
+    assert not (in_folder / "b/report.html").exists()
 
 
 def test_calibrate_stores_what_it_finds(toy, in_folder, capsys):

@@ -1,0 +1,334 @@
+"""The state of a whole system at a communication point, in a file from which a run continues bit for bit.
+
+The file holds what the components gave as their serialised states, the exchanged values and what the coupling scheme
+remembers: a magic line, the length of a JSON header, the header, raw bytes, and the SHA-256 of all before. Nothing in
+it is ever executed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final, Protocol, runtime_checkable
+
+import numpy as np
+
+from master.algorithm import Algorithm, initialise
+from master.arrays import FloatArray
+from master.errors import MasterError, RunError, UsageError
+from master.network import Network
+from master.simulation import TimeGrid
+from master.system import Component, System
+
+#: First bytes of every checkpoint; the digit is the format's version.
+MAGIC: Final = b"openpanto checkpoint 1\n"
+NAME: Final = "checkpoint.state"
+_LENGTH: Final = struct.Struct("<Q")
+_CHECKSUM: Final = hashlib.sha256().digest_size
+#: Share of a step by which a wanted time may miss a communication point.
+_ROUNDING: Final = 1e-6
+
+
+@runtime_checkable
+class Storable(Protocol):
+    """A slave whose state can be written to a file."""
+
+    def serialise(self) -> bytes:
+        """Return the whole state."""
+
+    def deserialise(self, data: bytes) -> None:
+        """Return to a state."""
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A system's state.
+
+    Attributes
+    ----------
+    start, step : float
+        Start time and macro step of the run that it comes from [s].
+    index : int
+        Macro steps done.
+    components : dict
+        What has to be the same when the run goes on: GUID and parameters by component name.
+    states : dict
+        Serialised states by component name.
+    inputs, outputs : dict
+        Exchanged values by ``component.variable``.
+    memory : ndarray
+        What the coupling scheme remembers.
+    scheme : str
+        Name of the coupling scheme.
+    """
+
+    start: float
+    step: float
+    index: int
+    components: dict[str, dict[str, Any]]
+    states: dict[str, bytes]
+    inputs: dict[str, float]
+    outputs: dict[str, float]
+    memory: FloatArray
+    scheme: str
+
+    @property
+    def time(self) -> float:
+        """When it was taken [s]."""
+        return self.start + self.index * self.step
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """A checkpoint to go on from.
+
+    Attributes
+    ----------
+    checkpoint : Checkpoint
+    file : str
+        Where it was read.
+    renewed : tuple of str
+        Components that are not taken from it but start anew at its time.
+    """
+
+    checkpoint: Checkpoint
+    file: str
+    renewed: tuple[str, ...] = ()
+
+    def grid(self, system: System) -> TimeGrid:
+        """Return the communication points: those of the first run if the step is the same."""
+        c = self.checkpoint
+        if system.step == c.step and system.start == c.start:
+            return TimeGrid(c.start, c.step, system.step_count, c.index)
+        count = int((system.stop - c.time) / system.step + _ROUNDING)
+        return TimeGrid(c.time, system.step, count)
+
+    def check(self, system: System) -> None:
+        """Refuse a system that the checkpoint does not belong to.
+
+        Raises
+        ------
+        UsageError
+            Naming every difference.
+        """
+        unknown = [name for name in self.renewed if name not in {c.name for c in system.components}]
+        found = [f"there is no component '{name}' to renew" for name in unknown]
+        for component in system.components:
+            if component.name not in self.renewed:
+                found += _differences(component, self.checkpoint.components.get(component.name))
+        if system.stop <= self.checkpoint.time:
+            found.append(f"it was saved at {self.checkpoint.time:g} s, the run would end at {system.stop:g} s")
+        if found:
+            raise UsageError(f"{self.file} does not fit this run: " + "; ".join(found))
+
+    def prepare(self, network: Network, algorithm: Algorithm, grid: TimeGrid) -> None:
+        """Bring slaves, exchanged values and scheme to the checkpoint."""
+        kept = [s for s in network.slaves if s.name not in self.renewed]
+        # Components that start anew do so at the checkpoint's time, the others where they once did.
+        starts = dict.fromkeys(self.renewed, self.checkpoint.time)
+        initialise(network, self.checkpoint.start, grid.stop, starts)
+        for slave in kept:
+            _storable(slave).deserialise(self.checkpoint.states[slave.name])
+        network.read()
+        kept_outputs = {f"{s.name}.{n}" for s in kept for n in s.output_names}
+        self._check_outputs(network, kept_outputs)
+        _fill(network.inputs, network.input_names, self.checkpoint.inputs)
+        if algorithm.name == self.checkpoint.scheme and not self.renewed:
+            algorithm.recall(self.checkpoint.memory)
+
+    def _check_outputs(self, network: Network, kept: set[str]) -> None:
+        for name, value in zip(network.output_names, network.outputs.tolist(), strict=True):
+            saved = self.checkpoint.outputs.get(name)
+            if name in kept and saved is not None and value != saved:
+                raise RunError(
+                    f"'{name}' is {value!r} after its state was restored from {self.file}, it was {saved!r}: "
+                    "the FMU does not restore its whole state"
+                )
+
+
+@dataclass
+class CheckpointObserver:
+    """Observer that writes a checkpoint at a communication point.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    index : int
+        After how many macro steps.
+    """
+
+    system: System
+    algorithm: Algorithm
+    path: Path
+    index: int
+    written: bool = field(default=False, init=False)
+
+    def begin(self, time: float, network: Network) -> None:
+        """Nothing to save yet."""
+
+    def observe(self, index: int, time: float, network: Network) -> None:
+        """Write it if this is the step."""
+        if index == self.index:
+            write(self.path, take(self.system, network, self.algorithm, index))
+            self.written = True
+
+    def finish(self) -> None:
+        """Nothing to close."""
+
+
+def index_at(system: System, time: float) -> int:
+    """Return the number of macro steps until ``time``.
+
+    Raises
+    ------
+    UsageError
+        If that is no communication point of the run, or a component cannot be saved.
+    """
+    steps = (time - system.start) / system.step
+    index = round(steps)
+    if not 0 < index <= system.step_count or abs(steps - index) > _ROUNDING:
+        raise UsageError(
+            f"--checkpoint {time:g}: not a communication point of the run, which goes from {system.start:g} s to "
+            f"{system.stop:g} s in steps of {system.step:g} s"
+        )
+    cannot = [c.name for c in system.components if not c.fmu.can_serialise]
+    if cannot:
+        raise UsageError(f"--checkpoint: the FMU of {', '.join(cannot)} cannot serialise its state")
+    return index
+
+
+def take(system: System, network: Network, algorithm: Algorithm, index: int) -> Checkpoint:
+    """Return the state of a system after ``index`` macro steps."""
+    return Checkpoint(
+        system.start,
+        system.step,
+        index,
+        {c.name: _identity(c) for c in system.components},
+        {s.name: _storable(s).serialise() for s in network.slaves},
+        dict(zip(network.input_names, network.inputs.tolist(), strict=True)),
+        dict(zip(network.output_names, network.outputs.tolist(), strict=True)),
+        algorithm.memory(),
+        algorithm.name,
+    )
+
+
+def write(path: Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint; readers see the old file or the new one, never half of it."""
+    temporary = path.with_name(path.name + ".part")
+    try:
+        temporary.write_bytes(pack(checkpoint))
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise MasterError(f"{path} cannot be written ({error.strerror})") from error
+
+
+def read(path: Path) -> Checkpoint:
+    """Read a checkpoint.
+
+    Raises
+    ------
+    MasterError
+        If it is missing, damaged, or something else.
+    """
+    try:
+        return unpack(path.read_bytes())
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise MasterError(f"{path} {error}") from error
+
+
+def pack(checkpoint: Checkpoint) -> bytes:
+    """Return a checkpoint as bytes."""
+    c = checkpoint
+    numbers = np.array([c.start, c.step, *c.inputs.values(), *c.outputs.values()])
+    header = {
+        "index": c.index,
+        "scheme": c.scheme,
+        "components": c.components,
+        "inputs": list(c.inputs),
+        "outputs": list(c.outputs),
+        "memory": len(c.memory),
+        "states": {name: len(state) for name, state in c.states.items()},
+    }
+    text = json.dumps(header, allow_nan=False).encode()
+    raw = numbers.astype("<f8").tobytes() + c.memory.astype("<f8").tobytes() + b"".join(c.states.values())
+    body = MAGIC + _LENGTH.pack(len(text)) + text + raw
+    return body + hashlib.sha256(body).digest()
+
+
+def unpack(data: bytes) -> Checkpoint:
+    """Return the checkpoint that `pack` was given.
+
+    Raises
+    ------
+    ValueError
+        If the bytes are none, or were cut or changed.
+    """
+    if not data.startswith(MAGIC):
+        raise ValueError("is not a checkpoint of this version")
+    body, checksum = data[:-_CHECKSUM], data[-_CHECKSUM:]
+    if hashlib.sha256(body).digest() != checksum:
+        raise ValueError("is damaged: its checksum does not fit, it was cut or changed")
+    start = len(MAGIC) + _LENGTH.size
+    (length,) = _LENGTH.unpack(body[len(MAGIC) : start])
+    return _unpack_body(json.loads(body[start : start + length]), body[start + length :])
+
+
+def _unpack_body(header: dict[str, Any], raw: bytes) -> Checkpoint:
+    inputs, outputs = header["inputs"], header["outputs"]
+    count = 2 + len(inputs) + len(outputs) + header["memory"]
+    numbers = np.frombuffer(raw, "<f8", count).astype(np.float64)
+    ends = 2 + np.cumsum([0, len(inputs), len(outputs), header["memory"]])
+    values = [numbers[a:b].tolist() for a, b in pairwise(ends.tolist())]
+    states, position = {}, 8 * count
+    for name, size in header["states"].items():
+        states[name] = raw[position : position + size]
+        position += size
+    return Checkpoint(
+        float(numbers[0]),
+        float(numbers[1]),
+        header["index"],
+        header["components"],
+        states,
+        dict(zip(inputs, values[0], strict=True)),
+        dict(zip(outputs, values[1], strict=True)),
+        np.array(values[2]),
+        header["scheme"],
+    )
+
+
+def _identity(component: Component) -> dict[str, Any]:
+    return {"guid": component.fmu.guid, "parameters": component.parameters}
+
+
+def _differences(component: Component, saved: dict[str, Any] | None) -> list[str]:
+    name = component.name
+    if saved is None:
+        return [f"it holds no component '{name}' (--renew {name} starts it anew)"]
+    if saved["guid"] != component.fmu.guid:
+        return [f"the FMU of '{name}' is another one now (--renew {name} starts it anew)"]
+    now, then = component.parameters, saved["parameters"]
+    changed = sorted(n for n in {*now, *then} if now.get(n) != then.get(n))
+    return [
+        f"{name}.{n} was {then.get(n, 'not set')}, is {now.get(n, 'not set')} (--renew {name} starts it anew)"
+        for n in changed
+    ]
+
+
+def _storable(slave: object) -> Storable:
+    if not isinstance(slave, Storable):
+        raise RunError(f"component '{getattr(slave, 'name', slave)}' cannot be saved to a file")
+    return slave
+
+
+def _fill(array: FloatArray, names: Sequence[str], values: dict[str, float]) -> None:
+    for i, name in enumerate(names):
+        array[i] = values.get(name, array[i])

@@ -1,0 +1,33 @@
+"""What people look at: reports in HTML, plots as files, films, and tables for the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from master import plots, results
+from master.report.measured import Comparison, comparison_rows
+from master.report.page import page
+from master.report.tables import CLAUSES, figure_rows, figures_table, headlines, uplift_line, verdict_table
+from master.results import Results
+
+__all__ = [
+    "CLAUSES",
+    "comparison_rows",
+    "figure_rows",
+    "figures_table",
+    "headlines",
+    "page",
+    "uplift_line",
+    "verdict_table",
+    "write",
+]
+
+
+def write(done: Results, measured: Comparison | None = None) -> Path:
+    """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
+    path = done.folder / results.REPORT
+    path.write_text(page(done, measured), encoding="utf-8")
+    for name, figure in plots.all_plots(done).items():
+        figure.savefig(done.folder / f"{name}.svg", metadata={"Date": None})
+        figure.savefig(done.folder / f"{name}.png", dpi=130)
+    return path

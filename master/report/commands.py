@@ -1,0 +1,124 @@
+"""The verbs ``report`` and ``compare`` of the command line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+
+from master import compare, export, report, results
+from master.errors import MasterError
+from master.report import tables
+from master.report.comparison import columns, comparison_page
+from master.report.film import FilmOptions, write_film
+from master.report.measured import Comparison, compare_measured, read_measured
+from master.report.movie import make_movie
+from master.report.signals import all_signals
+from master.results import Results
+
+REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
+COMPARE_HELP: Final = "two or more runs side by side"
+_WIDTH: Final = 80
+
+
+def add_report_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``report``."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
+    parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to put beside")
+    parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
+    parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
+    parser.add_argument("--magnify", type=float, default=8.0, metavar="N", help="deformation in the film, default 8")
+    parser.add_argument("--parquet", action="store_true", help="write the time series as Parquet too")
+
+
+def run_report(options: argparse.Namespace) -> int:
+    """Write the report of a run again, and what else is wanted."""
+    done = results.read(options.run)
+    summary = {**done.summary, **results.figures(done.assessments(), done.uplifts, done.followings)}
+    measured = _measured(done, options.measured, options.contact) if options.measured else None
+    results.write_json(done.folder / results.SUMMARY, summary)
+    print(report.write(replace(done, summary=summary), measured))
+    if options.parquet:
+        print(*export.write_parquet(done.folder), sep="\n")
+    if options.film:
+        print(_film(done, options))
+    if measured is not None:
+        _say_measured(measured)
+    return 0
+
+
+def report_what_there_is(folder: Path) -> None:
+    """Write the report of a run that stopped, if it has left anything to report on."""
+    try:
+        report.write(results.read(folder))
+    except MasterError:
+        return  # it stopped before anything was recorded; the error itself is told by the caller
+
+
+def _measured(done: Results, path: Path, contact: int) -> Comparison:
+    signals = [s for s in all_signals(done) if s.contact.index == contact]
+    if not signals:
+        raise MasterError(
+            f"{done.folder} has no contact {contact} with a recorded force; choose another with --contact"
+        )
+    return compare_measured(signals[0], read_measured(path))
+
+
+def _say_measured(measured: Comparison) -> None:
+    rows = tables.plain_table(("0-20 Hz", "simulated", "measured", "difference"), report.comparison_rows(measured))
+    Console(width=_WIDTH, highlight=False).print(rows)
+
+
+def _film(done: Results, options: argparse.Namespace) -> Path:
+    movie = make_movie(done, all_signals(done))
+    if movie is None:
+        raise MasterError(f"{done.folder} has no recorded uplift, contact point and geometry, which a film needs")
+    start, end = done.interval
+    return write_film(movie, options.film, FilmOptions(options.magnify, start=start, end=end))
+
+
+def add_compare_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``compare``."""
+    parser.add_argument("first", type=Path, metavar="RUN", help="results folder")
+    parser.add_argument("others", type=Path, metavar="RUN", nargs="+", help="results folders")
+    parser.add_argument("--report", type=Path, metavar="FILE", help="write a report in HTML")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+
+
+def run_compare(options: argparse.Namespace) -> int:
+    """Compare runs with the first one."""
+    runs = [results.read(folder) for folder in (options.first, *options.others)]
+    if options.report:
+        options.report.write_text(comparison_page(runs), encoding="utf-8")
+    pairs = [compare.compare(runs[0], other) for other in runs[1:]]
+    if options.json:
+        print(json.dumps([_as_json(c) for found in pairs for c in found], indent=1))
+        return 0
+    _show(runs, pairs, options)
+    return 0
+
+
+def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]], options: argparse.Namespace) -> None:
+    console = Console(width=_WIDTH, highlight=False)
+    found = columns(runs)
+    heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
+    console.print(report.figures_table([c.assessment.quality for c in found], heads))
+    for folder, differences in zip(options.others, pairs, strict=True):
+        for c in differences:
+            if c.rms is not None and c.largest is not None:
+                who = f"{folder}, {c.first.contact.pantograph}: 0-20 Hz forces differ by"
+                console.print(f"{who} {c.rms:.3g} N (rms), {c.largest:.3g} N (largest)", markup=False, soft_wrap=True)
+    if options.report:
+        console.print(f"report in {options.report}", markup=False, soft_wrap=True)
+
+
+def _as_json(c: compare.Comparison) -> Mapping[str, Any]:
+    names = ("mean", "sigma", "minimum", "maximum")
+    one, two = c.first.quality, c.second.quality
+    difference = {n: getattr(two, n) - getattr(one, n) for n in names}
+    return {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}

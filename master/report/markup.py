@@ -1,0 +1,162 @@
+"""Pieces of HTML that every report is made of."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterable, Sequence
+from importlib import resources
+from typing import Any, Final
+
+from master.report.charts import Chart
+from master.report.movie import Movie, as_json
+from master.report.tables import CLAUSES, headlines
+from master.results import Assessment
+
+_ICON: Final = "<link rel='icon' href='data:,'>"
+#: The browser itself keeps the page from asking for anything.
+_SEALED: Final = (
+    "<meta http-equiv='Content-Security-Policy' content=\"default-src 'none'; script-src 'unsafe-inline'; "
+    "style-src 'unsafe-inline'; img-src data: blob:\">"
+)
+
+
+def document(title: str, body: Iterable[str], charts: Sequence[Chart], movie: Movie | None = None) -> str:
+    """Return a whole page that needs nothing but itself."""
+    parts = [
+        "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>",
+        _SEALED,
+        "<meta name='viewport' content='width=device-width, initial-scale=1'>",
+        f"{_ICON}<title>{text(title)}</title><style>{asset('style.css')}</style></head><body><main>",
+        *body,
+        "</main>",
+        _data("charts", {c.key: {**c.figure, "height": c.height} for c in charts}),
+    ]
+    if charts:
+        parts += [_script("plotly-basic.min.js"), _script("charts.js")]
+    if movie is not None:
+        parts += [_data("movie-data", as_json(movie)), _script("movie.js")]
+    return "\n".join([*parts, "</body></html>\n"])
+
+
+def asset(name: str) -> str:
+    """Return the text of a file that goes into pages."""
+    return resources.files("master.report").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def _script(name: str) -> str:
+    return f"<script>{asset(name)}</script>"
+
+
+def _data(key: str, data: Any) -> str:
+    encoded = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return f"<script type='application/json' id='{key}'>{encoded}</script>"
+
+
+def text(value: object) -> str:
+    """Return text for HTML."""
+    return html.escape(str(value), quote=True)
+
+
+def signs(limit: str) -> str:
+    """Return a limit for HTML with proper signs.
+
+    Examples
+    --------
+    >>> signs("157.3 +- 2.5 N"), signs("<= 0.2 %"), signs("< 350 N")
+    ('157.3 ± 2.5 N', '≤ 0.2 %', '&lt; 350 N')
+    """
+    return text(limit.replace("+-", "\u00b1").replace("<=", "\u2264"))
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: bool = True) -> str:
+    """Return a table; the columns after the first are numbers, or text."""
+    kind = "n" if numbers else "text"
+    right = " class='n'" if numbers else ""
+    head = "".join(f"<th{right if i else ''}>{text(h)}</th>" for i, h in enumerate(heads))
+    body = "".join(
+        f"<tr><td>{text(r[0])}</td>" + "".join(f"<td class='{kind}'>{text(c)}</td>" for c in r[1:]) + "</tr>"
+        for r in rows
+    )
+    return f"<div class='scroll'><table><tr>{head}</tr>{body}</table></div>"
+
+
+def chart(found: Chart) -> str:
+    """Return the place of a chart."""
+    note = f"<p class='note'>{text(found.note)}</p>" if found.note else ""
+    style = f"style='height:{found.height}px'"
+    place = f"<div class='chart' id='chart-{text(found.key)}' {style}></div>"
+    return f"<figure><figcaption><h3>{text(found.title)}</h3>{note}</figcaption>{place}</figure>"
+
+
+def mark(passed: bool) -> str:
+    """Return a verdict in a word and a sign, not in colour alone."""
+    kind, sign, word = ("pass", "\u2713", "passed") if passed else ("fail", "\u2717", "failed")
+    return f"<span class='{kind}'>{sign}<span class='word'> {word}</span></span>"
+
+
+def badge(passed: bool, complete: bool = True) -> str:
+    """Return the verdict as a whole."""
+    word = ("\u2713 passed" if passed else "\u2717 failed") + ("" if complete else " so far")
+    return f"<span class='badge {'pass' if passed else 'fail'}'>EN 50367 {word}</span>"
+
+
+def verdict(assessment: Assessment, name: str, complete: bool = True) -> str:
+    """Return the first screen of one contact: verdict and headline figures."""
+    q = assessment.quality
+    where = f"{q.start:.1f} m to {q.end:.1f} m at {3.6 * q.speed:.1f} km/h"
+    word = badge(assessment.passed, complete)
+    aside = f"<span class='note'>{where}</span>{_broken(assessment)}"
+    head = f"<div class='verdict'><b>{text(name)}</b> {word} {aside}</div>"
+    tiles = "".join(
+        f"<div class='tile'><div class='name'><span>{text(h.name)}</span>{_sign(h.passed)}</div>"
+        f"<div class='value'>{text(h.value)} <small>{text(h.unit)}</small></div>"
+        f"<div class='limit'>{signs(h.limit)}</div></div>"
+        for h in headlines(assessment)
+    )
+    return f"{head}<div class='tiles'>{tiles}</div>"
+
+
+def _broken(assessment: Assessment) -> str:
+    names = ", ".join(c.name for c in assessment.criteria if not c.passed)
+    return f" <span class='fail'>not kept: {text(names)}</span>" if names else ""
+
+
+def _sign(passed: bool | None) -> str:
+    if passed is None:
+        return ""
+    return "<span class='pass'>\u2713</span>" if passed else "<span class='fail'>\u2717</span>"
+
+
+def criteria(assessment: Assessment) -> str:
+    """Return the verdict row by row."""
+    rows = "".join(
+        f"<tr><td>{text(c.name)}<div class='note'>{text(CLAUSES.get(c.name, ''))}</div></td>"
+        f"<td class='n'>{text(c.value)}</td><td class='n'>{signs(c.limit)}</td><td>{mark(c.passed)}</td></tr>"
+        for c in assessment.criteria
+    )
+    heads = "<tr><th>figure and clause</th><th class='n'>value</th><th class='n'>limit</th><th>verdict</th></tr>"
+    return f"<div class='scroll'><table>{heads}{rows}</table></div>"
+
+
+def movie_player(movie: Movie, begin: float) -> str:
+    """Return the moving picture's place and controls; ``begin`` is the share of the run it opens at."""
+    how = (
+        "as recorded at supports, droppers and contacts" if movie.everywhere else "as recorded at supports and contacts"
+    )
+    note = (
+        f"Side view that follows the pantographs; the contact wire's deformation is drawn {how}, straight between, "
+        "and magnified; the messenger wire is drawn at rest, slack droppers dashed. "
+        "Below: contact force, thin as computed, thick 0-20 Hz."
+    )
+    speeds = "".join(f"<option value='{v}'>{n}</option>" for v, n in ((1, "real time"), (0.25, "1/4"), (0.1, "1/10")))
+    return (
+        f"<p class='note'>{note}</p>"
+        f"<canvas id='movie' data-begin='{begin:.4f}' style='height:26rem' role='img' "
+        "aria-label='moving picture of line and pantographs'></canvas>"
+        "<div class='controls'><button id='movie-play' type='button'>play</button>"
+        "<input class='seek' id='movie-seek' type='range' min='0' max='1' value='0' aria-label='time'>"
+        "<span id='movie-clock'></span>"
+        f"<label>speed <select id='movie-speed'>{speeds}</select></label>"
+        "<label>deformation \u00d7 <input id='movie-scale' type='range' min='1' max='30' value='8'></label></div>"
+    )

@@ -1,0 +1,150 @@
+"""The report of one run: a single HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from master.quality import FILTER_NOTE
+from master.report import markup
+from master.report.charts import Chart, run_charts
+from master.report.inputs import Input, inputs_of, provenance_rows, quality_rows
+from master.report.measured import Comparison, comparison_chart, comparison_rows
+from master.report.movie import Movie, make_movie
+from master.report.signals import Signals, all_signals
+from master.report.tables import figure_rows
+from master.results import Assessment, Results
+from master.trains import Following
+
+_CONTENTS: Final = (
+    ("verdict", "Verdict"),
+    ("figures", "Figures"),
+    ("measured", "Measured"),
+    ("force", "Contact force"),
+    ("movie-part", "Moving picture"),
+    ("line", "Line and droppers"),
+    ("inputs", "Inputs"),
+    ("computed", "How it was computed"),
+)
+_LINE_CHARTS: Final = ("uplift", "dropper", "elevation", "plan")
+
+
+def page(done: Results, measured: Comparison | None = None) -> str:
+    """Return the report of a run as HTML.
+
+    Parameters
+    ----------
+    done : Results
+        The run, complete or not.
+    measured : Comparison, optional
+        A measured contact force beside it.
+    """
+    summary, signals, assessments = done.summary, all_signals(done), done.assessments()
+    charts = run_charts(done, signals)
+    extra = [comparison_chart(measured)] if measured is not None else []
+    movie = make_movie(done, signals)
+    body = [
+        _head(summary, assessments),
+        _figures(assessments, done.followings if assessments else ()),
+        *(_measured(measured, extra[0]) if measured is not None else ()),
+        *_section("force", "Contact force", [c for c in charts if not c.key.startswith(_LINE_CHARTS)]),
+        *(_movie(movie, signals) if movie is not None else ()),
+        *_section("line", "Line and droppers", [c for c in charts if c.key.startswith(_LINE_CHARTS)]),
+        _inputs(summary),
+        _computed(summary),
+    ]
+    contents = "".join(f"<a href='#{k}'>{t}</a>" for k, t in _CONTENTS if any(f"id='{k}'" in part for part in body))
+    title = f"{summary.get('scenario', '')}: pantograph-catenary interaction"
+    return markup.document(title, [f"<nav>{contents}</nav>", *body], [*charts, *extra], movie)
+
+
+def _head(summary: dict[str, Any], assessments: tuple[Assessment, ...]) -> str:
+    complete = summary.get("status") == "complete"
+    name = markup.text(summary.get("scenario", ""))
+    parts = [f"<section id='verdict'><h1>{name}: pantograph-catenary interaction</h1>", status_note(summary)]
+    parts += [markup.verdict(a, a.contact.pantograph, complete) for a in assessments]
+    if not assessments:
+        parts.append("<p class='warning'>No contact-quality figures: no contact force in the interval of interest.</p>")
+    return "".join([*parts, "</section>"])
+
+
+def status_note(summary: dict[str, Any]) -> str:
+    """Return a warning if the run is not complete."""
+    status = str(summary.get("status"))
+    if status == "complete":
+        return ""
+    reached, stop = summary.get("time_reached"), summary.get("settings", {}).get("stop")
+    where = f" at t = {reached:.6g} s" if reached is not None else ""
+    where += f" of {stop:.6g} s" if where and stop is not None else ""
+    words = {"running": "was not finished (still running, or killed)"}
+    how = words.get(status, f"is {status}")
+    reason = markup.text(summary.get("reason", ""))
+    note = f"<b>Incomplete.</b> This run {markup.text(how)}{where}. {reason} What follows is what was computed."
+    return f"<p class='warning'>{note}</p>"
+
+
+def _figures(assessments: tuple[Assessment, ...], following: tuple[Following, ...] = ()) -> str:
+    if not assessments:
+        return ""
+    heads = ["figure, 0-20 Hz", *(a.contact.pantograph for a in assessments)]
+    verdicts = "".join(
+        f"<h3>EN 50367, {markup.text(a.contact.pantograph)}</h3>{markup.criteria(a)}" for a in assessments
+    )
+    note = f"<p class='note'>Filter: {markup.text(FILTER_NOTE)}.</p>"
+    rows = markup.table(heads, figure_rows([a.quality for a in assessments]))
+    note += "".join(f"<p>{markup.text(f.sentence)}.</p>" for f in following)
+    statistics = f"<div><h3>Statistics in the interval of interest</h3>{rows}{note}</div>"
+    return (
+        f"<section id='figures'><h2>Figures</h2><div class='columns'><div>{verdicts}</div>{statistics}</div></section>"
+    )
+
+
+def _section(key: str, title: str, charts: list[Chart]) -> list[str]:
+    if not charts:
+        return []
+    return [f"<section id='{key}'><h2>{title}</h2>", *map(markup.chart, charts), "</section>"]
+
+
+def _movie(movie: Movie, signals: tuple[Signals, ...]) -> list[str]:
+    inside = np.flatnonzero(signals[0].inside)
+    begin = (inside[0] + inside[-1]) / 2.0 / len(signals[0].inside) if inside.size else 0.5
+    return [f"<section id='movie-part'><h2>Moving picture</h2>{markup.movie_player(movie, float(begin))}</section>"]
+
+
+def _measured(found: Comparison, chart: Chart) -> list[str]:
+    heads = ("0-20 Hz", "simulated", "measured", "difference")
+    rows = markup.table(heads, comparison_rows(found))
+    where = f"compared from {found.start:.1f} m to {found.end:.1f} m"
+    note = f"<p class='note'>Measured: {markup.text(found.source)}; {where}.</p>"
+    return ["<section id='measured'><h2>Measured beside simulated</h2>", note, rows, markup.chart(chart), "</section>"]
+
+
+def _inputs(summary: dict[str, Any]) -> str:
+    parts = ["<section id='inputs'><h2>Inputs and where they come from</h2>"]
+    parts.append("<p class='note'>A dot marks what the scenario or the command line has set.</p>")
+    for component in summary.get("components", []):
+        rows = "".join(_input_row(i) for i in inputs_of(component))
+        heads = "<tr><th>parameter</th><th class='n'>value</th><th>unit</th><th>what</th><th>source</th></tr>"
+        head = f"<summary>{markup.text(component['name'])}: {markup.text(component['fmu'])}</summary>"
+        parts.append(f"<details>{head}<div class='scroll'><table>{heads}{rows}</table></div></details>")
+    return "".join([*parts, "</section>"])
+
+
+def _input_row(i: Input) -> str:
+    changed = " class='changed'" if i.changed else ""
+    return (
+        f"<tr{changed}><td>{markup.text(i.name)}</td><td class='n'>{markup.text(i.value)}</td>"
+        f"<td>{markup.text(i.unit)}</td><td class='text'>{markup.text(i.description)}</td>"
+        f"<td class='text note'>{markup.text(i.source)}</td></tr>"
+    )
+
+
+def _computed(summary: dict[str, Any]) -> str:
+    quality = markup.table(("what", "value"), quality_rows(summary), numbers=False)
+    provenance = markup.table(("what", "value"), provenance_rows(summary), numbers=False)
+    return (
+        "<section id='computed'><h2>How it was computed</h2><div class='columns'>"
+        f"<div><h3>Numerical quality</h3>{quality}</div>"
+        f"<div><h3>Versions and provenance</h3>{provenance}</div></div></section>"
+    )

@@ -1,0 +1,166 @@
+"""Nested systems as one flat list of components: connections are followed through the systems' connectors.
+
+A component of a nested system is named by its path, ``train.pantograph``, as SSP names parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from master.ssp.elements import Binding, Component, Connection, Connector, Leg, SystemNode
+from master.ssp.xml import Reader
+
+#: Owner (its path, empty for the whole) and connector.
+_Place = tuple[str, str]
+_THROUGH = ("input", "output")
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A system without nesting."""
+
+    components: tuple[Component, ...]
+    connections: tuple[Connection, ...]
+    bindings: tuple[Binding, ...]
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """A connection between two places, in the direction in which values go."""
+
+    source: _Place
+    target: _Place
+    connection: Connection
+
+
+def flatten(root: SystemNode, reader: Reader) -> Flat:
+    """Return the components, connections and bindings of a system and of all systems in it."""
+    systems = dict(_systems(root, ""))
+    components = tuple(replace(c, name=_join(path, c.name)) for path, s in systems.items() for c in s.components)
+    direct, edges = _connections(systems, reader)
+    return Flat(components, (*direct, *_followed(edges, systems, reader)), _bindings(systems))
+
+
+def _systems(system: SystemNode, path: str) -> Iterator[tuple[str, SystemNode]]:
+    yield path, system
+    for nested in system.systems:
+        yield from _systems(nested, _join(path, nested.name))
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+def _bindings(systems: dict[str, SystemNode]) -> tuple[Binding, ...]:
+    """Return the systems' bindings, inner ones first: those of the outer systems take priority."""
+    found: list[Binding] = []
+    for path in sorted(systems, key=lambda p: -_depth(p, systems)):
+        found += [replace(b, prefix=f"{path}." + b.prefix if path else b.prefix) for b in systems[path].bindings]
+    return tuple(found)
+
+
+def _depth(path: str, systems: dict[str, SystemNode]) -> int:
+    return sum(1 for other in systems if other and (path == other or path.startswith(f"{other}.")))
+
+
+def _connections(systems: dict[str, SystemNode], reader: Reader) -> tuple[list[Connection], list[_Edge]]:
+    """Return the connections between components as they are, and those that touch a system's connector."""
+    direct, edges = [], []
+    for path, system in systems.items():
+        for c in system.connections:
+            ends = [(c.start_element, c.start_connector), (c.end_element, c.end_connector)]
+            touched = [_system_at(path, element, systems) for element, _ in ends]
+            if touched == [None, None]:
+                start, end = (_join(path, element) for element, _ in ends)
+                direct.append(replace(c, start_element=start, end_element=end))
+            elif (edge := _edge(path, c, systems, reader)) is not None:
+                edges.append(edge)
+    return direct, edges
+
+
+def _system_at(path: str, element: str, systems: dict[str, SystemNode]) -> str | None:
+    """Return the path of the system that an element's name stands for, None if it is no system."""
+    found = _join(path, element) if element else path
+    return found if found in systems else None
+
+
+def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Reader) -> _Edge | None:
+    ends = []
+    for element, name in ((c.start_element, c.start_connector), (c.end_element, c.end_connector)):
+        place = (_join(path, element) if element else path, name)
+        connector = _connector(path, element, name, systems)
+        if connector is None:
+            what = f"'{element}' has no connector '{name}'" if element else f"the system has no connector '{name}'"
+            reader.report(c.line, "connection", what)
+            return None
+        if connector.kind not in _THROUGH:
+            reader.report(c.line, "unsupported", f"connects '{name}' of kind '{connector.kind}'; use a binding instead")
+            return None
+        # Seen from inside, a system's own input gives values and its own output takes them.
+        ends.append((place, (connector.kind == "output") == bool(element)))
+    (first, first_gives), (second, second_gives) = ends
+    if first_gives == second_gives:
+        both = "give" if first_gives else "take"
+        reader.report(c.line, "connection", f"'{first[1]}' and '{second[1]}' both {both} values")
+        return None
+    return _Edge(first, second, c) if first_gives else _Edge(second, first, c)
+
+
+def _connector(path: str, element: str, name: str, systems: dict[str, SystemNode]) -> Connector | None:
+    system = _system_at(path, element, systems)
+    if system is not None:
+        connectors = systems[system].connectors
+    else:
+        connectors = next((c.connectors for c in systems[path].components if c.name == element), ())
+    return next((x for x in connectors if x.name == name), None)
+
+
+def _followed(edges: list[_Edge], systems: dict[str, SystemNode], reader: Reader) -> Iterator[Connection]:
+    """Yield a connection for every component's input that is reached through systems' connectors."""
+    into: dict[_Place, list[_Edge]] = {}
+    for edge in edges:
+        into.setdefault(edge.target, []).append(edge)
+    for edge in edges:
+        if edge.target[0] not in systems:
+            yield from _trace(edge, into, systems, reader)
+
+
+def _trace(
+    last: _Edge, into: dict[_Place, list[_Edge]], systems: dict[str, SystemNode], reader: Reader
+) -> Iterator[Connection]:
+    chain = [last]
+    while chain[0].source[0] in systems:
+        before = into.get(chain[0].source, [])
+        if len(before) != 1 or len(chain) > len(into):
+            _report_end(chain[0], len(before), systems, reader)
+            return
+        chain.insert(0, before[0])
+    yield replace(
+        last.connection,
+        start_element=chain[0].source[0],
+        start_connector=chain[0].source[1],
+        end_element=last.target[0],
+        end_connector=last.target[1],
+        before=tuple(_leg(e, systems) for e in chain[:-1]),
+    )
+
+
+def _leg(edge: _Edge, systems: dict[str, SystemNode]) -> Leg:
+    """Return a connection that ends at a system's connector, whose unit its value has from there on."""
+    path, name = edge.target
+    unit = next(x.unit for x in systems[path].connectors if x.name == name)
+    c = edge.connection
+    return Leg(unit, c.transformation, c.suppress_unit_conversion, c.line)
+
+
+def _report_end(edge: _Edge, count: int, systems: dict[str, SystemNode], reader: Reader) -> None:
+    path, name = edge.source
+    where = f"connector '{name}' of system '{path or systems[''].name}'"
+    if count > 1:
+        text = f"{where} has {count} connections; one is allowed"
+    elif path:
+        text = f"{where} is connected to nothing"
+    else:
+        text = f"{where} is an input from outside, which nothing feeds here; connect '{edge.target[1]}' to a component"
+    reader.report(edge.connection.line, "connection", text)

@@ -1,0 +1,81 @@
+"""Several pantographs under one line: who runs ahead, and what following costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from master.arrays import FloatArray
+from master.contacts import Contact, strip_centre, track_position
+from master.recorder import Recording
+
+if TYPE_CHECKING:
+    from master.results import Assessment
+
+
+@dataclass(frozen=True)
+class Following:
+    """A pantograph and the one just ahead of it: figures of the follower minus those of the one ahead.
+
+    Attributes
+    ----------
+    leading, trailing : str
+        Component names.
+    distance : float
+        Between their strips at the start [m].
+    mean, sigma, minimum, maximum : float
+        Differences [N].
+    """
+
+    leading: str
+    trailing: str
+    distance: float
+    mean: float
+    sigma: float
+    minimum: float
+    maximum: float
+
+    @property
+    def sentence(self) -> str:
+        """The comparison in a line."""
+        return (
+            f"{self.trailing} {self.distance:.0f} m behind {self.leading}: sigma {self.sigma:+.1f} N, "
+            f"maximum {self.maximum:+.1f} N, minimum {self.minimum:+.1f} N"
+        )
+
+
+def leading_first(recording: Recording, contacts: Sequence[Contact]) -> list[Contact]:
+    """Return contacts in the order in which they pass a place."""
+    forward = all(x[-1] >= x[0] for x in (_position(recording, c) for c in contacts))
+    return sorted(contacts, key=lambda c: float(_position(recording, c)[0]), reverse=forward)
+
+
+def followings(recording: Recording, assessments: Sequence[Assessment]) -> tuple[Following, ...]:
+    """Compare every pantograph that has figures with the one ahead of it on the same line."""
+    found: list[Following] = []
+    for line in dict.fromkeys(a.contact.catenary for a in assessments):
+        own = {a.contact: a for a in assessments if a.contact.catenary == line}
+        ordered = leading_first(recording, list(own))
+        found += [_following(recording, own[ahead], own[behind]) for ahead, behind in pairwise(ordered)]
+    return tuple(found)
+
+
+def _following(recording: Recording, ahead: Assessment, behind: Assessment) -> Following:
+    places = [float(_position(recording, a.contact)[0]) for a in (ahead, behind)]
+    one, two = ahead.quality, behind.quality
+    return Following(
+        ahead.contact.pantograph,
+        behind.contact.pantograph,
+        abs(places[0] - places[1]),
+        two.mean - one.mean,
+        two.sigma - one.sigma,
+        two.minimum - one.minimum,
+        two.maximum - one.maximum,
+    )
+
+
+def _position(recording: Recording, contact: Contact) -> FloatArray:
+    centre = strip_centre(recording, contact, "x")
+    return track_position(recording, contact) if centre is None else centre

@@ -1,0 +1,1 @@
+"""Verification: cases written as data, run, and judged row by row against references."""

@@ -1,0 +1,112 @@
+"""The runs that cases need: each made once within a verification, told apart by content, never kept beyond it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Final
+
+from master.errors import InterruptedRunError, MasterError
+from master.results import Results
+from master.run import run
+from master.scenario import open_scenario
+from master.simulation import Observer
+from master.system import System
+from master.verify.case import Case
+
+#: Folder of the runs within the verification's folder.
+RUNS: Final = "runs"
+
+#: Makes the observers of one run, and takes them away after it.
+Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
+
+
+def content_key(system: System) -> str:
+    """Return a hash of all that a run's outcome depends on: FMUs, values, connections, times, settings."""
+    content = (
+        [(c.name, c.fmu.sha256, sorted(c.parameters.items()), c.inputs, c.outputs) for c in system.components],
+        [asdict(c) for c in system.connections],
+        (system.start, system.stop, system.step),
+        system.settings.model_dump_json(),
+    )
+    return hashlib.sha256(repr(content).encode()).hexdigest()
+
+
+def first_instant(system: System) -> System:
+    """Return the system with a run of a single step: enough for static figures."""
+    return replace(system, stop=system.start + system.step)
+
+
+@dataclass
+class Runs:
+    """Makes runs and keeps them as long as the verification lasts.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the runs' folders are put.
+    watching : callable
+        System -> context manager that gives its observers (progress).
+    tell : callable
+        Is told what takes time.
+    build : bool
+        Whether missing or stale FMUs are built.
+    """
+
+    folder: Path
+    watching: Watching
+    tell: Callable[[str], None] = lambda _: None
+    build: bool = True
+    _done: dict[str, Results | MasterError] = field(default_factory=dict)
+    _opened: dict[tuple[Path, bool], str] = field(default_factory=dict)
+    _names: set[str] = field(default_factory=set)
+
+    def get(self, case: Case, name: str) -> Results:
+        """Return the results of a case's run, which is made unless one of the same content was.
+
+        Raises
+        ------
+        MasterError
+            If it fails, and again whenever it is asked for.
+        InterruptedRunError
+            If the user stops it.
+        """
+        place = (case.scenario_path(name), case.runs[name].start_only)
+        if place not in self._opened:
+            self._opened[place] = self._make(*place)
+        outcome = self._done[self._opened[place]]
+        if isinstance(outcome, MasterError):
+            raise outcome
+        return outcome
+
+    def _make(self, path: Path, start_only: bool) -> str:
+        """Make a run, unless there is one, and return the key under which it is kept."""
+        try:
+            with open_scenario(path, tell=self.tell, build=self.build) as scenario:
+                return self._run(scenario.system, start_only)
+        except InterruptedRunError:
+            raise
+        except MasterError as error:
+            key = f"{path}, {start_only}"
+            self._done[key] = error
+            return key
+
+    def _run(self, whole: System, start_only: bool) -> str:
+        system = first_instant(whole) if start_only else whole
+        for key in (content_key(whole), content_key(system)):
+            if key in self._done:
+                return key
+        key = content_key(system)
+        folder = self._folder_of(f"{system.name}-start" if start_only else system.name, key)
+        with self.watching(system) as observers:
+            self._done[key] = run(system, folder, observers)
+        return key
+
+    def _folder_of(self, name: str, key: str) -> Path:
+        """Return a folder of the run's own, with part of its key in the name if the name is taken."""
+        own = f"{name}-{key[:8]}" if name in self._names else name
+        self._names.add(own)
+        return self.folder / own

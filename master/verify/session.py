@@ -1,0 +1,103 @@
+"""A verification: cases one after the other, and what is left of them on disk after each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from master import results
+from master.errors import InterruptedRunError, MasterError
+from master.verify import page
+from master.verify.case import Case
+from master.verify.outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
+from master.verify.runs import Runs
+
+JSON: Final = "verify.json"
+PAGE: Final = "verify.html"
+
+
+def verify(
+    cases: Sequence[Case],
+    folder: Path,
+    runs: Runs,
+    show: Callable[[CaseOutcome], None] = lambda _: None,
+) -> Verification:
+    """Run and judge cases; page and JSON in ``folder`` are written anew after each.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        What is verified, in this order.
+    folder : Path
+        Made, or taken over if it is an earlier verification's.
+    runs : Runs
+        Makes the runs.
+    show : callable
+        Is given every finished case.
+
+    Raises
+    ------
+    InterruptedRunError, KeyboardInterrupt
+        If the user stops it; the finished cases are in the page then.
+    MasterError
+        If the folder holds something else.
+    """
+    prepare(folder)
+    state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), results.versions(), len(cases))
+    writer = _Writer(folder)
+    writer.write(state)
+    try:
+        for case in cases:
+            state = state.with_case(judge_case(case, runs))
+            writer.write(state)
+            show(state.cases[-1])
+    except (InterruptedRunError, KeyboardInterrupt):
+        writer.write(replace(state, status="interrupted"))
+        raise
+    state = replace(state, status="complete")
+    writer.write(state)
+    return state
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder.
+
+    Raises
+    ------
+    MasterError
+        If it is there and is not a verification of ours.
+    """
+    if folder.is_dir() and any(folder.iterdir()) and not _is_ours(folder):
+        raise MasterError(
+            f"{folder} exists and is no verification of this tool; it is left alone, choose another with --out"
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        text = f"the folder {folder} cannot be made ({error.strerror}); choose another with --out"
+        raise MasterError(text) from error
+
+
+def _is_ours(folder: Path) -> bool:
+    try:
+        found = json.loads((folder / JSON).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(found, dict) and found.get("generator") == GENERATOR
+
+
+class _Writer:
+    """Writes page and JSON; each case's part of the page is made once."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._sections: list[str] = []
+
+    def write(self, state: Verification) -> None:
+        self._sections += [page.section(c) for c in state.cases[len(self._sections) :]]
+        results.write_json(self._folder / JSON, as_data(state))
+        results.write_text(self._folder / PAGE, page.page(state, self._sections))

@@ -1,0 +1,102 @@
+"""Runs beside runs, measurements beside simulations."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from master.errors import MasterError
+from master.report.comparison import columns, comparison_page
+from master.report.inputs import differing_inputs
+from master.report.measured import compare_measured, comparison_rows, read_measured
+from master.report.signals import all_signals
+
+
+def write(path, text):
+    path.write_text(text)
+    return path
+
+
+def as_csv(title, xs, fs):
+    return "\n".join([title, *(f"{x:.6f},{f:.6f}" for x, f in zip(xs, fs, strict=True))])
+
+
+@pytest.fixture
+def signals(made_up):
+    return all_signals(made_up())[0]
+
+
+def test_a_measurement_of_the_simulation_itself_correlates_fully(signals, tmp_path):
+    over_x = write(tmp_path / "x.csv", as_csv("position [m],force [N]", signals.position, signals.raw))
+    over_t = write(tmp_path / "t.csv", as_csv("time [s],force [N]", signals.time, signals.raw))
+    for path in (over_x, over_t):
+        found = compare_measured(signals, read_measured(path))
+        assert found.correlation == pytest.approx(1.0, abs=1e-6)
+        assert found.rms < 0.01
+        assert found.start == pytest.approx(50.0, abs=0.07)
+
+
+def test_units_separators_and_further_columns(signals, tmp_path):
+    rows = [f"{x / 1e3:.7f};7;{f / 1e3 + 0.01:.7f}" for x, f in zip(signals.position, signals.raw, strict=True)]
+    path = write(tmp_path / "m.csv", "\ufeffposition [km];mark;Force (kN)\n" + "\n".join(rows) + "\n\n")
+    found = compare_measured(signals, read_measured(path))
+    rows = {r[0]: r[1:] for r in comparison_rows(found)}
+    assert rows["mean force [N]"][2] == "-10.0"
+    assert rows["standard deviation [N]"][2] == "+0.0"
+    assert rows["correlation"][2] == "1.000"
+
+
+def test_noise_above_20_hz_does_not_disturb(signals, tmp_path):
+    noise = 40.0 * np.sin(2 * np.pi * 80.0 * signals.time)
+    path = write(tmp_path / "m.csv", as_csv("time [s],force [N]", signals.time, signals.raw + noise))
+    assert compare_measured(signals, read_measured(path)).rms < 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("position [m],speed [m/s]\n1,2\n", "no column named force"),
+        ("force [N]\n1\n", "no column named position or time"),
+        ("time [min],force [N]\n1,2\n2,3\n3,4\n", "unit 'min'"),
+        ("time [s],force [N]\n1,2\n2,x\n3,4\n", "not a column of numbers"),
+        ("time [s],force [N]\n1,2\n1,3\n3,4\n", "do not increase"),
+        ("time [s],force [N]\n1,2\n2,nan\n3,4\n", "finite"),
+        ("", "no column named position or time"),
+    ],
+)
+def test_what_is_wrong_with_a_measurement_is_said(tmp_path, text, said):
+    with pytest.raises(MasterError, match=said):
+        read_measured(write(tmp_path / "m.csv", text))
+
+
+def test_a_measurement_elsewhere_is_refused(signals, tmp_path):
+    path = write(tmp_path / "m.csv", "position [m],force [N]\n900,1\n901,2\n902,3\n")
+    with pytest.raises(MasterError, match="outside the interval of interest"):
+        compare_measured(signals, read_measured(path))
+
+
+def test_runs_stand_side_by_side_with_their_differences(made_up, tmp_path):
+    before, after = made_up(folder=tmp_path / "before"), made_up(folder=tmp_path / "after")
+    louder = dataclasses.replace(after.recordings[0], values=after.recordings[0].values.copy())
+    louder.values[:, 0] += 10.0
+    after = dataclasses.replace(after, recordings=(louder, *after.recordings[1:]))
+    assert [c.name for c in columns([before, after])] == ["before", "after"]
+    page = comparison_page([before, after])
+    assert "(+10.0)" in page
+    assert page.count("class='tiles'") == 2
+    assert "Inputs that differ" in page
+
+
+def test_one_run_alone_is_no_comparison(made_up, tmp_path):
+    with pytest.raises(MasterError, match="nothing to compare"):
+        comparison_page([made_up(folder=tmp_path / "a")])
+
+
+def test_only_inputs_that_differ_are_listed():
+    def run(tension):
+        inputs = [{"name": "tension", "value": tension, "unit": "N"}, {"name": "length", "value": 1.0}]
+        component = {"name": "line", "fmu": "Line.fmu", "sha256": "0" * 64, "inputs": inputs}
+        return {"components": [component]}
+
+    assert differing_inputs([run(1.0), run(2.0)]) == [("line.tension [N]", "1", "2")]
+    assert differing_inputs([run(1.0), run(1.0)]) == []

@@ -165,6 +165,7 @@ class CatenaryModel:
             ContactWire(chain, self.static, self.free_index, self._angles) for chain in self.mesh.contact_chains()
         )
         self.uplift_dofs = self.free_index[self.mesh.support_nodes * NODE_DOFS + 2]
+        self._law = CONTACT_LAWS[definition.contact.law]
         self._steppers: dict[float, _Stepper] = {}
         n = len(self.free)
         self._work = np.empty(n)
@@ -232,7 +233,7 @@ class CatenaryModel:
                     wire, found, strip, state.displacement[dofs], state.velocity[dofs]
                 )
                 impact = max(velocity, 0.0)
-                law = CONTACT_LAWS["continuous"](penetration, velocity, impact, self.definition.contact)
+                law = self._law(penetration, velocity, impact, self.definition.contact)
                 result.force[p, s] = law.scaled(found.engagement).force
                 result.point[p, s] = self._point(wire, found, state.displacement)
         return result
@@ -293,7 +294,7 @@ class CatenaryModel:
             unilateral=self.unilateral,
             dropper_columns=stiffness.dropper_columns,
             velocity_factor=newmark.a1,
-            law=CONTACT_LAWS["continuous"],
+            law=self._law,
             parameters=self.definition.contact,
         )
         product = sp.hstack([-2.0 * self.K, newmark.a2 * self.M], format="csr")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from models import schema
+from models.contact import CONTACT_LAWS
 from models.definition import Quantity, Table
 from models.part import Parameter
 from models.schema import count, quantity
@@ -127,8 +128,9 @@ class Damping:
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """Contact of collector strip and contact wire."""
+    """Contact of collector strip and contact wire; ``law`` is one of ``CONTACT_LAWS``."""
 
+    law: str = "continuous"
     stiffness: float = quantity("N/m", "contact stiffness (N/m^n for an exponent n)", default=20000.0, positive=True)
     exponent: float = quantity("1", "exponent n of the penetration", default=1.0, minimum=1.0, maximum=3.0)
     restitution: float = quantity("1", "coefficient of restitution", default=1.0, minimum=0.0, maximum=1.0)
@@ -334,7 +336,7 @@ def read(table: Table) -> CatenaryDefinition:
         dropper=_read_dropper(table.required_table("dropper")),
         clamps=schema.read(Clamps, table.table("clamps") or Table.from_dict({})),
         damping=_read_damping(table.required_table("damping")),
-        contact=schema.read(Contact, table.table("contact") or Table.from_dict({})),
+        contact=_read_contact(table.table("contact") or Table.from_dict({})),
         mesh=schema.read(Mesh, table.table("mesh") or Table.from_dict({})),
         sections=sections,
         stitch_wire=schema.read(StitchWire, stitch) if stitch is not None else None,
@@ -406,6 +408,10 @@ def _read_dropper(table: Table) -> Dropper:
     if dropper.stiffness is None and (dropper.area is None or dropper.youngs_modulus is None):
         table.problem("stiffness", "give either stiffness, or area and youngs_modulus")
     return dropper
+
+
+def _read_contact(table: Table) -> Contact:
+    return schema.read(Contact, table, law=table.text("law", default="continuous", choices=CONTACT_LAWS))
 
 
 def _read_damping(table: Table) -> Damping:

@@ -260,7 +260,7 @@ class _StaticResponse:
             unilateral=model.unilateral,
             dropper_columns=self._columns,
             velocity_factor=0.0,
-            law=CONTACT_LAWS["continuous"],
+            law=CONTACT_LAWS[model.definition.contact.law],
             parameters=model.definition.contact,
         )
         self._rest = self._solve(model.B.T @ model.rest_compensation)

@@ -13,8 +13,8 @@ from models.pantograph.parameters import LumpedDefinition
 LIBRARY = Path(models.__file__).parent / "library"
 
 
-def make_line(spans: int = 6, alpha: float = 0.0272, **changes: object) -> CatenaryDefinition:
-    """Return a simple line of LN2's wires with ``spans`` spans of 50 m."""
+def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -> CatenaryDefinition:
+    """Return a simple line of LN2's wires with ``spans`` spans of 50 m; a change to None takes a table away."""
     source = "test"
     data = {
         "name": "short",
@@ -64,7 +64,39 @@ def make_line(spans: int = 6, alpha: float = 0.0272, **changes: object) -> Caten
         "damping": {"alpha": [alpha, "s", source], "beta": [0.0, "1/s", source]},
     }
     data.update(changes)
-    return read(Table.from_dict(data, "short.toml"))
+    if spans is None:
+        del data["spans"]
+    return read(Table.from_dict({k: v for k, v in data.items() if v is not None}, "short.toml"))
+
+
+def make_section(start: float, spans: int, stagger: list[float], *, anchor: float = 0.0, **ends: object) -> dict[str, object]:
+    """Return a section of ``spans`` spans of 50 m from ``start``, its inner supports at the places ``stagger``."""
+    source = "test"
+    return {
+        "spans": {
+            "start": [start, "m", source],
+            "count": spans,
+            "length": [50.0, "m", source],
+            "droppers": {"first": [4.5, "m", source], "count": 7},
+        },
+        "stagger": {"listed": [stagger, "m", source], "anchor": [anchor, "m", source]},
+        "ends": {"spans": 1, "rise": [0.1, "m", source]} | ends,
+    }
+
+
+def make_sections(*sections: dict[str, object], **changes: object) -> CatenaryDefinition:
+    """Return a line of LN2's wires in several sections."""
+    return make_line(spans=None, stagger=None, ends=None, section=list(sections), **changes)
+
+
+@pytest.fixture(scope="session")
+def section_maker():
+    return make_section
+
+
+@pytest.fixture(scope="session")
+def sections_maker():
+    return make_sections
 
 
 @pytest.fixture(scope="session")

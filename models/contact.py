@@ -88,7 +88,9 @@ ContactLaw = Callable[[float, float, float, ContactParameters], NormalForce]
 CONTACT_LAWS: dict[str, ContactLaw] = {"continuous": continuous_contact}
 
 
-def crossing(a: FloatArray, b: FloatArray, i: tuple[float, float], j: tuple[float, float]) -> tuple[float, float] | None:
+def crossing(
+    a: FloatArray, b: FloatArray, i: tuple[float, float], j: tuple[float, float]
+) -> tuple[float, float] | None:
     """Intersect strip and wire element in plan [2.36-2.42].
 
     Parameters

@@ -83,15 +83,9 @@ CONNECTION = (
     [
         (
             "</ssd:Elements>",
-            '<ssd:System name="inner"/></ssd:Elements>',
+            '<ssd:SignalDictionaryReference name="bus" dictionary="d"/></ssd:Elements>',
             "unsupported",
-            "element 'inner' is a System, which is not supported",
-        ),
-        (
-            '<ssd:System name="toy">',
-            '<ssd:System name="toy"><ssd:Connectors><ssd:Connector name="a" kind="input"/></ssd:Connectors>',
-            "unsupported",
-            "connectors of the system",
+            "element 'bus' is a SignalDictionaryReference, which is not supported",
         ),
         (
             COMPONENT,
@@ -111,8 +105,8 @@ CONNECTION = (
             '<ssd:ParameterBinding source="parameters.ssv"/>',
             '<ssd:ParameterBinding source="parameters.ssv">'
             '<ssd:ParameterMapping source="a.ssm"/></ssd:ParameterBinding>',
-            "unsupported",
-            "parameter mappings are not supported",
+            "mapping",
+            "mapping file 'a.ssm' does not exist",
         ),
         (
             '<ssd:ParameterBinding source="parameters.ssv"/>',
@@ -178,7 +172,7 @@ def test_several_mistakes_are_all_reported(base, tmp_path):
 
 
 def test_other_versions_are_refused(base, tmp_path):
-    _, problems = read(tmp_path, base.replace('version="1.0" name', 'version="2.0" name', 1))
+    _, problems = read(tmp_path, base.replace('version="1.0" name', 'version="3.0" name', 1))
     assert any(p.rule == "version" for p in problems)
 
 

@@ -1,0 +1,1 @@
+"""Families of runs: one scenario, many variants, reported side by side."""

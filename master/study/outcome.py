@@ -1,0 +1,165 @@
+"""What a study has found so far, and as rows for tables and files."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
+from typing import Any, Final
+
+from master.results import Results
+from master.study.family import Family, Interval
+from master.study.figures import Entry, entries
+
+GENERATOR: Final = "openpanto study"
+#: Columns of the figures: title, unit, how to get it, decimals.
+FIGURES: Final[tuple[tuple[str, str, Callable[[Entry], float | None], int], ...]] = (
+    ("mean", "N", lambda e: e.assessment.quality.mean, 1),
+    ("sigma", "N", lambda e: e.assessment.quality.sigma, 1),
+    ("sigma / mean", "1", lambda e: e.assessment.quality.sigma / e.assessment.quality.mean, 3),
+    ("maximum", "N", lambda e: e.assessment.quality.maximum, 1),
+    ("minimum", "N", lambda e: e.assessment.quality.minimum, 1),
+    ("amplitude", "N", lambda e: e.assessment.quality.amplitude, 1),
+    ("statistical minimum", "N", lambda e: e.assessment.quality.statistical_minimum, 1),
+    ("share of loss", "%", lambda e: e.assessment.quality.losses.percentage, 2),
+    ("uplift", "mm", lambda e: None if e.uplift is None else 1e3 * e.uplift, 1),
+    ("slack droppers", "%", lambda e: None if e.slack is None else 1e2 * e.slack, 0),
+)
+
+
+@dataclass(frozen=True)
+class Done:
+    """A variant that was run.
+
+    Attributes
+    ----------
+    name : str
+    results : Results
+    """
+
+    name: str
+    results: Results
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A study so far.
+
+    Attributes
+    ----------
+    family : Family
+    date : str
+    versions : dict
+    status : str
+        running, interrupted or complete.
+    done : tuple of Done
+        In the order of the table.
+    failures : dict
+        Why variants failed, by name.
+    """
+
+    family: Family
+    date: str
+    versions: Mapping[str, str]
+    status: str = "running"
+    done: tuple[Done, ...] = ()
+    failures: Mapping[str, str] = field(default_factory=dict)
+
+    def entries(self, interval: Interval) -> tuple[Entry, ...]:
+        """Return the figures of all pantographs of all variants in an interval."""
+        return tuple(e for d in self.done for e in entries(d.name, d.results, interval))
+
+
+def shown(value: float | None, decimals: int) -> str:
+    """Return a figure as text."""
+    return "-" if value is None else f"{value:.{decimals}f}"
+
+
+def verdict(entry: Entry) -> str:
+    """Return EN 50367's verdict in a few words.
+
+    A mean force off its target is named even where the study wants another mean.
+    """
+    failed = [c.name for c in entry.assessment.criteria if not c.passed]
+    return f"fails: {', '.join(failed)}" if failed else "passes"
+
+
+def differences(found: Sequence[Entry]) -> list[tuple[str, str, str, tuple[float, float, float]]]:
+    """Return what stands beside what: sigma, maximum and minimum of one less those of the other [N].
+
+    Every follower is compared with the pantograph ahead, and everyone with a variant of a single pantograph of the
+    same name ending (``single, low damping`` for ``31 m, low damping``), if there is one.
+    """
+    singles = {_kind(e.variant): e for e in found if _is_single(e, found)}
+    rows = []
+    for variant in dict.fromkeys(e.variant for e in found):
+        own = [e for e in found if e.variant == variant]
+        rows += [_beside(b, a, a.pantograph) for a, b in pairwise(own)]
+        single = singles.get(_kind(variant))
+        rows += [_beside(e, single, single.variant) for e in own if single is not None and single is not e]
+    return rows
+
+
+def _is_single(entry: Entry, found: Sequence[Entry]) -> bool:
+    return sum(e.variant == entry.variant for e in found) == 1
+
+
+def _kind(variant: str) -> str:
+    return variant.partition(",")[2].strip()
+
+
+def _beside(one: Entry, other: Entry, name: str) -> tuple[str, str, str, tuple[float, float, float]]:
+    a, b = one.assessment.quality, other.assessment.quality
+    change = (a.sigma - b.sigma, a.maximum - b.maximum, a.minimum - b.minimum)
+    return one.variant, one.pantograph, name, change
+
+
+def as_csv(outcome: Outcome) -> str:
+    """Return every figure of the study as a table."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    heads = [f"{title} [{unit}]" for title, unit, _, _ in FIGURES]
+    sharing = ["both wires from [m]", "both wires to [m]", "both wires [s]", "least total force [N]", "losses per wire"]
+    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", *sharing])
+    for interval in outcome.family.settings.interval:
+        for e in outcome.entries(interval):
+            values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
+            writer.writerow([e.variant, interval.name, e.pantograph, *values, verdict(e), *_sharing_cells(e)])
+    return text.getvalue()
+
+
+def _sharing_cells(e: Entry) -> list[str]:
+    s = e.sharing
+    if s is None:
+        return [""] * 5
+    numbers = (s.start, s.end, s.duration, s.least_force)
+    return [*(f"{v:.6g}" for v in numbers), " ".join(map(str, s.losses))]
+
+
+def as_data(outcome: Outcome) -> dict[str, Any]:
+    """Return the contents of ``study.json``."""
+    return {
+        "generator": GENERATOR,
+        "study": outcome.family.name,
+        "title": outcome.family.settings.title,
+        "status": outcome.status,
+        "date": outcome.date,
+        "versions": dict(outcome.versions),
+        "variants": [{"name": d.name, "folder": d.results.folder.name} for d in outcome.done],
+        "failures": dict(outcome.failures),
+        "figures": [_entry_data(e) for i in outcome.family.settings.interval for e in outcome.entries(i)],
+    }
+
+
+def _entry_data(e: Entry) -> dict[str, Any]:
+    figures = {f"{title} [{unit}]": get(e) for title, unit, get, _ in FIGURES}
+    return {
+        "variant": e.variant,
+        "interval": e.interval.name,
+        "pantograph": e.pantograph,
+        **figures,
+        "criteria": [asdict(c) for c in e.assessment.criteria],
+        "sharing": asdict(e.sharing) if e.sharing is not None else None,
+    }

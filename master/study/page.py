@@ -1,0 +1,86 @@
+"""A study as a page: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from master.quality import FILTER_NOTE
+from master.report import markup
+from master.report.charts import Chart
+from master.study import charts
+from master.study.figures import Entry
+from master.study.outcome import FIGURES, Outcome, differences, shown, verdict
+
+_STATUS = {
+    "running": "Not finished: still running, or killed. What follows is what was computed.",
+    "interrupted": "Interrupted. What follows is what was computed.",
+}
+
+
+def page(outcome: Outcome) -> str:
+    """Return the whole page."""
+    settings = outcome.family.settings
+    drawn: list[Chart] = []
+    body = [
+        f"<h1>{markup.text(outcome.family.name)}</h1>",
+        f"<p>{markup.text(settings.title)}</p>",
+        f"<p class='note'>{markup.text(settings.source)}; {markup.text(outcome.date)}</p>",
+    ]
+    if outcome.status in _STATUS:
+        body.append(f"<p class='warning'>{_STATUS[outcome.status]}</p>")
+    body += [f"<p class='warning'>{markup.text(f'{n}: {why}')}</p>" for n, why in outcome.failures.items()]
+    for interval in settings.interval:
+        found = outcome.entries(interval)
+        title = f"{interval.name}, {interval.start:g} m to {interval.end:g} m"
+        body.append(f"<h2>{markup.text(title)}</h2>")
+        if found:
+            body += _tables(found)
+            body += _place(charts.interval_charts(outcome, interval, found), drawn)
+    body += _sharing(outcome)
+    body += _place(charts.sharing_charts(outcome), drawn)
+    if histories := charts.history_charts(outcome):
+        body += ["<h2>Histories</h2>", *_place(histories, drawn)]
+    body.append(f"<p class='note'>Contact forces: {markup.text(FILTER_NOTE)}.</p>")
+    return markup.document(outcome.family.name, body, drawn)
+
+
+def _place(made: Sequence[Chart], drawn: list[Chart]) -> list[str]:
+    drawn += made
+    return [markup.chart(c) for c in made]
+
+
+def _tables(found: Sequence[Entry]) -> list[str]:
+    heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), "EN 50367"]
+    rows = [
+        [f"{e.variant}, {e.pantograph}", *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found
+    ]
+    note = (
+        "Uplift: the interval's supports, all pantographs. Slack droppers: share of the interval's droppers that "
+        "carry nothing for a moment as this pantograph passes, until the next one comes."
+    )
+    parts = [markup.table(heads, rows), f"<p class='note'>{note}</p>"]
+    if beside := differences(found):
+        lines = [[f"{v}, {p}", other, *(f"{d:+.1f}" for d in change)] for v, p, other, change in beside]
+        heads = ["variant, pantograph", "less", "sigma [N]", "maximum [N]", "minimum [N]"]
+        parts += ["<h3>Leading and trailing, one and two</h3>", markup.table(heads, lines)]
+    return parts
+
+
+def _sharing(outcome: Outcome) -> list[str]:
+    found = [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing is not None]
+    if not found:
+        return []
+    heads = ["variant, pantograph", "both wires from [m]", "to [m]", "[s]", "losses per wire", "least total force [N]"]
+    rows = [
+        [
+            f"{e.variant}, {e.pantograph}",
+            f"{s.start:.1f}",
+            f"{s.end:.1f}",
+            f"{s.duration:.3f}",
+            ", ".join(map(str, s.losses)),
+            f"{s.least_force:.1f}",
+        ]
+        for e in found
+        if (s := e.sharing) is not None
+    ]
+    return ["<h2>From wire to wire</h2>", markup.table(heads, rows)]

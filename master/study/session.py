@@ -1,0 +1,136 @@
+"""A study: variants one after the other, and what is left of them on disk after each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from master import results
+from master.errors import InterruptedRunError, MasterError
+from master.study.family import Family, Variant
+from master.study.outcome import GENERATOR, Done, Outcome, as_csv, as_data
+from master.study.page import page
+from master.study.variants import Runner, finished, folder_name
+
+JSON: Final = "study.json"
+CSV: Final = "study.csv"
+PAGE: Final = "study.html"
+
+
+def study(
+    family: Family,
+    chosen: Sequence[Variant],
+    folder: Path,
+    runner: Runner,
+    again: bool = False,
+    show: Callable[[Done], None] = lambda _: None,
+) -> Outcome:
+    """Run variants; page, table and JSON in ``folder`` are written anew after each.
+
+    A variant that an earlier study in the same folder has finished, with the same FMUs and values, is not run again;
+    those that were not chosen are reported if they are there.
+
+    Parameters
+    ----------
+    family : Family
+    chosen : sequence of Variant
+        What is run.
+    folder : Path
+        Made, or taken over if it is an earlier study's.
+    runner : Runner
+        Makes the runs.
+    again : bool
+        Whether finished variants are run again.
+    show : callable
+        Is given every variant that has been run.
+
+    Raises
+    ------
+    InterruptedRunError, KeyboardInterrupt
+        If the user stops it; the finished variants are in the page then.
+    MasterError
+        If the folder holds something else.
+    """
+    prepare(folder)
+    state = Outcome(family, datetime.now(UTC).isoformat(timespec="seconds"), results.versions())
+    write(state, folder)
+    try:
+        for variant in family.variants:
+            place = folder / folder_name(variant.name)
+            wanted = variant in chosen
+            state = _with_variant(state, variant, runner, _Task(place, wanted, not (again and wanted), show))
+            write(state, folder)
+    except (InterruptedRunError, KeyboardInterrupt):
+        write(replace(state, status="interrupted"), folder)
+        raise
+    state = replace(state, status="complete")
+    write(state, folder)
+    return state
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder.
+
+    Raises
+    ------
+    MasterError
+        If it is there and is not a study of ours.
+    """
+    if folder.is_dir() and any(folder.iterdir()) and not _is_ours(folder):
+        raise MasterError(f"{folder} exists and is no study of this tool; it is left alone, choose another with --out")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MasterError(
+            f"the folder {folder} cannot be made ({error.strerror}); choose another with --out"
+        ) from error
+
+
+def write(state: Outcome, folder: Path) -> None:
+    """Write what there is so far."""
+    results.write_json(folder / JSON, as_data(state))
+    results.write_text(folder / CSV, as_csv(state))
+    results.write_text(folder / PAGE, page(state))
+
+
+def _is_ours(folder: Path) -> bool:
+    try:
+        found = json.loads((folder / JSON).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(found, dict) and found.get("generator") == GENERATOR
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is to become of a variant: where it lies, whether it is run, whether an earlier run counts."""
+
+    folder: Path
+    wanted: bool
+    reuse: bool
+    show: Callable[[Done], None]
+
+
+def _with_variant(state: Outcome, variant: Variant, runner: Runner, task: _Task) -> Outcome:
+    if not task.wanted and not results.is_ours(task.folder):
+        return state
+    try:
+        with runner.opened(state.family, variant) as system:
+            found = finished(task.folder, system) if task.reuse else None
+            if found is None and task.wanted:
+                runner.tell(f"{system.name}, {system.start:g} s to {system.stop:g} s")
+                found = runner.run(system, task.folder)
+    except InterruptedRunError:
+        raise
+    except MasterError as error:
+        return replace(state, failures={**state.failures, variant.name: str(error)})
+    if found is None:
+        return state
+    done = Done(variant.name, found)
+    if task.wanted:
+        task.show(done)
+    return replace(state, done=(*state.done, done))

@@ -1,0 +1,108 @@
+"""A study on the terminal, 80 columns wide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from master.study.family import Family, Interval
+from master.study.figures import Entry
+from master.study.outcome import Outcome, differences, shown, verdict
+
+_WIDTH: Final = 80
+_SIGMA: Final = "\u03c3"
+_FIGURE_HEADS: Final = (
+    *("variant", "pantograph", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),
+)
+
+
+def show(console: Console, outcome: Outcome) -> None:
+    """Print a study: figures and differences for each interval, then the changes of wire, then what failed."""
+    for interval in outcome.family.settings.interval:
+        found = outcome.entries(interval)
+        if found:
+            console.print(figures_table(interval, found))
+        if beside := differences(found):
+            console.print(differences_table(beside))
+    if sharing := [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing]:
+        console.print(sharing_table(sharing))
+    for name, text in outcome.failures.items():
+        console.print(f"variant '{name}' failed: {text}", style="red", markup=False, soft_wrap=True)
+
+
+def figures_table(interval: Interval, found: Sequence[Entry]) -> Table:
+    """Return the statistics of all pantographs."""
+    where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
+    title = f"{where}; force 0-20 Hz [N], uplift [mm], slack droppers [%], loss [%]"
+    table = _table(title, _FIGURE_HEADS)
+    for e in found:
+        q = e.assessment.quality
+        numbers = (q.mean, q.sigma, q.sigma / q.mean, q.maximum, q.minimum, q.statistical_minimum)
+        texts = [shown(v, d) for v, d in zip(numbers, (1, 1, 3, 0, 0, 0), strict=True)]
+        uplift = shown(None if e.uplift is None else 1e3 * e.uplift, 0)
+        slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
+        style = "" if e.assessment.passed else "yellow"
+        cells = [*texts, uplift, slack, shown(q.losses.percentage, 1)]
+        table.add_row(escape(e.variant), escape(e.pantograph), *cells, style=style)
+    if failing := _failing(found):
+        table.caption = escape(failing)
+        table.caption_justify = "left"
+    return table
+
+
+def _failing(found: Sequence[Entry]) -> str:
+    """Return which pantographs fail what, grouped by what."""
+    groups: dict[str, list[str]] = {}
+    for e in found:
+        if not e.assessment.passed:
+            groups.setdefault(verdict(e), []).append(f"{e.variant} {e.pantograph}")
+    if not groups:
+        return "EN 50367: all pass"
+    everyone = len(found)
+    words = [f"{what} ({'all' if len(who) == everyone else '; '.join(who)})" for what, who in groups.items()]
+    return f"EN 50367: {'. '.join(words)}"
+
+
+def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, float]]]) -> Table:
+    """Return what stands beside what."""
+    table = _table(
+        "less the one ahead, and less the single one [N]", ("variant", "pantograph", "less", _SIGMA, "max", "min")
+    )
+    for variant, pantograph, other, change in rows:
+        table.add_row(escape(variant), escape(pantograph), escape(other), *(f"{d:+.1f}" for d in change))
+    return table
+
+
+def sharing_table(found: Sequence[Entry]) -> Table:
+    """Return how the strips pass from wire to wire."""
+    heads = ("variant", "pantograph", "from m", "to m", "s", "losses per wire", "least total N")
+    table = _table("From wire to wire: both touched", heads)
+    for e in found:
+        if (s := e.sharing) is not None:
+            numbers = (f"{s.start:.1f}", f"{s.end:.1f}", f"{s.duration:.3f}", " ".join(map(str, s.losses)))
+            table.add_row(escape(e.variant), escape(e.pantograph), *numbers, f"{s.least_force:.0f}")
+    return table
+
+
+def list_table(families: Sequence[Family]) -> Table:
+    """Return families with their variants."""
+    table = _table("", ("study", "variants", "what"))
+    for family in families:
+        names = "\n".join(v.name for v in family.variants)
+        table.add_row(escape(family.name), escape(names), escape(family.settings.title))
+    return table
+
+
+def _table(title: str, heads: Sequence[str]) -> Table:
+    table = Table(title=title or None, title_justify="left", width=_WIDTH - 1, box=SIMPLE_HEAD, pad_edge=False)
+    texts = ("variant", "pantograph", "less", "study", "variants", "what")
+    for head in heads:
+        is_text = head in texts
+        table.add_column(head, justify="left" if is_text else "right", no_wrap=not is_text)
+    table.padding = (0, 1)
+    return table

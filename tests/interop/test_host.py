@@ -1,0 +1,172 @@
+"""A host in plain C: what a tool does that is not Python, and the same numbers as in Python, bit for bit."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build, recipe
+from fmus.shim import INNER_SUFFIX
+from master.run import loaded
+from master.scenario import open_scenario
+from master.ssp.archive import extract
+from tests.interop.support import STEP
+
+pytestmark = pytest.mark.skipif(
+    not sys.platform.startswith("linux") or shutil.which(os.environ.get("CC", "cc")) is None,
+    reason="needs Linux and a C compiler (set CC, or install gcc)",
+)
+SOURCE = Path(__file__).parent / "host" / "host.c"
+STEPS = 200
+EXCHANGES = 6
+FORCE = "pantograph[1].contact.force"
+LIBPYTHON = Path(sysconfig.get_config_var("LIBDIR") or "") / (sysconfig.get_config_var("INSTSONAME") or "none")
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory):
+    """The host, compiled with FMPy's copy of the FMI headers."""
+    headers = Path(importlib.util.find_spec("fmpy").origin).parent / "c-code"
+    program = tmp_path_factory.mktemp("host") / "host"
+    command = [os.environ.get("CC", "cc"), "-std=gnu11", "-O1", "-Wall", "-Werror", f"-I{headers}", str(SOURCE)]
+    subprocess.run([*command, "-o", str(program), "-ldl"], check=True)
+    return program
+
+
+@dataclass(frozen=True)
+class Unpacked:
+    """An FMU as a tool unpacks it."""
+
+    folder: Path
+    name: str
+
+    @property
+    def library(self):
+        return self.folder / "binaries" / "linux64" / f"{self.name}.so"
+
+
+@pytest.fixture(scope="module")
+def system(packed, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scenario")
+    extract(packed, folder)
+    with open_scenario(folder, build=False) as scenario:
+        return scenario.system
+
+
+def unpack(fmu, folder):
+    with zipfile.ZipFile(fmu) as file:
+        file.extractall(folder / fmu.stem)
+    return Unpacked(folder / fmu.stem, fmu.stem)
+
+
+@pytest.fixture(scope="module")
+def plain(system, tmp_path_factory):
+    """The scenario's FMUs, unpacked."""
+    folder = tmp_path_factory.mktemp("plain")
+    return [unpack(c.fmu.path, folder) for c in system.components]
+
+
+@pytest.fixture(scope="module")
+def shimmed(system, tmp_path_factory):
+    """The same FMUs with the shim."""
+    built, folder = tmp_path_factory.mktemp("built"), tmp_path_factory.mktemp("shimmed")
+    return [unpack(build(recipe(c.fmu.path.stem), built, shim=True), folder) for c in system.components]
+
+
+def plan(system, unpacked):
+    """The host's orders."""
+    pairs = zip(unpacked, system.components, strict=True)
+    lines = [f"fmu {u.library} {c.fmu.guid} file://{u.folder}/resources" for u, c in pairs]
+    names = [c.name for c in system.components]
+    variables = [c.fmu.variables for c in system.components]
+    for i, component in enumerate(system.components):
+        lines += [f"parameter {i} {variables[i][n].reference} {v!r}" for n, v in component.parameters.items()]
+    for c in system.connections:
+        i, j = names.index(c.source), names.index(c.target)
+        lines.append(f"connect {i} {variables[i][c.output].reference} {j} {variables[j][c.input].reference}")
+    for i, component in enumerate(system.components):
+        lines += [f"observe {i} {variables[i][name].reference}" for name in component.outputs]
+    return "\n".join([*lines, f"run {STEPS} {STEP!r}"]) + "\n"
+
+
+@pytest.fixture(scope="module")
+def in_python(system):
+    """The numbers that the host is to find, from FMPy."""
+    with loaded(system) as network:
+        for slave in network.slaves:
+            slave.start(0.0, STEPS * STEP)
+        for _ in range(EXCHANGES):
+            network.read()
+            network.gather()
+            network.write()
+        for slave in network.slaves:
+            slave.finish_initialisation()
+        values = []
+        for n in range(STEPS):
+            network.read()
+            network.gather()
+            network.write()
+            for slave in network.slaves:
+                slave.step(n * STEP, STEP)
+            network.read()
+            values += network.outputs.tolist()
+        force = network.output_names.index(f"catenary.{FORCE}")
+        assert max(values[force :: len(network.output_names)]) > 50.0
+    return values
+
+
+def run(host, orders, **environment):
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "LD_"))}
+    clean |= {"OMP_NUM_THREADS": "1", **environment}
+    return subprocess.run([host], input=orders, env=clean, capture_output=True, text=True, check=False)
+
+
+def numbers(done):
+    assert done.returncode == 0, f"ended with {done.returncode}: {done.stderr[-3000:]}"
+    assert done.stderr.count("same bits:") == 6
+    return [float.fromhex(line) for line in done.stdout.split()]
+
+
+def test_bits_as_in_python_with_the_shim(host, system, shimmed, in_python):
+    """Nothing is preloaded, PATH does not lead to this Python: one variable names it."""
+    assert all(u.library.with_suffix(INNER_SUFFIX).is_file() for u in shimmed)
+    done = run(host, plan(system, shimmed), PATH="/usr/bin:/bin", OPENPANTO_PYTHON=sys.executable)
+    assert numbers(done) == in_python
+
+
+def test_bits_as_in_python_with_the_shim_and_python_on_path(host, system, shimmed, in_python):
+    done = run(host, plan(system, shimmed), PATH=f"{Path(sys.executable).parent}:/usr/bin:/bin")
+    assert numbers(done) == in_python
+
+
+@pytest.mark.skipif(not LIBPYTHON.is_file(), reason="this Python has no shared library that could be preloaded")
+def test_bits_as_in_python_without_the_shim(host, system, plain, in_python):
+    """The FMU as built by default: libpython is preloaded, this Python is the first on PATH."""
+    path = f"{Path(sys.executable).parent}:/usr/bin:/bin"
+    done = run(host, plan(system, plain), PATH=path, LD_PRELOAD=str(LIBPYTHON))
+    values = [float.fromhex(line) for line in done.stdout.split()]
+    assert values == in_python, done.stderr[-3000:]
+    assert done.stderr.count("same bits:") == 6
+
+
+@pytest.mark.parametrize(
+    ("python", "text"),
+    [("/nowhere/python3", "no Python 3 found"), ("BARE", "lacks the packages numpy and scipy")],
+)
+def test_the_shim_says_what_is_missing(host, system, shimmed, tmp_path, python, text):
+    if python == "BARE":
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "bare")], check=True)
+        python = str(tmp_path / "bare" / "bin" / "python")
+    done = run(host, plan(system, shimmed), PATH="/usr/bin:/bin", OPENPANTO_PYTHON=python)
+    assert done.returncode == 1
+    assert text in done.stderr
+    assert "cannot be instantiated" in done.stderr

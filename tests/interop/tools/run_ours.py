@@ -1,0 +1,38 @@
+"""Run a packed scenario in our own master with the scheme jacobi, recording no more than the other runners do."""
+
+from pathlib import Path
+
+import common
+
+from master.algorithm import Jacobi
+from master.run import loaded
+from master.scenario import Overrides, open_scenario
+from master.simulation import TimeGrid, simulate
+
+archive, step, count, out = common.arguments()
+
+
+class Collector:
+    """Observer that keeps the contact force of every step."""
+
+    def begin(self, time, network):
+        self._place = network.output_names.index(f"{common.COMPONENT}.{common.VARIABLE}")
+        self.forces = []
+        watch.mark()
+
+    def observe(self, index, time, network):
+        self.forces.append(float(network.outputs[self._place]))
+
+    def finish(self):
+        watch.mark()
+
+
+collector = Collector()
+with open_scenario(Path(archive), Overrides(count * step, step, "jacobi"), build=False) as scenario:
+    watch = common.Watch()
+    with loaded(scenario.system) as network:
+        outcome = simulate(network, Jacobi(), TimeGrid(0.0, step, count), [collector])
+if outcome.error:
+    raise SystemExit(str(outcome.error))
+common.write(out, step, collector.forces)
+watch.report()

@@ -1,0 +1,158 @@
+"""Lines of several sections: reading, geometry of the overlap, mechanical independence."""
+
+import numpy as np
+import pytest
+
+from models.catenary.model import CatenaryModel, StripMotion
+from models.catenary.part import CatenaryPart
+from models.catenary.statics import arm_loads
+from models.contact import STRIP_EDGE
+from models.definition import DefinitionError
+from models.library import load_line
+
+#: Half of the pan-head's working length [m].
+HALF_STRIP = 0.725
+
+
+@pytest.fixture(scope="module")
+def overlap():
+    return CatenaryModel(load_line("LN2_overlap"))
+
+
+@pytest.fixture(scope="module")
+def pair(section_maker, sections_maker):
+    """Two sections of four spans that share two of them."""
+    left = section_maker(0.0, 4, [0.2, -0.2, 0.2])
+    right = section_maker(100.0, 4, [0.2, -0.2, 0.2])
+    return sections_maker(left, right)
+
+
+def height(model, section, x):
+    wire = model.wires[section]
+    element, xi = wire.locate(x)
+    return np.array([1.0, xi, xi**2, xi**3]) @ wire.elements[element].static
+
+
+def lateral(model, section, x):
+    nodes = model.mesh.contact_chains()[section].nodes
+    return np.interp(x, *model.static.positions[nodes, :2].T)
+
+
+def test_every_section_has_its_own_spans_stagger_and_ends(pair):
+    assert [s.supports[0].x for s in pair.sections] == [0.0, 100.0]
+    assert [s.supports[-1].x for s in pair.sections] == [200.0, 300.0]
+    assert [len(s.spans) for s in pair.sections] == [4, 4]
+
+
+def test_mistakes_name_their_section(section_maker, sections_maker):
+    wrong = section_maker(100.0, 4, [0.2, -0.2])
+    with pytest.raises(DefinitionError, match=r"section\[2\]\.stagger\.listed: has 2 values where 3 are needed"):
+        sections_maker(section_maker(0.0, 4, [0.2, -0.2, 0.2]), wrong)
+
+
+def test_spans_of_the_line_and_sections_exclude_each_other(section_maker, line_maker):
+    with pytest.raises(DefinitionError, match="spans: unknown key"):
+        line_maker(section=[section_maker(0.0, 4, [0.2, -0.2, 0.2])])
+
+
+def test_one_section_written_as_a_list_is_the_same_line(section_maker, sections_maker, line_maker):
+    listed = sections_maker(section_maker(0.0, 4, [0.2, -0.2, 0.2]))
+    assert listed.sections == line_maker(spans=4).sections
+
+
+def test_a_listing_may_stand_for_several_spans(section_maker, sections_maker):
+    section = section_maker(0.0, 4, [0.2, -0.2, 0.2])
+    section["spans"]["listed"] = [{"span": 2, "to": 3, "positions": [[10.0, 40.0], "m", "test"]}]
+    spans = sections_maker(section).sections[0].spans
+    assert [len(s.droppers) for s in spans] == [7, 2, 2, 7]
+
+
+def test_the_rise_may_begin_within_a_span(section_maker, sections_maker):
+    line = sections_maker(section_maker(0.0, 6, [0.2, -0.2, 0.2, -0.2, 0.2], length=[75.0, "m", "test"]))
+    ends = line.sections[0].ends
+    assert ends.working == (75.0, 225.0)
+    assert ends.rise_at(75.0) == 0.0
+    assert ends.rise_at(50.0) == pytest.approx(0.1 / 9.0)
+    assert [s.has_steady_arm for s in line.sections[0].supports] == [False, *[True] * 5, False]
+
+
+def test_sections_do_not_act_on_each_other(overlap):
+    node = overlap.free // 6
+    section = overlap.mesh.section[node]
+    for matrix in (overlap.K, overlap.M, overlap.C):
+        entries = matrix.tocoo()
+        assert (section[entries.row] == section[entries.col]).all()
+
+
+def test_the_section_touched_answers_as_if_it_were_alone(section_maker, sections_maker):
+    left, right = section_maker(0.0, 4, [0.2, -0.2, 0.2]), section_maker(250.0, 4, [0.2, -0.2, 0.2])
+    alone, both = CatenaryModel(sections_maker(left)), CatenaryModel(sections_maker(left, right))
+    forces = [_pushed(model, 80.0) for model in (alone, both)]
+    assert forces[0].max() > 50.0
+    assert forces[1][:, 0] == pytest.approx(forces[0][:, 0], abs=1e-6)
+    assert not forces[1][:, 1].any()
+
+
+def _pushed(model, start, steps=200):
+    state, forces = model.initial_state(), []
+    for k in range(1, steps + 1):
+        x = start + 0.08 * k
+        strip = [[[x, side * HALF_STRIP, 5.07], [80.0, 0.0, 0.0]] for side in (1, -1)]
+        forces.append(model.step(state, 1e-3, StripMotion(np.array([strip]), np.zeros(1))).force[0])
+    return np.array(forces)
+
+
+def test_overlap_has_the_supports_and_spans_that_are_printed():
+    line = load_line("LN2_overlap")
+    x = sorted(s.x for section in line.sections for s in section.supports)
+    for wanted in (798.6, 1292.0, 1242.0, 1778.0):  # Table 5.10
+        assert min(abs(a - wanted) for a in x) < 0.01
+    for section in line.sections:  # Table 5.11 and the text of section 5.4
+        assert 24 <= len(section.spans) <= 26
+        assert all(45.0 <= s.length <= 54.0 for s in section.spans)
+        assert 7 <= min(len(s.droppers) for s in section.spans) <= max(len(s.droppers) for s in section.spans) <= 8
+        working = sum(section.ends.working[0] <= s.start and s.end <= section.ends.working[1] for s in section.spans)
+        assert 21 <= working + 1 <= 23  # and half a span at each end
+        assert section.spans[-1].end - section.spans[0].start < 1500.0
+    for start, end in ((798.6, 1292.0), (1242.0, 1778.0)):
+        between = {s.x for section in line.sections for s in section.supports if start - 0.01 < s.x < end + 0.01}
+        assert len(between) == 11
+
+
+def test_incoming_wire_comes_down_as_the_outgoing_one_rises(overlap):
+    first, middle, last = 1046.9, 1071.3, 1095.7
+    assert height(overlap, 0, middle) == pytest.approx(height(overlap, 1, middle), abs=1e-3)
+    x = np.linspace(first, last, 41)
+    change = np.diff([height(overlap, 1, a) - height(overlap, 0, a) for a in x])
+    assert (change < 1e-4).all()
+    for outgoing, incoming, at in ((0, 1, first), (1, 0, last)):
+        assert height(overlap, outgoing, at) == pytest.approx(5.08, abs=0.02)
+        assert 0.08 < height(overlap, incoming, at) - height(overlap, outgoing, at) < 0.1
+
+
+def test_the_wires_cross_in_plan_within_the_strip(overlap):
+    x = np.linspace(1046.9, 1095.7, 41)
+    y = np.array([[lateral(overlap, s, a) for a in x] for s in (0, 1)])
+    assert np.abs(y).max() < HALF_STRIP - STRIP_EDGE
+    assert y[0, 0] < y[1, 0]
+    assert y[0, -1] > y[1, -1]
+    assert x[np.argmin(np.abs(y[0] - y[1]))] == pytest.approx(1071.3, abs=1.3)
+
+
+def test_every_dropper_and_every_arm_of_the_overlap_is_in_tension(overlap):
+    assert overlap.static.dropper_force.min() > 0.0
+    assert arm_loads(overlap).lateral.min() > 0.0
+
+
+def test_supports_and_droppers_of_two_sections_have_different_names(pair):
+    part = CatenaryPart(pair)
+    for sites in (part.supports, part.droppers):
+        names = [s.name for s in sites]
+        assert len(set(names)) == len(names)
+    assert [s.name for s in part.supports] == [f"{i} of section {s}" for s in (1, 2) for i in (1, 2, 3)]
+    assert [s.section for s in part.supports] == [1, 1, 1, 2, 2, 2]
+    assert part.geometry.support_section.tolist() == [1, 1, 1, 2, 2, 2]
+
+
+def test_supports_of_one_section_are_plain_numbers(line_maker):
+    assert [s.name for s in CatenaryPart(line_maker(spans=4)).supports] == ["1", "2", "3"]

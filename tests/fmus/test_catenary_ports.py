@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -63,3 +64,44 @@ def test_only_the_touched_port_feels_the_wire(instance):
     rows = run(instance, range(40), ["pantograph[1].contact.force", "pantograph[2].contact.force"])
     assert rows[-1][0] > 0.0
     assert rows[-1][1] == 0.0
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(recipe("Catenary_LN2_overlap_P4"), tmp_path_factory.mktemp("fmu"))
+
+
+def test_four_pantographs_on_two_sections(four):
+    made = Instance(four)
+    outputs = names_of(made, "output")
+    assert [n for n in outputs if ".section[" in n] == [
+        f"pantograph[{p}].section[{s}].force" for p in (1, 2, 3, 4) for s in (1, 2)
+    ]
+    made.free()
+
+
+def test_supports_and_droppers_say_their_section(four):
+    with zipfile.ZipFile(four) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    assert "uplift of the contact wire at support 23 of section 1, x = 1095.7 m" in text
+    assert "uplift of the contact wire at support 2 of section 2, x = 1095.7 m" in text
+    made = Instance(four)
+    supports = [n for n in names_of(made, "calculatedParameter") if n.startswith("support[") and n.endswith(".section")]
+    assert len(supports) == 23 + 25
+    made.free()
+
+
+def test_a_strip_between_the_sections_feels_both_wires(four):
+    made = Instance(four)
+    height = {f"pantograph[3].{end}.z": 5.11 for end in "AB"}
+    place = {f"pantograph[3].{end}.x": 1071.3 for end in "AB"}
+    made.initialise(**height, **place)
+    for n in range(10):
+        made.step(n * 1e-3)
+    names = [f"pantograph[3].section[{s}].force" for s in (1, 2)]
+    one, two, total = made.get([*names, "pantograph[3].contact.force"])
+    assert one > 0.0
+    assert two > 0.0
+    assert total == pytest.approx(one + two)
+    assert made.get(["pantograph[1].contact.force"]) == [0.0]
+    made.free()

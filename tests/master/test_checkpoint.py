@@ -111,7 +111,7 @@ def test_packing_keeps_every_bit(saved):
     assert np.isnan(again.outputs["x.y"])
     assert replace(again, memory=found.memory, outputs=found.outputs) == replace(
         odd, memory=found.memory, outputs=found.outputs
-    )  # noqa: E501
+    )
 
 
 def test_an_fmu_that_restores_less_than_its_state_is_found_out(toy, saved):

@@ -69,7 +69,9 @@ def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -
     return read(Table.from_dict({k: v for k, v in data.items() if v is not None}, "short.toml"))
 
 
-def make_section(start: float, spans: int, stagger: list[float], *, anchor: float = 0.0, **ends: object) -> dict[str, object]:
+def make_section(
+    start: float, spans: int, stagger: list[float], *, anchor: float = 0.0, **ends: object
+) -> dict[str, object]:
     """Return a section of ``spans`` spans of 50 m from ``start``, its inner supports at the places ``stagger``."""
     source = "test"
     return {

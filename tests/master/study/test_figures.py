@@ -1,0 +1,106 @@
+"""What a study reports of a pantograph."""
+
+import numpy as np
+import pytest
+
+from master.study import charts
+from master.study.family import Family, Interval, Settings, Variant
+from master.study.figures import entries
+from master.study.outcome import Done, Outcome, as_csv, differences
+from master.study.page import page
+
+WHOLE = Interval(name="whole", start=60.0, end=120.0)
+
+
+def test_the_leading_pantograph_comes_first(pair):
+    assert [e.pantograph for e in entries("30 m", pair, WHOLE)] == ["leading", "trailing"]
+
+
+def test_a_slack_dropper_counts_for_the_pantograph_that_passes(pair):
+    leading, trailing = entries("30 m", pair, WHOLE)
+    assert (leading.slack, trailing.slack) == (0.0, 0.5)
+
+
+def test_uplift_is_that_of_the_intervals_supports(pair):
+    assert entries("30 m", pair, WHOLE)[0].uplift == pytest.approx(0.05, rel=0.01)
+    behind = Interval(name="behind", start=80.0, end=120.0)
+    assert entries("30 m", pair, behind)[0].uplift is None
+
+
+def test_change_of_wires(pair):
+    for entry in entries("30 m", pair, WHOLE):
+        sharing = entry.sharing
+        assert sharing.start == pytest.approx(100.0, abs=0.1)
+        assert sharing.end == pytest.approx(110.0, abs=0.1)
+        assert sharing.duration == pytest.approx(0.2, abs=0.003)
+        assert sharing.losses == (1, 0)
+        assert sharing.least_force > 100.0
+
+
+def test_followers_are_compared_with_the_one_ahead(pair):
+    (following,) = pair.followings
+    assert (following.leading, following.trailing) == ("leading", "trailing")
+    assert following.distance == pytest.approx(30.0)
+    assert following.sigma < 0.0
+    assert following.sentence.startswith("trailing 30 m behind leading: sigma -")
+
+
+@pytest.fixture
+def outcome(pair, tmp_path):
+    settings = Settings(title="A <pair>", interval=(WHOLE,), histories={"variants": ("30 m",), "position": 71.0},
+                        sharing={"variants": ("30 m",)})  # fmt: skip
+    variants = (Variant(name="30 m", values={}), Variant(name="single", values={}))
+    return Outcome(
+        Family(name="pair", folder=tmp_path, settings=settings, variants=variants), "today", {}, "complete",
+        (Done("30 m", pair), Done("single", _without(pair, "trailing"))), {"60 m": "the wire <broke>"},
+    )  # fmt: skip
+
+
+def _without(pair, pantograph):
+    left = [c for c in pair.summary["contacts"] if c["pantograph"] != pantograph]
+    return type(pair)(pair.folder, {**pair.summary, "contacts": left}, pair.recordings, pair.geometry)
+
+
+def test_everyone_stands_beside_the_single_pantograph(outcome):
+    rows = differences(outcome.entries(WHOLE))
+    assert [r[:3] for r in rows] == [
+        ("30 m", "trailing", "leading"),
+        ("30 m", "leading", "single"),
+        ("30 m", "trailing", "single"),
+    ]
+    assert rows[1][3] == pytest.approx((0.0, 0.0, 0.0))
+
+
+def test_the_table_has_a_row_for_each(outcome):
+    lines = as_csv(outcome).splitlines()
+    assert len(lines) == 4
+    assert lines[0].startswith("variant,interval,pantograph,mean [N],sigma [N]")
+    assert all(line.count(",") >= lines[0].count(",") for line in lines[1:])
+
+
+def test_the_page_shows_all_and_asks_for_nothing(outcome):
+    text = page(outcome)
+    for words in ("A &lt;pair&gt;", "60 m: the wire &lt;broke&gt;", "30 m, trailing", "From wire to wire", "Histories"):
+        assert words in text
+    assert "http://" not in text.split("<script>")[0]
+
+
+def test_histories_are_drawn_at_the_nearest_support_and_dropper(outcome):
+    uplift, dropper = charts.history_charts(outcome)
+    assert uplift.title == "Uplift at the support at 75.0 m"
+    assert dropper.title == "Force in the dropper at 70.0 m"
+
+
+def test_wires_are_drawn_with_their_sum(outcome):
+    made = charts.sharing_charts(outcome)
+    assert [c.title for c in made] == [f"From wire to wire, 30 m, {p}" for p in ("leading", "trailing")]
+    assert [t["name"] for t in made[0].figure["data"]] == ["section 1", "section 2", "total"]
+
+
+def test_statistics_are_drawn_by_place_in_the_train_with_the_single_one(outcome):
+    made = charts.interval_charts(outcome, WHOLE, outcome.entries(WHOLE))
+    assert [c.title for c in made[:2]] == ["Statistics, leading", "Statistics, trailing"]
+    assert [t["name"] for t in made[0].figure["data"]] == ["single", "30 m"]
+    assert [c.title for c in made[2:]] == ["Contact force, 30 m", "Histogram, 30 m"]
+    shares = [np.sum(t["y"]) for t in made[3].figure["data"]]
+    assert shares == pytest.approx([100.0, 100.0])

@@ -62,7 +62,7 @@ def measure(tool: str, archive: Path, stop: float, folder: Path) -> dict[str, fl
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path), "OMP_NUM_THREADS": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        print(done.returncode, done.stdout, done.stderr, command, environment["PYTHONPATH"], file=sys.stderr)
+        print(f"{tool}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}", file=sys.stderr)
         return None
     times: dict[str, float] = json.loads(done.stdout.strip().splitlines()[-1])
     return times

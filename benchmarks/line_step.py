@@ -6,11 +6,10 @@ The bare model under a lumped pantograph at 1 ms, its shares, and the same line 
 from __future__ import annotations
 
 import sys
-import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
+from fmu_calls import stepped
 from timing import by_turns, table
 
 from models.catenary.model import CatenaryModel
@@ -38,7 +37,7 @@ def main(name: str) -> None:
 
     state, stepper = coupled.line_state, model._stepper(STEP)
     load = np.random.default_rng(1).standard_normal(len(model.free))
-    fmu = _fmu(name)
+    fmu = stepped(f"Catenary_{name}")
     jobs = {
         "whole step, monolithic": steps,
         "  solve": lambda: _repeat(lambda: stepper.stiffness.solve(load)),
@@ -62,36 +61,6 @@ def main(name: str) -> None:
 def _repeat(job: object) -> None:
     for _ in range(STEPS):
         job()  # type: ignore[operator]
-
-
-def _fmu(name: str) -> object:
-    """Return a function that steps the line's FMU."""
-    from fmpy import extract, read_model_description
-    from fmpy.fmi2 import FMU2Slave
-
-    from fmus.build import build, recipe
-
-    folder = Path(tempfile.mkdtemp())
-    path = build(recipe(f"Catenary_{name}"), folder)
-    description = read_model_description(str(path))
-    slave = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=extract(str(path)),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="line",
-    )
-    slave.instantiate()
-    slave.setupExperiment(startTime=0.0)
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
-    clock = {"n": 0}
-
-    def steps(count: int) -> None:
-        for _ in range(count):
-            slave.doStep(currentCommunicationPoint=clock["n"] * STEP, communicationStepSize=STEP)
-            clock["n"] += 1
-
-    return steps
 
 
 if __name__ == "__main__":

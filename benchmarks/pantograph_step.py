@@ -1,6 +1,7 @@
 """What a step of each pantograph costs: ``python benchmarks/pantograph_step.py``.
 
-Lumped and multibody parts at 1 ms under a contact force that changes, times real time and against the lumped CX.
+Lumped and multibody parts at 1 ms under a contact force that changes, times real time and against the lumped CX; and
+the multibody ones as FMUs, called by fmpy.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from fmu_calls import stepped
 from timing import by_turns, table
 
 from models.library import load_pantograph, pantograph_names
@@ -38,8 +40,21 @@ def steps(name: str) -> Callable[[], None]:
     return run
 
 
+def fmu_steps(name: str) -> Callable[[], None]:
+    """Return a function that steps a pantograph's FMU under a swinging force."""
+
+    def inputs(time: float) -> dict[str, float]:
+        x, y = 300.0 / 3.6 * time, 0.2 * np.sin(5.0 * time)
+        return {"contact.force": 150.0 + 40.0 * np.sin(20.0 * time), "contact.x": x, "contact.y": y}
+
+    run = stepped(f"Pantograph_{name}", inputs)
+    return lambda: run(STEPS)
+
+
 def main() -> None:
-    best = by_turns({name: steps(name) for name in pantograph_names()}, rounds=5)
+    jobs = {name: steps(name) for name in pantograph_names()}
+    jobs |= {f"{name} as FMU": fmu_steps(name) for name in pantograph_names() if name.endswith("multibody")}
+    best = by_turns(jobs, rounds=5)
     rows = [
         (name, f"{1e6 * t / STEPS:.0f}", f"{STEP * STEPS / t:.1f}", f"{t / best['CX']:.1f}") for name, t in best.items()
     ]

@@ -9,6 +9,7 @@ and the next ``do_step`` is refused with the text.
 
 from __future__ import annotations
 
+import ctypes
 import math
 import sys
 import traceback
@@ -49,17 +50,14 @@ PartT = TypeVar("PartT", bound=Part)
 #: Beyond every value reference: no value is out of date.
 _NOTHING = sys.maxsize
 
-#: References that pythonfmu takes away, see ``hold``.
-_held: list[dict[str, Any]] = []
-
-
 def hold(names: dict[str, Any]) -> None:
     """Add a reference to the namespace of a script that pythonfmu loads.
 
     Its loader runs the script once more for every instance and then releases the script's ``globals()``
-    without having owned them; without this call the second instance in a process would crash.
+    without having owned them; without this call the second instance in a process would crash. No container
+    may hold that reference: it would give back, when Python ends, what the loader has taken away.
     """
-    _held.append(names)
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(names))
 
 
 class AdapterError(RuntimeError):

@@ -23,6 +23,7 @@ import pythonfmu
 from fmus.bundle import BundleError, Module, collect, rewrite
 from fmus.documentation import About, page
 from fmus.icon import icon
+from fmus.repair import repaired
 from fmus.shim import NATIVE, ShimError, with_shim
 
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -43,7 +44,7 @@ _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
     "multibody": ("fmus.multibody", "MultibodyPantographSlave"),
 }
 #: Sources that are not carried along but decide about an FMU's bytes.
-_BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "shim.py")
+_BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "repair.py", "shim.py")
 _REQUIREMENTS = b"numpy>=1.26\nscipy>=1.11\n"
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
 
@@ -273,7 +274,7 @@ def _hash(pieces: Mapping[str, bytes]) -> str:
 def _binaries(name: str) -> dict[str, bytes]:
     folder = PYTHONFMU / "resources" / "binaries"
     files = sorted(p for p in folder.rglob("*") if p.suffix in _PLATFORMS)
-    return {f"binaries/{p.parent.name}/{name}{p.suffix}": p.read_bytes() for p in files}
+    return {f"binaries/{p.parent.name}/{name}{p.suffix}": repaired(p.read_bytes()) for p in files}
 
 
 def _licenses() -> dict[str, bytes]:

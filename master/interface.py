@@ -108,7 +108,7 @@ class PowerObserver:
     def _names(self, contact: Contact) -> tuple[list[int], list[int]] | None:
         port = contact.prefix.removesuffix(".contact")
         given = [contact.force, contact.end("A", "vz"), contact.end("B", "vz")]
-        told = [f"{contact.pantograph}.contact.force", f"{port}.A.vz", f"{port}.B.vz"]
+        told = [contact.force_input, f"{port}.A.vz", f"{port}.B.vz"]
         if any(n not in self._outputs for n in given) or any(n not in self._inputs for n in told):
             return None
         return [self._outputs[n] for n in given], [self._inputs[n] for n in told]

@@ -56,9 +56,9 @@ def followings(recording: Recording, assessments: Sequence[Assessment]) -> tuple
     """Compare every pantograph that has figures with the one ahead of it on the same line."""
     found: list[Following] = []
     for line in dict.fromkeys(a.contact.catenary for a in assessments):
-        own = {a.contact: a for a in assessments if a.contact.catenary == line}
-        ordered = leading_first(recording, list(own))
-        found += [_following(recording, own[ahead], own[behind]) for ahead, behind in pairwise(ordered)]
+        own = {a.contact.index: a for a in assessments if a.contact.catenary == line}
+        ordered = leading_first(recording, [a.contact for a in own.values()])
+        found += [_following(recording, own[ahead.index], own[behind.index]) for ahead, behind in pairwise(ordered)]
     return tuple(found)
 
 

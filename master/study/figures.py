@@ -82,12 +82,12 @@ def entries(variant: str, done: Results, interval: Interval) -> tuple[Entry, ...
     uplifts = [u for u in done.uplifts if u.x is None or interval.start - 1.0 <= u.x <= interval.end + 1.0]
     found = assess_contacts(done.recordings, done.contacts, limits, uplifts)
     ordered = leading_first(done.recordings[0], [a.contact for a in found])
-    by_contact = {a.contact: a for a in found}
+    by_index = {(a.contact.catenary, a.contact.index): a for a in found}
     return tuple(
         Entry(
             variant,
             interval,
-            by_contact[contact],
+            by_index[contact.catenary, contact.index],
             max((u.maximum for u in uplifts), default=None),
             slack_share(done, contact, follower, interval),
             sharing(done.recordings[0], contact, interval),

@@ -12,13 +12,11 @@ from rich.table import Table
 
 from master.study.family import Family, Interval
 from master.study.figures import Entry
-from master.study.outcome import Outcome, differences, shown, verdict
+from master.study.outcome import Outcome, differences, shown
 
 _WIDTH: Final = 80
 _SIGMA: Final = "\u03c3"
-_FIGURE_HEADS: Final = (
-    *("variant", "pantograph", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),
-)
+_FIGURE_HEADS: Final = (*("variant", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),)
 
 
 def show(console: Console, outcome: Outcome) -> None:
@@ -36,10 +34,9 @@ def show(console: Console, outcome: Outcome) -> None:
 
 
 def figures_table(interval: Interval, found: Sequence[Entry]) -> Table:
-    """Return the statistics of all pantographs."""
+    """Return the statistics of all pantographs; yellow where EN 50367 is not met."""
     where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
-    title = f"{where}; force 0-20 Hz [N], uplift [mm], slack droppers [%], loss [%]"
-    table = _table(title, _FIGURE_HEADS)
+    table = _table(f"{where}: force 0-20 Hz [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
     for e in found:
         q = e.assessment.quality
         numbers = (q.mean, q.sigma, q.sigma / q.mean, q.maximum, q.minimum, q.statistical_minimum)
@@ -47,45 +44,44 @@ def figures_table(interval: Interval, found: Sequence[Entry]) -> Table:
         uplift = shown(None if e.uplift is None else 1e3 * e.uplift, 0)
         slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
         style = "" if e.assessment.passed else "yellow"
-        cells = [*texts, uplift, slack, shown(q.losses.percentage, 1)]
-        table.add_row(escape(e.variant), escape(e.pantograph), *cells, style=style)
-    if failing := _failing(found):
-        table.caption = escape(failing)
-        table.caption_justify = "left"
+        table.add_row(_name(e), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
+    table.caption, table.caption_justify = escape(_failing(found)), "left"
     return table
 
 
+def _name(e: Entry) -> str:
+    return escape(f"{e.variant}, {e.pantograph}")
+
+
 def _failing(found: Sequence[Entry]) -> str:
-    """Return which pantographs fail what, grouped by what."""
-    groups: dict[str, list[str]] = {}
+    """Return which limits of EN 50367 are not kept, and by whom."""
+    failing: dict[str, list[str]] = {}
     for e in found:
-        if not e.assessment.passed:
-            groups.setdefault(verdict(e), []).append(f"{e.variant} {e.pantograph}")
-    if not groups:
+        for criterion in e.assessment.criteria:
+            if not criterion.passed:
+                failing.setdefault(criterion.name, []).append(f"{e.variant}, {e.pantograph}")
+    if not failing:
         return "EN 50367: all pass"
-    everyone = len(found)
-    words = [f"{what} ({'all' if len(who) == everyone else '; '.join(who)})" for what, who in groups.items()]
-    return f"EN 50367: {'. '.join(words)}"
+    words = (f"{what}: {'all' if len(who) == len(found) else '; '.join(who)}" for what, who in failing.items())
+    return "EN 50367 is not met by\n" + "\n".join(words)
 
 
 def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, float]]]) -> Table:
     """Return what stands beside what."""
-    table = _table(
-        "less the one ahead, and less the single one [N]", ("variant", "pantograph", "less", _SIGMA, "max", "min")
-    )
+    table = _table("less the one ahead, and less the single one [N]", ("variant", "less", _SIGMA, "max", "min"))
     for variant, pantograph, other, change in rows:
-        table.add_row(escape(variant), escape(pantograph), escape(other), *(f"{d:+.1f}" for d in change))
+        table.add_row(escape(f"{variant}, {pantograph}"), escape(other), *(f"{d:+.1f}" for d in change))
     return table
 
 
 def sharing_table(found: Sequence[Entry]) -> Table:
     """Return how the strips pass from wire to wire."""
-    heads = ("variant", "pantograph", "from m", "to m", "s", "losses per wire", "least total N")
+    heads = ("variant", "from m", "to m", "s", "losses per wire", "least total N")
     table = _table("From wire to wire: both touched", heads)
     for e in found:
         if (s := e.sharing) is not None:
             numbers = (f"{s.start:.1f}", f"{s.end:.1f}", f"{s.duration:.3f}", " ".join(map(str, s.losses)))
-            table.add_row(escape(e.variant), escape(e.pantograph), *numbers, f"{s.least_force:.0f}")
+            table.add_row(_name(e), *numbers, f"{s.least_force:.0f}")
     return table
 
 
@@ -99,10 +95,14 @@ def list_table(families: Sequence[Family]) -> Table:
 
 
 def _table(title: str, heads: Sequence[str]) -> Table:
-    table = Table(title=title or None, title_justify="left", width=_WIDTH - 1, box=SIMPLE_HEAD, pad_edge=False)
-    texts = ("variant", "pantograph", "less", "study", "variants", "what")
+    table = Table(
+        title=escape(title) if title else None, title_justify="left", width=_WIDTH - 1, box=SIMPLE_HEAD, pad_edge=False
+    )
+    texts = ("variant", "less", "study", "variants", "what")
     for head in heads:
         is_text = head in texts
-        table.add_column(head, justify="left" if is_text else "right", no_wrap=not is_text)
-    table.padding = (0, 1)
+        table.add_column(
+            head, justify="left" if is_text else "right", no_wrap=not is_text, ratio=1 if head == "variant" else None
+        )
+    table.padding = (0, 0)
     return table

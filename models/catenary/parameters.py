@@ -191,21 +191,21 @@ class EndSpans:
     ----------
     anchors, working : (float, float)
         Where the wires end, and where they leave the working height [m].
-    rise : float
+    rises : (float, float)
         Height of the contact wire above its working height at the anchors [m].
     """
 
     anchors: tuple[float, float]
     working: tuple[float, float]
-    rise: float
+    rises: tuple[float, float]
 
     def rise_at(self, x: float) -> float:
         """Return the height above the working height at ``x`` [m]."""
         (start, end), (first, last) = self.anchors, self.working
         if x < first:
-            return self.rise * ((first - x) / (first - start)) ** 2
+            return self.rises[0] * ((first - x) / (first - start)) ** 2
         if x > last:
-            return self.rise * ((x - last) / (end - last)) ** 2
+            return self.rises[1] * ((x - last) / (end - last)) ** 2
         return 0.0
 
 
@@ -556,22 +556,41 @@ def _check_droppers(table: Table, index: int, length: float, offsets: Sequence[f
         table.problem(key, f"span {index}: droppers are not in rising order")
 
 
-def _read_ends(table: Table, boundaries: Sequence[float]) -> tuple[int, EndSpans]:
-    """Return how many spans at each end are unregistered, and the wires' rise over them."""
+@dataclass(frozen=True)
+class _End:
+    """One end of a section: unregistered spans, where the wires leave the working height, their rise from there [m]."""
+
+    free: int
+    working: float
+    rise: float
+
+
+def _read_ends(table: Table, boundaries: Sequence[float]) -> tuple[tuple[int, int], EndSpans]:
+    """Return how many spans at each end are unregistered, and the wires' rise; an end may have a table of its own."""
+    start = _read_end(table.table("start") or table, boundaries)
+    end = _read_end(table.table("end") or table, boundaries[::-1])
+    anchors = boundaries[0], boundaries[-1]
+    return (start.free, end.free), EndSpans(anchors, (start.working, end.working), (start.rise, end.rise))
+
+
+def _read_end(table: Table, boundaries: Sequence[float]) -> _End:
+    """Read one end; ``boundaries`` count from there."""
     free = table.integer("spans", default=0, minimum=0, maximum=max(0, (len(boundaries) - 2) // 2))
     rise = table.quantity("rise", "m", default=0.0, minimum=0.0, maximum=5.0)
-    start, end = boundaries[0], boundaries[-1]
-    working = boundaries[free], boundaries[len(boundaries) - 1 - free]
+    working = boundaries[free]
     if table.has("length"):
-        length = table.quantity("length", "m", positive=True, maximum=max(1e-3, 0.5 * (end - start)))
-        working = start + length, end - length
-    return free, EndSpans((start, end), working, rise)
+        whole = boundaries[-1] - boundaries[0]
+        length = table.quantity("length", "m", positive=True, maximum=max(1e-3, 0.5 * abs(whole)))
+        working = boundaries[0] + math.copysign(length, whole)
+    return _End(free, working, rise)
 
 
-def _read_supports(table: Table, boundaries: Sequence[float], free: int, *, has_arms: bool) -> tuple[Support, ...]:
+def _read_supports(
+    table: Table, boundaries: Sequence[float], free: tuple[int, int], *, has_arms: bool
+) -> tuple[Support, ...]:
     """Supports with their stagger: alternating at registered supports, straight on to the anchors."""
     last = len(boundaries) - 1
-    registered = [max(free, 1) <= i <= last - max(free, 1) for i in range(last + 1)]
+    registered = [max(free[0], 1) <= i <= last - max(free[1], 1) for i in range(last + 1)]
     staggers = _read_stagger(table.required_table("stagger"), boundaries, registered)
     return tuple(
         Support(x, y, has_steady_arm=has_arms and ok)

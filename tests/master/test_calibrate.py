@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from master.calibrate import MAX_RUNS, find_value, store_value
+from master.calibrate import MAX_RUNS, find_value, find_values, store_value
 from master.errors import MasterError
 
 
@@ -82,3 +82,34 @@ def test_a_parameter_that_is_not_there_is_told(tmp_path):
     with pytest.raises(MasterError, match="stands there 0 times"):
         store_value(path, "mass", 1.0, "x")
     assert path.read_text() == TEXT
+
+
+def test_several_values_are_found_in_the_same_runs():
+    calls = []
+
+    def trains(values):
+        calls.append(values)
+        one, two = values
+        return 0.9 * one + 3.0 + 0.02 * two, 0.95 * two - 0.05 * one
+
+    found = find_values(trains, 157.5, (170.0, 170.0), 0.05)
+    assert [f.result for f in found] == pytest.approx([157.5, 157.5], abs=0.05)
+    assert trains(tuple(f.value for f in found)) == pytest.approx((157.5, 157.5), abs=0.05)
+    assert len(calls) <= 6
+
+
+def test_a_value_that_is_right_stays_while_others_are_looked_for():
+    calls = []
+
+    def trains(values):
+        calls.append(values)
+        return values[0], 0.5 * values[1] + 50.0
+
+    found = find_values(trains, 150.0, (150.0, 170.0), 0.1)
+    assert {values[0] for values in calls} == {150.0}
+    assert found[1].value == pytest.approx(200.0, abs=0.3)
+
+
+def test_several_values_that_cannot_be_found_are_told():
+    with pytest.raises(MasterError, match="no values found after"):
+        find_values(lambda v: (100.0 + 50.0 * v[0] / (1.0 + abs(v[0])),), 157.5, (1.0,), 0.1)

@@ -9,7 +9,9 @@ from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.part import CatenaryPart
 from models.contact import application_point, engagement
 from models.coupled import CoupledModel
+from models.library import load_pantograph
 from models.pantograph.lumped import LumpedModel, LumpedPantographPart
+from models.statistics import contact_figures
 from models.time_integration import Newmark
 
 START = 70.0
@@ -199,13 +201,35 @@ def test_a_strip_between_two_wires_touches_neither(section_maker, sections_maker
     assert part.contact_point[0] == pytest.approx([strip[0, 0, 0, 0], 0.0, 5.2])
 
 
-@pytest.mark.parametrize("count", [3, 4])
-def test_up_to_four_pantographs_on_one_line(line_maker, cx, count):
+@pytest.mark.parametrize("kinds", [("CX", "DSA380", "generic"), ("CX", "CX", "DSA380", "generic")])
+def test_up_to_four_pantographs_of_any_kind_on_one_line(line_maker, kinds):
     """Far apart on a damped line each feels only itself."""
-    line = line_maker(spans=count * 3 + 2, alpha=0.05)
-    spaced = [cx.with_values({"start_position": 60.0 + 150.0 * i, "raise_duration": 0.05}) for i in range(count)]
+    line = line_maker(spans=len(kinds) * 3 + 2, alpha=0.05)
+    settings = {"raise_duration": 0.05, "reference_height": 5.02}
+    spaced = [
+        load_pantograph(kind).with_values({"start_position": 60.0 + 150.0 * i, **settings})
+        for i, kind in enumerate(kinds)
+    ]
     together = CoupledModel(CatenaryModel(line), spaced).run(0.25, 1e-3)
     for i, pantograph in enumerate(spaced):
         alone = CoupledModel(CatenaryModel(line), [pantograph]).run(0.25, 1e-3)
         assert alone.contact_force.max() > 50.0
         assert together.contact_force[:, i] == pytest.approx(alone.contact_force[:, 0], abs=0.5)
+
+
+@pytest.mark.slow
+def test_a_kilometre_apart_each_runs_as_if_it_were_alone(line_maker, cx):
+    """The leading one's waves reach the trailing one within the run; on a damped line they have died out."""
+    line, stop = CatenaryModel(line_maker(spans=38)), 7.5
+    starts = (1150.0, 150.0)
+    spaced = [cx.with_values({"start_position": x, "static_force": 178.0}) for x in starts]
+    together = CoupledModel(line, spaced).run(stop, 1e-3)
+    for i, pantograph in enumerate(spaced):
+        alone = CoupledModel(line, [pantograph]).run(stop, 1e-3)
+        figures = [
+            contact_figures(r.position[:, p], r.contact_force[:, p], 1e-3, starts[i] + 350.0, starts[i] + 600.0)
+            for r, p in ((together, i), (alone, 0))
+        ]
+        for name in ("mean", "sigma", "maximum", "minimum"):
+            one, other = (getattr(f, name) for f in figures)
+            assert one == pytest.approx(other, rel=0.005), name

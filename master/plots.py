@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -218,15 +217,3 @@ def _within(x: float | None, interval: tuple[float | None, float | None]) -> boo
 
 def _step(recording: Recording) -> float:
     return float(recording.time[-1] - recording.time[0]) / (len(recording.time) - 1)
-
-
-def title_of(name: str) -> str:
-    """Return a caption for a plot's file name.
-
-    Examples
-    --------
-    >>> title_of("contact_force")
-    'Contact force'
-    """
-    words = re.sub("_", " ", name)
-    return words[:1].upper() + words[1:]

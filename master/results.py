@@ -160,13 +160,38 @@ def _empty(folder: Path) -> None:
             path.unlink()
 
 
+def take_over(folder: Path, marker: str, generator: str, kind: str) -> None:
+    """Make a folder, or take over one whose JSON file ``marker`` names its ``generator``; nothing is removed.
+
+    Raises
+    ------
+    MasterError
+        If it is there and is no ``kind`` of ours, or cannot be made.
+    """
+    if folder.is_dir() and any(folder.iterdir()) and not made_by(folder / marker, generator):
+        raise MasterError(
+            f"{folder} exists and is no {kind} of this tool; it is left alone, choose another with --out"
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MasterError(
+            f"the folder {folder} cannot be made ({error.strerror}); choose another with --out"
+        ) from error
+
+
 def is_ours(folder: Path) -> bool:
     """Whether the folder is a result of this tool."""
+    return made_by(folder / SUMMARY, GENERATOR)
+
+
+def made_by(path: Path, generator: str) -> bool:
+    """Whether a JSON file says that it is from ``generator``."""
     try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(summary, dict) and summary.get("generator") == GENERATOR
+    return isinstance(found, dict) and found.get("generator") == generator
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -55,7 +54,7 @@ def study(
     MasterError
         If the folder holds something else.
     """
-    prepare(folder)
+    results.take_over(folder, JSON, GENERATOR, "study")
     state = Outcome(family, datetime.now(UTC).isoformat(timespec="seconds"), results.versions())
     write(state, folder)
     try:
@@ -72,37 +71,11 @@ def study(
     return state
 
 
-def prepare(folder: Path) -> None:
-    """Make the folder.
-
-    Raises
-    ------
-    MasterError
-        If it is there and is not a study of ours.
-    """
-    if folder.is_dir() and any(folder.iterdir()) and not _is_ours(folder):
-        raise MasterError(f"{folder} exists and is no study of this tool; it is left alone, choose another with --out")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MasterError(
-            f"the folder {folder} cannot be made ({error.strerror}); choose another with --out"
-        ) from error
-
-
 def write(state: Outcome, folder: Path) -> None:
     """Write what there is so far."""
     results.write_json(folder / JSON, as_data(state))
     results.write_text(folder / CSV, as_csv(state))
     results.write_text(folder / PAGE, page(state))
-
-
-def _is_ours(folder: Path) -> bool:
-    try:
-        found = json.loads((folder / JSON).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(found, dict) and found.get("generator") == GENERATOR
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from master import results
-from master.errors import InterruptedRunError, MasterError
+from master.errors import InterruptedRunError
 from master.verify import page
 from master.verify.case import Case
 from master.verify.outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
@@ -46,7 +45,7 @@ def verify(
     MasterError
         If the folder holds something else.
     """
-    prepare(folder)
+    results.take_over(folder, JSON, GENERATOR, "verification")
     state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), results.versions(), len(cases))
     writer = _Writer(folder)
     writer.write(state)
@@ -61,33 +60,6 @@ def verify(
     state = replace(state, status="complete")
     writer.write(state)
     return state
-
-
-def prepare(folder: Path) -> None:
-    """Make the folder.
-
-    Raises
-    ------
-    MasterError
-        If it is there and is not a verification of ours.
-    """
-    if folder.is_dir() and any(folder.iterdir()) and not _is_ours(folder):
-        raise MasterError(
-            f"{folder} exists and is no verification of this tool; it is left alone, choose another with --out"
-        )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        text = f"the folder {folder} cannot be made ({error.strerror}); choose another with --out"
-        raise MasterError(text) from error
-
-
-def _is_ours(folder: Path) -> bool:
-    try:
-        found = json.loads((folder / JSON).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(found, dict) and found.get("generator") == GENERATOR
 
 
 class _Writer:

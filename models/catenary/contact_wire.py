@@ -65,7 +65,6 @@ class ContactWire:
     """
 
     def __init__(self, chain: Chain, static: StaticState, free_index: IntArray, angles: FloatArray) -> None:
-        self._nodes = chain.nodes
         self._static_xy = static.positions[chain.nodes, :2]
         self._xy_dofs = free_index[chain.nodes[:, None] * NODE_DOFS + np.arange(2)]
         self._axes = [(math.cos(a), math.sin(a)) for a in angles[chain.nodes]]

@@ -149,7 +149,8 @@ class CatenaryModel:
         self.static: StaticState = find_form(definition, self.mesh)
         self._angles = plan_angles(self.mesh, self.static.points)
         self._rotation = plan_rotation(self._angles)
-        self.free, self._blocks = self._numbering()
+        rotated = self._rotated()
+        self.free, self._blocks = self._numbering(*rotated[:2])
         self.free_index = np.full(self.mesh.fixed.size, -1)
         self.free_index[self.free] = np.arange(len(self.free))
         # Droppers hang on attachments, where nodal axes are the global ones.
@@ -160,15 +161,14 @@ class CatenaryModel:
         self._rest_load = self.B.T @ self.rest_compensation
         self.unilateral = 1.0 - compression_ratio(definition, self.mesh)
         self._stretch = self.B.T.tocsc()
-        self.K, self.M, self.C = self._matrices()
+        self.K, self.M, self.C = self._matrices(*rotated)
         self.wires = tuple(
             ContactWire(chain, self.static, self.free_index, self._angles) for chain in self.mesh.contact_chains()
         )
         self.uplift_dofs = self.free_index[self.mesh.support_nodes * NODE_DOFS + 2]
         self._law = CONTACT_LAWS[definition.contact.law]
         self._steppers: dict[float, _Stepper] = {}
-        n = len(self.free)
-        self._work = np.empty(n)
+        self._work = np.empty(len(self.free))
 
     def initial_state(self, pantographs: int = 1) -> CatenaryState:
         """Return the line at rest in its static shape."""
@@ -261,16 +261,18 @@ class CatenaryModel:
         damped = np.sqrt(np.maximum(C.diagonal(), 0.0))
         return without_rounding(K, stiff), without_rounding(M, heavy), without_rounding(C, damped)
 
-    def _numbering(self) -> tuple[IntArray, Blocks]:
+    def _numbering(self, K: sp.csr_matrix, M: sp.csr_matrix) -> tuple[IntArray, Blocks]:
         """Return the free degrees of freedom, those inside the intervals first, block by block."""
         free = np.flatnonzero(~self.mesh.fixed.ravel())
         inner = np.repeat(~attachments(self.mesh), NODE_DOFS)[free]
-        K, M, _ = self._rotated()
         order, blocks = order_by_blocks((abs(K) + abs(M))[free][:, free], inner)
         return free[order], blocks
 
-    def _matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
-        K, M, C = (matrix[self.free][:, self.free] for matrix in self._rotated())
+    def _matrices(
+        self, *rotated: sp.csr_matrix
+    ) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+        """Return K, M and C over the numbered degrees of freedom, droppers included."""
+        K, M, C = (matrix[self.free][:, self.free] for matrix in rotated)
         droppers = self.B.T @ sp.diags(self.dropper_stiffness) @ self.B
         K = K + droppers
         C = C + self.definition.damping.of("dropper").alpha * droppers

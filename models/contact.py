@@ -7,9 +7,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -39,8 +38,7 @@ class ContactParameters(Protocol):
         """Return the coefficient of restitution."""
 
 
-@dataclass(frozen=True)
-class NormalForce:
+class NormalForce(NamedTuple):
     """Normal force and its derivatives by penetration [N/m] and penetration velocity [N s/m]."""
 
     force: float
@@ -89,14 +87,14 @@ CONTACT_LAWS: dict[str, ContactLaw] = {"continuous": continuous_contact}
 
 
 def crossing(
-    a: FloatArray, b: FloatArray, i: tuple[float, float], j: tuple[float, float]
+    a: Sequence[float], b: Sequence[float], i: Sequence[float], j: Sequence[float]
 ) -> tuple[float, float] | None:
     """Intersect strip and wire element in plan [2.36-2.42].
 
     Parameters
     ----------
-    a, b : ndarray, shape (3,) or longer
-        Ends of the strip [m].
+    a, b : sequence of at least two numbers
+        Ends of the strip, x and y first [m].
     i, j : (float, float)
         Ends of the element in plan [m].
 
@@ -107,16 +105,15 @@ def crossing(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> crossing(np.array([1.0, 1.0, 0.0]), np.array([1.0, -1.0, 0.0]), (0.0, 0.5), (4.0, 0.5))
+    >>> crossing((1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 0.5), (4.0, 0.5))
     (0.25, 0.25)
     """
-    strip_x, strip_y = float(b[0] - a[0]), float(b[1] - a[1])
+    strip_x, strip_y = b[0] - a[0], b[1] - a[1]
     wire_x, wire_y = j[0] - i[0], j[1] - i[1]
     determinant = strip_y * wire_x - strip_x * wire_y
     if determinant == 0.0:
         return None
-    dx, dy = i[0] - float(a[0]), i[1] - float(a[1])
+    dx, dy = i[0] - a[0], i[1] - a[1]
     return (dy * wire_x - dx * wire_y) / determinant, (strip_x * dy - strip_y * dx) / determinant
 
 

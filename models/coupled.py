@@ -135,7 +135,7 @@ class CoupledModel:
             contact_point=np.full((rows, P, 3), np.nan),
             section_force=np.zeros((rows, P, len(line.wires))),
             strip_height=np.zeros((rows, P)),
-            uplift=np.zeros((rows, len(line.uplift_dofs))),
+            uplift=np.zeros((rows, len(line.uplift_places))),
             dropper_force=np.zeros((rows, len(line.dropper_stiffness))),
         )
 

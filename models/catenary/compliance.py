@@ -1,103 +1,128 @@
-"""The effective stiffness of a step, factorised once, and the columns of its inverse that a step needs."""
+"""What attachments give way by under local loads: columns of a factor's inverse, where they are not zero."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.condensation import Blocks, Condensed
+from models.catenary.band import CUT, Factor
 from models.part import FloatArray, IntArray
 
-#: A column is cut where it has fallen below this share of its largest value, less than rounding.
-_CUT = 1e-16
 #: Droppers whose response is kept.
 _KEPT_DROPPERS = 256
+#: Attachments of the contact wires whose response is kept: strips come by once.
+_KEPT_ATTACHMENTS = 24
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Some columns of K_hat^-1 B, where they are not zero.
-
-    The response to a contact force or a slack dropper's force dies out along the line.
+    """Responses of the attachments to a few loads, where they are not zero: they die out along the line.
 
     Attributes
     ----------
-    index : ndarray, shape (m,)
-        Degrees of freedom, rising.
-    values : ndarray, shape (m, n)
+    rows : slice
+        Attachments' displacements that they reach.
+    values : ndarray, shape (n_rows, n)
     dropper_index : ndarray, shape (k,)
-        Droppers that the columns stretch.
+        Droppers that they stretch.
     dropper_stretch : ndarray, shape (k, n)
         Elongation of those droppers [m/N].
     """
 
-    index: IntArray
+    rows: slice
     values: FloatArray
     dropper_index: IntArray
     dropper_stretch: FloatArray
 
-    def at(self, dofs: IntArray) -> FloatArray:
-        """Return the values at some degrees of freedom, shape (len(dofs), n)."""
-        place = np.minimum(np.searchsorted(self.index, dofs), len(self.index) - 1)
-        inside = self.index[place] == dofs
-        result = np.zeros((len(dofs), self.values.shape[1]))
-        result[inside] = self.values[place[inside]]
+    def at(self, places: IntArray) -> FloatArray:
+        """Return the values at some displacements of the attachments, shape (len(places), n)."""
+        inside = (places >= self.rows.start) & (places < self.rows.stop)
+        result = np.zeros((len(places), self.values.shape[1]))
+        result[inside] = self.values[places[inside] - self.rows.start]
         return result
 
 
-class EffectiveStiffness:
-    """Factorised K_hat, and the responses to what acts inside a step.
+def joined(parts: Sequence[Columns]) -> Columns:
+    """Return the columns of several as one, side by side."""
+    rows = slice(min(part.rows.start for part in parts), max(part.rows.stop for part in parts))
+    droppers = np.unique(np.concatenate([part.dropper_index for part in parts]))
+    count = sum(part.values.shape[1] for part in parts)
+    values, stretch = np.zeros((rows.stop - rows.start, count)), np.zeros((len(droppers), count))
+    first = 0
+    for part in parts:
+        own = slice(first, first + part.values.shape[1])
+        values[part.rows.start - rows.start : part.rows.stop - rows.start, own] = part.values
+        stretch[np.searchsorted(droppers, part.dropper_index), own] = part.dropper_stretch
+        first = own.stop
+    return Columns(rows, values, droppers, stretch)
+
+
+class Compliance:
+    """Local responses of the attachments.
 
     Parameters
     ----------
-    K_hat : sparse, shape (n, n)
-        Symmetric positive definite.
-    B : sparse, shape (n_droppers, n)
+    factor : Factor
+        Of the matrix that the attachments feel.
+    B : sparse, shape (n_droppers, n_attached)
         Rows of dropper elongation.
-    blocks : Blocks
-        Degrees of freedom to condense out, the first ones of ``K_hat``.
     """
 
-    def __init__(self, K_hat: sp.csr_matrix, B: sp.csr_matrix, blocks: Blocks) -> None:
-        self._factor = Condensed(K_hat.tocsr(), blocks)
-        self._B = B.tocsr()
-        self.dropper_columns = DropperColumns(self._B, self.columns)
+    def __init__(self, factor: Factor, B: sp.csr_matrix) -> None:
+        self._factor, self._B = factor, B
+        self._by_place = B.tocsc()
+        self._attachments: dict[int, Columns] = {}
+        self.dropper_columns = DropperColumns(self)
 
-    def solve(self, load: FloatArray) -> FloatArray:
-        """Return K_hat^-1 load, for loads of shape (n,) or (n, m)."""
-        return self._factor.solve(load)
+    def attachment(self, places: IntArray) -> Columns:
+        """Return the responses to unit loads on one attachment, whose displacements are at ``places``."""
+        kept, key = self._attachments, int(places[0])
+        found = kept.get(key)
+        if found is None:
+            found = self.columns(places, np.eye(len(places)))
+            while len(kept) >= _KEPT_ATTACHMENTS:
+                del kept[next(iter(kept))]
+            kept[key] = found
+        return found
 
-    def columns(self, load: FloatArray) -> Columns:
-        """Return K_hat^-1 load for loads of shape (n, m), where it is not zero."""
-        full = self._factor.solve(load)
-        size = np.abs(full).max(axis=1)
-        index = np.flatnonzero(size > _CUT * size.max())
-        stretch = self._B @ full
-        near = np.flatnonzero(np.abs(stretch).max(axis=1) > _CUT * np.abs(stretch).max(initial=1e-300))
-        return Columns(index, np.ascontiguousarray(full[index]), near, np.ascontiguousarray(stretch[near]))
+    def columns(self, places: IntArray, load: FloatArray) -> Columns:
+        """Return the responses to loads of shape (len(places), n) at some displacements of the attachments."""
+        first = int(places.min())
+        local = np.zeros((int(places.max()) - first + 1, load.shape[1]))
+        local[places - first] = load
+        begin, values = self._factor.near(first, local)
+        rows = slice(begin, begin + len(values))
+        part = self._by_place[:, rows]
+        touched = np.unique(part.indices)
+        stretch = part.tocsr()[touched] @ values
+        size = np.abs(stretch).max(axis=1)
+        near = size > CUT * size.max(initial=0.0)
+        return Columns(rows, values, touched[near], np.ascontiguousarray(stretch[near]))
+
+    def dropper(self, index: int) -> Columns:
+        """Return the response to a unit force in a dropper."""
+        row = self._B[[index]].tocoo()
+        return self.columns(row.col, row.data[:, None])
+
+    @property
+    def droppers(self) -> int:
+        """Return the number of droppers."""
+        return int(self._B.shape[0])
 
 
 class DropperColumns(Sequence[Columns]):
-    """Response to a unit force in each dropper, solved when first asked for: few droppers ever slacken.
+    """Response to a unit force in each dropper, solved when first asked for: few droppers ever slacken."""
 
-    Parameters
-    ----------
-    B : sparse, shape (n_droppers, n)
-        Rows of dropper elongation.
-    respond : callable
-        load, shape (n, 1) -> Columns.
-    """
-
-    def __init__(self, B: sp.csr_matrix, respond: Callable[[FloatArray], Columns]) -> None:
-        self._B, self._respond = B, respond
+    def __init__(self, compliance: Compliance) -> None:
+        self._compliance = compliance
         self._known: dict[int, Columns] = {}
 
     def __len__(self) -> int:
-        return int(self._B.shape[0])
+        return self._compliance.droppers
 
     @overload
     def __getitem__(self, index: int) -> Columns: ...
@@ -108,7 +133,7 @@ class DropperColumns(Sequence[Columns]):
             return [self[i] for i in range(*index.indices(len(self)))]
         found = self._known.get(index)
         if found is None:
-            found = self._respond(self._B[[index]].toarray().T)
+            found = self._compliance.dropper(index)
             while len(self._known) >= _KEPT_DROPPERS:
                 del self._known[next(iter(self._known))]
             self._known[index] = found

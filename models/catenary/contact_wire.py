@@ -1,53 +1,89 @@
-"""The contact wire as a strip meets it: elements along the track, their shape and their static height."""
+"""The contact wire as a strip meets it: elements along the track, their shape and their static height.
+
+An element's nodes move with its interval: with its modes q and with the displacements x of the two attachments.
+Local coordinates of an interval are these, one after the other.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.catenary.assembly import element_dofs
-from models.catenary.condensation import plan_rotation
 from models.catenary.elements import NODE_DOFS, frames, hermite_rows
 from models.catenary.equilibrium import StaticState
+from models.catenary.interval_modes import IntervalModes, IntervalMotion
+from models.catenary.intervals import Interval, turns
 from models.catenary.mesh import Chain
 from models.contact import crossing, engagement
 from models.part import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
-class WireElement:
-    """One element of a contact wire.
+class WireInterval:
+    """A contact wire between two attachments: k + 1 elements, m local coordinates.
 
     Attributes
     ----------
-    dofs : ndarray, shape (m,)
-        Its free degrees of freedom, m <= 12.
-    rows : ndarray, shape (4, m)
-        Height above the static shape = [1, xi, xi^2, xi^3] @ rows @ d[dofs].
-    static : ndarray, shape (4,)
-        Static height = [1, xi, xi^2, xi^3] @ static [m].
+    first : int
+        Its first element.
+    modes : slice
+        Its modes.
+    sides : (ndarray, ndarray)
+        Places of its two attachments' displacements.
+    ends : ndarray, shape (e,)
+        The same, one after the other.
+    plan : ndarray, shape (2 k + 4, m)
+        Displacement in plan, x and y, of its k + 2 nodes.
+    plan_static : ndarray, shape (2 k + 4,)
+        Static position of its nodes in plan [m].
+    height : ndarray, shape (k + 1, 4, m)
+        Height above the static shape = [1, xi, xi^2, xi^3] @ height[element] @ local coordinates.
+    height_static : ndarray, shape (k + 1, 4)
+        Static height = [1, xi, xi^2, xi^3] @ height_static[element] [m].
     """
 
-    dofs: IntArray
-    rows: FloatArray
-    static: FloatArray
+    first: int
+    modes: slice
+    sides: tuple[IntArray, IntArray]
+    ends: IntArray
+    plan: FloatArray
+    plan_static: FloatArray
+    height: FloatArray
+    height_static: FloatArray
+
+    def positions(self, local: FloatArray) -> list[float]:
+        """Return the positions of its nodes in plan, x and y in turn [m]."""
+        return (self.plan_static + self.plan @ local).tolist()
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a strip crosses a wire in plan: element, place on it, place on the strip; how much of the contact acts."""
+    """Where a strip crosses a wire in plan.
+
+    Attributes
+    ----------
+    element : int
+        Of the wire.
+    xi : float
+        Share of the way along the element.
+    share : float
+        Share of the way along the strip.
+    engagement : float
+        How much of the contact acts.
+    """
 
     element: int
     xi: float
     share: float
     engagement: float = 1.0
 
-    @property
-    def powers(self) -> FloatArray:
-        """Return [1, xi, xi^2, xi^3]."""
-        return np.array([1.0, self.xi, self.xi**2, self.xi**3])
+
+#: Positions in plan of an interval's nodes, x and y in turn [m], from wherever its motion is known.
+Positions = Callable[[WireInterval], Sequence[float]]
 
 
 class ContactWire:
@@ -57,19 +93,26 @@ class ContactWire:
     ----------
     chain : Chain
         Its nodes.
+    parts : sequence of (Interval, slice)
+        Its intervals, from end to end, and their modes.
     static : StaticState
-    free_index : ndarray, shape (6 n,)
-        Position of a degree of freedom among the free ones, -1 if it is held.
+    modes : IntervalModes
+        Coordinates of the line.
     angles : ndarray, shape (n,)
         Direction of the nodal axes in plan [rad].
     """
 
-    def __init__(self, chain: Chain, static: StaticState, free_index: IntArray, angles: FloatArray) -> None:
-        self._static_xy = static.positions[chain.nodes, :2]
-        self._xy_dofs = free_index[chain.nodes[:, None] * NODE_DOFS + np.arange(2)]
-        self._axes = [(math.cos(a), math.sin(a)) for a in angles[chain.nodes]]
-        self.elements = _elements(chain, static, free_index, angles)
-        self._starts = self._static_xy[:, 0].tolist()
+    def __init__(
+        self,
+        chain: Chain,
+        parts: Sequence[tuple[Interval, slice]],
+        static: StaticState,
+        modes: IntervalModes,
+        angles: FloatArray,
+    ) -> None:
+        self._starts: list[float] = static.positions[chain.nodes, 0].tolist()
+        self.intervals = _intervals(parts, static, modes, angles)
+        self._of_element = [i for i in self.intervals for _ in i.height]
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -82,96 +125,147 @@ class ContactWire:
         start, end = self._starts[element : element + 2]
         return element, (x - start) / (end - start)
 
-    def find(self, strip: FloatArray, displacement: FloatArray, guess: int) -> Crossing | None:
+    def interval(self, element: int) -> WireInterval:
+        """Return the interval that an element belongs to."""
+        return self._of_element[element]
+
+    def height_row(self, element: int, xi: float) -> FloatArray:
+        """Return what unit local coordinates of the interval lift a point of an element by, shape (m,)."""
+        interval = self._of_element[element]
+        row: FloatArray = powers(xi) @ interval.height[element - interval.first]
+        return row
+
+    def unit_force(self, element: int, xi: float) -> tuple[FloatArray, FloatArray]:
+        """Return what a unit vertical force does to the interval's modes and to its attachments' displacements."""
+        span = self._of_element[element].modes
+        row = self.height_row(element, xi)
+        return row[: span.stop - span.start], row[span.stop - span.start :]
+
+    def static_height(self, element: int, xi: float) -> float:
+        """Return the static height of a point of an element [m]."""
+        interval = self._of_element[element]
+        return float(powers(xi) @ interval.height_static[element - interval.first])
+
+    def find(self, strip: FloatArray, positions: Positions, guess: int) -> Crossing | None:
         """Find where a strip crosses the wire, walking from the element ``guess``.
 
         Parameters
         ----------
         strip : ndarray, shape (2, 2, 3)
             Ends A and B; position and velocity.
-        displacement : ndarray, shape (n_free,)
-            Displacement of the line from its static shape.
+        positions : callable
+            Interval -> positions in plan of its nodes, x and y in turn [m].
 
         Returns
         -------
         Crossing or None
             None beyond the wire's ends, or where the wire passes beside the strip.
         """
-        element = self._start(guess, float(strip[0, 0, 0] + strip[1, 0, 0]) / 2.0)
-        last = len(self.elements) - 1
+        a, b = strip[:, 0].tolist()
+        element = self._start(guess, (a[0] + b[0]) / 2.0)
+        last = len(self._of_element) - 1
+        interval: WireInterval | None = None
+        at: Sequence[float] = ()
         direction = 0
         while True:
-            found = crossing(
-                strip[0, 0], strip[1, 0], self._plan(element, displacement), self._plan(element + 1, displacement)
-            )
+            if interval is not self._of_element[element]:
+                interval = self._of_element[element]
+                at = positions(interval)
+            k = 2 * (element - interval.first)
+            found = crossing(a, b, at[k : k + 2], at[k + 2 : k + 4])
             if found is None:
                 return None
             share, xi = found
             step = -1 if xi < 0.0 else (1 if xi > 1.0 else 0)
             if step == 0 or step == -direction:
-                return self._crossing(strip, element, min(max(xi, 0.0), 1.0), share) if 0.0 <= share <= 1.0 else None
+                return self._crossing(a, b, element, min(max(xi, 0.0), 1.0), share) if 0.0 <= share <= 1.0 else None
             direction = step
             element += step
             if not 0 <= element <= last:
                 return None
 
-    def plan(self, found: Crossing, displacement: FloatArray) -> tuple[float, float]:
-        """Return the crossing's position in plan [m]."""
-        (x1, y1), (x2, y2) = (self._plan(found.element + k, displacement) for k in (0, 1))
-        return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1)
+    def point(self, found: Crossing, local: FloatArray) -> tuple[float, float, float]:
+        """Return a point of the wire from the local coordinates of its interval [m]."""
+        interval = self._of_element[found.element]
+        k = found.element - interval.first
+        x1, y1, x2, y2 = interval.positions(local)[2 * k : 2 * k + 4]
+        z = powers(found.xi) @ (interval.height_static[k] + interval.height[k] @ local)
+        return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1), float(z)
 
-    def _crossing(self, strip: FloatArray, element: int, xi: float, share: float) -> Crossing:
-        length = math.dist(strip[0, 0, :2].tolist(), strip[1, 0, :2].tolist())
+    def _crossing(
+        self, a: Sequence[float], b: Sequence[float], element: int, xi: float, share: float
+    ) -> Crossing:
         start, end = self._starts[element : element + 2]
         x = start + xi * (end - start)
         from_wire_end = min(x - self._starts[0], self._starts[-1] - x)
-        return Crossing(element, xi, share, engagement(min(share, 1.0 - share) * length, from_wire_end))
+        from_strip_end = min(share, 1.0 - share) * math.dist(a[:2], b[:2])
+        return Crossing(element, xi, share, engagement(from_strip_end, from_wire_end))
 
     def _start(self, guess: int, x: float) -> int:
         """Return where to begin walking; a guess that is far off (first step, reset) is replaced by a search."""
-        if 0 <= guess < len(self.elements) and abs(self._starts[guess] - x) < 5.0:
+        if 0 <= guess < len(self._of_element) and abs(self._starts[guess] - x) < 5.0:
             return guess
         found = int(np.searchsorted(self._starts, x)) - 1
-        return min(max(found, 0), len(self.elements) - 1)
-
-    def _plan(self, node: int, displacement: FloatArray) -> tuple[float, float]:
-        x, y = self._static_xy[node]
-        i, j = self._xy_dofs[node]
-        u = float(displacement[i]) if i >= 0 else 0.0
-        v = float(displacement[j]) if j >= 0 else 0.0
-        cosine, sine = self._axes[node]
-        return float(x) + cosine * u - sine * v, float(y) + sine * u + cosine * v
+        return min(max(found, 0), len(self._of_element) - 1)
 
 
-def _elements(
-    chain: Chain, static: StaticState, free_index: IntArray, angles: FloatArray
-) -> tuple[WireElement, ...]:
-    pairs = np.stack([chain.nodes[:-1], chain.nodes[1:]], axis=1)
+def powers(xi: float) -> FloatArray:
+    """Return [1, xi, xi^2, xi^3]."""
+    return np.array([1.0, xi, xi * xi, xi * xi * xi])
+
+
+def height_polynomials(
+    nodes: IntArray, static: StaticState, angles: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return heights of the elements between successive nodes as polynomials of xi.
+
+    Returns
+    -------
+    rows : ndarray, shape (k, 4, 12)
+        Of the height above the static shape, over the nodal displacements of an element.
+    static : ndarray, shape (k, 4)
+        Of the static height [m].
+    """
+    pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
     axes, length = frames(static.points[pairs[:, 0]], static.points[pairs[:, 1]])
-    dofs = element_dofs(pairs)
-    return tuple(
-        _element(static, pair, dofs[i], free_index, axes[i], float(length[i]), angles[pair])
-        for i, pair in enumerate(pairs)
-    )
-
-
-def _element(
-    static: StaticState,
-    pair: IntArray,
-    dofs: IntArray,
-    free_index: IntArray,
-    axes: FloatArray,
-    length: float,
-    angles: FloatArray,
-) -> WireElement:
-    rows = hermite_rows(axes, length)
-    z = static.points[pair, 2]
-    local = static.displacement[dofs].copy()
+    rows = np.array([hermite_rows(axis, float(size)) for axis, size in zip(axes, length, strict=True)])
+    local = static.displacement[element_dofs(pairs)].copy()
     # The static rotations count from a horizontal wire; the chord's own slope is in the reference height.
-    local[[4, 10]] += axes[0, 2]
-    local[[5, 11]] -= axes[0, 1]
-    height = rows @ local
-    height[:2] += z[0], z[1] - z[0]
-    rows = rows @ plan_rotation(angles)
-    inside = free_index[dofs] >= 0
-    return WireElement(free_index[dofs][inside], np.ascontiguousarray(rows[:, inside]), height)
+    local[:, [4, 10]] += axes[:, 0, 2, None]
+    local[:, [5, 11]] -= axes[:, 0, 1, None]
+    height = np.einsum("kij,kj->ki", rows, local)
+    z = static.points[pairs, 2]
+    height[:, 0] += z[:, 0]
+    height[:, 1] += z[:, 1] - z[:, 0]
+    turn = turns(angles)[np.repeat(pairs, 2, axis=1)]
+    return np.einsum("kibj,kbjm->kibm", rows.reshape(-1, 4, 4, 3), turn).reshape(rows.shape), height
+
+
+def _intervals(
+    parts: Sequence[tuple[Interval, slice]], static: StaticState, modes: IntervalModes, angles: FloatArray
+) -> tuple[WireInterval, ...]:
+    motion = IntervalMotion(modes)
+    nodes = np.concatenate([parts[0][0].nodes[:1], *(part.nodes[1:] for part, _ in parts)])
+    rows, height = height_polynomials(nodes, static, angles)
+    result, first = [], 0
+    for part, span in parts:
+        count = len(part.nodes) - 1
+        here = slice(first, first + count)
+        sides, local = motion.rows(part, span)
+        by_node = local.reshape(count + 1, NODE_DOFS, -1)
+        of_element = np.concatenate([by_node[:-1], by_node[1:]], axis=1)
+        plan = np.einsum("nij,njm->nim", turns(angles[part.nodes])[:, :2, :2], by_node[:, :2])
+        result.append(
+            WireInterval(
+                first=first,
+                modes=span,
+                sides=sides,
+                ends=np.concatenate(sides),
+                plan=np.ascontiguousarray(plan.reshape(2 * (count + 1), -1)),
+                plan_static=static.positions[part.nodes, :2].ravel(),
+                height=rows[here] @ of_element,
+                height_static=height[here],
+            )
+        )
+        first += count
+    return tuple(result)

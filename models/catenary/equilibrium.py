@@ -23,8 +23,8 @@ from models.catenary.assembly import (
     dropper_rows,
     dropper_stiffness,
 )
-from models.catenary.condensation import attachments
 from models.catenary.elements import NODE_DOFS
+from models.catenary.intervals import attachments
 from models.catenary.mesh import CatenaryMesh
 from models.catenary.parameters import GRAVITY, CatenaryDefinition
 from models.part import FloatArray

@@ -49,12 +49,22 @@ class OpenContact:
         delta'(-) of a contact that is closed already; 0 otherwise.
     engagement : float
         Share of the contact law that acts; less than 1 near the ends of strip and wire.
-    load : ndarray, shape (m,)
-        What a unit contact force does at the element's degrees of freedom ``dofs``.
-    weights : ndarray, shape (4,)
-        Powers of xi: the response is ``columns @ weights``.
+    place : (int, float)
+        Element of the wire and place on it, xi.
+    interval : slice
+        Modes of the wire's interval.
+    modal : ndarray, shape (n_span,)
+        What a unit contact force does to these modes.
+    yielding : ndarray, shape (n_span,)
+        How far they give way to it, the attachments held.
+    places : ndarray, shape (e,)
+        Displacements of the interval's attachments.
+    load : ndarray, shape (e,)
+        What a unit contact force does to them, directly and through the modes.
     columns : Columns
-        Response of the line to the element's four shape polynomials.
+        Response to unit loads at ``places``.
+    at_ends : ndarray, shape (e, e)
+        The same at ``places`` themselves.
     """
 
     pantograph: int
@@ -63,10 +73,24 @@ class OpenContact:
     velocity: float
     impact_velocity: float
     engagement: float
-    dofs: IntArray
+    place: tuple[int, float]
+    interval: slice
+    modal: FloatArray
+    yielding: FloatArray
+    places: IntArray
     load: FloatArray
-    weights: FloatArray
     columns: Columns
+    at_ends: FloatArray
+
+    @property
+    def compliance(self) -> float:
+        """Return how far the wire gives way at the contact [m/N]."""
+        return float(self.load @ (self.at_ends @ self.load) + self.modal @ self.yielding)
+
+    def moved_by(self, other: OpenContact) -> float:
+        """Return how far the wire is moved here by a unit force at another contact [m/N]."""
+        moved = float(self.load @ (other.columns.at(self.places) @ other.load))
+        return moved + float(self.modal @ other.yielding) if self.interval == other.interval else moved
 
 
 @dataclass(frozen=True)
@@ -184,8 +208,8 @@ class LocalProblem:
         self, free_force: FloatArray, contact: OpenContact, strip_compliance: float
     ) -> LocalForces | None:
         """Return the solution for one contact if it leaves no dropper slack, which is what most steps are."""
-        columns, weights, slope_of_velocity = contact.columns, contact.weights, self.velocity_factor
-        compliance = strip_compliance + float(contact.load @ (columns.at(contact.dofs) @ weights))
+        columns, slope_of_velocity = contact.columns, self.velocity_factor
+        compliance = strip_compliance + contact.compliance
         force = 0.0
         for _ in range(_MAX_ITERATIONS):
             penetration = contact.penetration - compliance * force
@@ -199,7 +223,7 @@ class LocalProblem:
             return None
         elastic = free_force.copy()
         near = columns.dropper_index
-        elastic[near] += self.measure[near] * (columns.dropper_stretch @ (force * weights))
+        elastic[near] += self.measure[near] * (columns.dropper_stretch @ (force * contact.load))
         if elastic.min(initial=0.0) < 0.0:
             return None
         none = np.zeros(0, dtype=np.int64)
@@ -218,10 +242,9 @@ class _Coupling:
         self.dropper_contact = np.zeros((problem.measure.size, n))
         for j, source in enumerate(contacts):
             index = source.columns.dropper_index
-            self.dropper_contact[index, j] = problem.measure[index] * (source.columns.dropper_stretch @ source.weights)
+            self.dropper_contact[index, j] = problem.measure[index] * (source.columns.dropper_stretch @ source.load)
             for i, target in enumerate(contacts):
-                response = source.columns.at(target.dofs) @ source.weights
-                self.contact_contact[i, j] += target.load @ response
+                self.contact_contact[i, j] += target.moved_by(source)
 
     def dropper_dropper(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return the compliance of droppers by slack droppers, d(-e)/df, shape (rows, columns)."""
@@ -236,7 +259,7 @@ class _Coupling:
         result = np.zeros((len(self.contacts), slack.size))
         for i, contact in enumerate(self.contacts):
             for k, j in enumerate(slack):
-                result[i, k] = contact.load @ self.problem.dropper_columns[j].at(contact.dofs)[:, 0]
+                result[i, k] = contact.load @ self.problem.dropper_columns[j].at(contact.places)[:, 0]
         return result
 
     def penetration(
@@ -302,8 +325,7 @@ class _Coupling:
 def _estimate(problem: LocalProblem, contact: OpenContact) -> float:
     """Return a first guess of a contact force: the law's secant over the free penetration."""
     law = problem.law_of(contact, contact.penetration, contact.velocity)
-    local = float(contact.load @ contact.columns.at(contact.dofs) @ contact.weights)
-    return law.force / (1.0 + law.by_penetration * local)
+    return law.force / (1.0 + law.by_penetration * contact.compliance)
 
 
 def _carried(now: IntArray, before: IntArray, compensation: FloatArray) -> FloatArray:

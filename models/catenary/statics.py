@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse.linalg import splu
 
 from models.catenary.assembly import beam_properties
-from models.catenary.compliance import Columns, DropperColumns
+from models.catenary.band import factorised
+from models.catenary.compliance import Compliance
 from models.catenary.contact_wire import ContactWire
 from models.catenary.elements import NODE_DOFS
 from models.catenary.local_response import LocalProblem
@@ -248,48 +248,43 @@ def positions_in_span(span: Span, between: int = 6) -> FloatArray:
 
 
 class _StaticResponse:
-    """The line's static compliance, its slack droppers found exactly."""
+    """The line's static compliance, its slack droppers found exactly.
+
+    At rest modes of intervals and attachments do not act on each other.
+    """
 
     def __init__(self, model: CatenaryModel) -> None:
         self._model = model
-        lu = splu(model.K.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        self._solve = lu.solve
-        self._columns = DropperColumns(model.B, self._respond)
+        factor = factorised(model.modes.K)
+        self._solve = factor.solve
+        columns = Compliance(factor, model.B).dropper_columns
+        self._columns = columns
         self._local = LocalProblem(
             measure=model.dropper_stiffness,
             unilateral=model.unilateral,
-            dropper_columns=self._columns,
+            dropper_columns=columns,
             velocity_factor=0.0,
             law=CONTACT_LAWS[model.definition.contact.law],
             parameters=model.definition.contact,
         )
-        self._rest = self._solve(model.B.T @ model.rest_compensation)
-
-    def _respond(self, load: FloatArray) -> Columns:
-        """Return the static response to a load, shape (n, 1)."""
-        values = self._solve(load[:, 0])[:, None]
-        droppers = np.arange(self._model.B.shape[0])
-        return Columns(np.arange(len(values)), values, droppers, self._model.B @ values)
+        self._rest = model.B.T @ model.rest_compensation
 
     def uplift(self, wire: ContactWire, x: float, force: float) -> float:
         """Return the rise of a contact wire under a vertical force on it [m]."""
         model = self._model
-        dofs, row = _height_row(wire, x)
-        load = np.zeros(len(model.free))
-        load[dofs] = force * row
-        displacement = self._solve(load) + self._rest
+        element, xi = wire.locate(x)
+        interval = wire.interval(element)
+        modal, ends = wire.unit_force(element, xi)
+        load = self._rest.copy()
+        load[interval.ends] += force * ends
+        displacement = self._solve(load)
         elastic = model.static.elastic_force + model.dropper_stiffness * (model.B @ displacement)
         found = self._local.solve(elastic, (), np.zeros((0, 0)), np.flatnonzero(elastic < 0.0))
         for j, compensation in zip(found.slack, found.compensation, strict=True):
-            displacement -= compensation * self._columns[int(j)].values[:, 0]
-        return float(row @ displacement[dofs])
-
-
-def _height_row(wire: ContactWire, x: float) -> tuple[IntArray, FloatArray]:
-    """Return the degrees of freedom at ``x`` and what their unit displacements lift the wire by."""
-    element, xi = wire.locate(x)
-    found = wire.elements[element]
-    return found.dofs, np.array([1.0, xi, xi**2, xi**3]) @ found.rows
+            column = self._columns[int(j)]
+            displacement[column.rows] -= compensation * column.values[:, 0]
+        inside = force * modal @ (modal / model.modes.eigenvalue[interval.modes])
+        return float(ends @ displacement[interval.ends] + inside)
 
 
 def _beams_of(beams: IntArray, pairs: IntArray) -> IntArray:

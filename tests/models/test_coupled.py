@@ -10,6 +10,7 @@ from models.catenary.part import CatenaryPart
 from models.coupled import CoupledModel
 from models.pantograph.lumped import LumpedModel, LumpedPantographPart
 from models.time_integration import Newmark
+from tests.models.nodal_line import NodalLine
 
 START, STOP = 60.0, 1.2
 
@@ -26,13 +27,14 @@ def pantograph(cx):
 
 def _assembled(line, pantograph, dt, steps):
     """One matrix for line, pantograph and contact spring, assembled and solved anew every step."""
-    catenary, lumped = CatenaryModel(line), LumpedModel(pantograph)
-    newmark, n, m = Newmark(dt), len(catenary.free), lumped.size
+    model, lumped = CatenaryModel(line), LumpedModel(pantograph)
+    catenary = NodalLine(model)
+    newmark, n, m = Newmark(dt), catenary.size, lumped.size
     M = sp.block_diag([catenary.M, lumped.M], format="csr")
     C = sp.block_diag([catenary.C, lumped.C], format="csr")
     K = sp.block_diag([catenary.K, lumped.K], format="csr")
     base = (K + newmark.a0 * M + newmark.a1 * C).tocsc()
-    wire, k = catenary.wires[0], line.contact.stiffness
+    k = line.contact.stiffness
     d, v, a = (np.zeros(n + m) for _ in range(3))
     forces, element = [], -1
     for step in range(1, steps + 1):
@@ -41,14 +43,11 @@ def _assembled(line, pantograph, dt, steps):
         right[n:] += lumped.load(t, np.zeros(2))
         x = pantograph.start_position + pantograph.speed * t
         strip = np.array([[[x, y, 0.0], [pantograph.speed, 0, 0]] for y in (0.7, -0.7)])
-        found = wire.find(strip, spsolve(base, right)[:n], element)
+        found = catenary.find(0, strip, spsolve(base, right)[:n], element)
         element = found.element
-        item, powers = wire.elements[found.element], found.powers
-        row = np.zeros(n + m)
-        row[item.dofs] = -(powers @ item.rows)
-        row[-1] = 1.0
-        row = sp.csc_matrix(row[:, None])
-        gap0 = pantograph.reference_height - powers @ item.static
+        row, height = catenary.row(0, found.element, found.xi)
+        row = sp.csc_matrix(np.concatenate([-row, np.zeros(m - 1), [1.0]])[:, None])
+        gap0 = pantograph.reference_height - height
         slack: set[int] = set()
         closed = False
         for _ in range(50):
@@ -58,12 +57,12 @@ def _assembled(line, pantograph, dt, steps):
                 load -= k * gap0 * row.toarray()[:, 0]
             if slack:
                 rows = sp.block_diag([catenary.B, sp.csr_matrix((0, m))], format="csr")[sorted(slack)]
-                stiff = sp.diags(catenary.dropper_stiffness[sorted(slack)])
+                stiff = sp.diags(model.dropper_stiffness[sorted(slack)])
                 system = system - rows.T @ stiff @ rows
-                load += rows.T @ catenary.static.dropper_force[sorted(slack)]
+                load += rows.T @ model.static.dropper_force[sorted(slack)]
             new = spsolve(system.tocsc(), load)
             gap = gap0 + (row.T @ new)[0]
-            elastic = catenary.static.dropper_force + catenary.dropper_stiffness * (catenary.B @ new[:n])
+            elastic = model.static.dropper_force + model.dropper_stiffness * (catenary.B @ new[:n])
             now = set(np.flatnonzero(elastic < 0.0).tolist())
             if (gap > 0.0) == closed and now == slack:
                 break

@@ -13,6 +13,7 @@ from models.library import load_pantograph
 from models.pantograph.lumped import LumpedModel, LumpedPantographPart
 from models.statistics import contact_figures
 from models.time_integration import Newmark
+from tests.models.nodal_line import NodalLine
 
 START = 70.0
 
@@ -33,21 +34,22 @@ def pantograph(cx):
 
 def _assembled(line, pantograph, dt, steps):
     """One matrix for both wires, pantograph and the springs of the closed contacts, solved anew every step."""
-    catenary, lumped = CatenaryModel(line), LumpedModel(pantograph)
-    newmark, n, m = Newmark(dt), len(catenary.free), lumped.size
+    model, lumped = CatenaryModel(line), LumpedModel(pantograph)
+    catenary = NodalLine(model)
+    newmark, n, m = Newmark(dt), catenary.size, lumped.size
     M, C, K = (
         sp.block_diag([getattr(catenary, name), getattr(lumped, name)], format="csr") for name in ("M", "C", "K")
     )
     base = (K + newmark.a0 * M + newmark.a1 * C).tocsc()
     B = sp.hstack([catenary.B, sp.csr_matrix((catenary.B.shape[0], m))], format="csr")
     d, v, a = (np.zeros(n + m) for _ in range(3))
-    forces, elements = [], [-1] * len(catenary.wires)
+    forces, elements = [], [-1] * len(model.wires)
     for step in range(1, steps + 1):
         t = step * dt
         right = M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a) + C @ (newmark.a1 * d + newmark.a4 * v)
         right[n:] += lumped.load(t, np.zeros(2))
         rows, gaps, elements = _contact_rows(catenary, pantograph, t, spsolve(base, right)[:n], elements, n + m)
-        new, penetration = _settled(line, catenary, base, B, right, rows, gaps)
+        new, penetration = _settled(line, model, base, B, right, rows, gaps)
         acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
         v = v + 0.5 * dt * (a + acceleration)
         d, a = new, acceleration
@@ -60,27 +62,24 @@ def _contact_rows(catenary, pantograph, t, free, elements, size):
     x = pantograph.start_position + pantograph.speed * t
     strip = np.array([[[x, y, 0.0], [pantograph.speed, 0, 0]] for y in (0.725, -0.725)])
     rows, gaps, met = [], [], []
-    for wire, guess in zip(catenary.wires, elements, strict=True):
-        found = wire.find(strip, free, guess)
-        item, powers = wire.elements[found.element], found.powers
-        row = np.zeros(size)
-        row[item.dofs] = -(powers @ item.rows)
-        row[-1] = 1.0
-        rows.append(row)
-        gaps.append(pantograph.reference_height - powers @ item.static)
+    for section, guess in enumerate(elements):
+        found = catenary.find(section, strip, free, guess)
+        row, height = catenary.row(section, found.element, found.xi)
+        rows.append(np.concatenate([-row, np.zeros(size - len(row) - 1), [1.0]]))
+        gaps.append(pantograph.reference_height - height)
         met.append(found.element)
     return np.array(rows), np.array(gaps), met
 
 
-def _settled(line, catenary, base, B, right, rows, gaps):
+def _settled(line, model, base, B, right, rows, gaps):
     k, closed, slack = line.contact.stiffness, np.zeros(len(rows), dtype=bool), np.zeros(B.shape[0], dtype=bool)
     for _ in range(50):
         R = sp.csr_matrix(rows[closed])
-        system = base + k * (R.T @ R) - B[slack].T @ sp.diags(catenary.dropper_stiffness[slack]) @ B[slack]
-        load = right - k * (R.T @ gaps[closed]) + B[slack].T @ catenary.static.dropper_force[slack]
+        system = base + k * (R.T @ R) - B[slack].T @ sp.diags(model.dropper_stiffness[slack]) @ B[slack]
+        load = right - k * (R.T @ gaps[closed]) + B[slack].T @ model.static.dropper_force[slack]
         new = spsolve(system.tocsc(), load)
         penetration = gaps + rows @ new
-        elastic = catenary.static.dropper_force + catenary.dropper_stiffness * (B @ new)
+        elastic = model.static.dropper_force + model.dropper_stiffness * (B @ new)
         if np.array_equal(penetration > 0.0, closed) and np.array_equal(elastic < 0.0, slack):
             return new, penetration
         closed, slack = penetration > 0.0, elastic < 0.0

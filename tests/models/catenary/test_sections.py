@@ -30,7 +30,7 @@ def pair(section_maker, sections_maker):
 def height(model, section, x):
     wire = model.wires[section]
     element, xi = wire.locate(x)
-    return np.array([1.0, xi, xi**2, xi**3]) @ wire.elements[element].static
+    return wire.static_height(element, xi)
 
 
 def lateral(model, section, x):
@@ -86,9 +86,8 @@ def test_the_ends_may_differ(section_maker, sections_maker):
 
 
 def test_sections_do_not_act_on_each_other(overlap):
-    node = overlap.free // 6
-    section = overlap.mesh.section[node]
-    for matrix in (overlap.K, overlap.M, overlap.C):
+    section = overlap.mesh.section[overlap.modes.attached // 6]
+    for matrix in (overlap.modes.K, overlap.modes.M, overlap.modes.C):
         entries = matrix.tocoo()
         assert (section[entries.row] == section[entries.col]).all()
 

@@ -1,0 +1,57 @@
+"""A line in plain nodal coordinates: what the coordinates of the intervals are checked against."""
+
+import numpy as np
+import scipy.sparse as sp
+
+from models.catenary.assembly import dropper_rows, element_dofs
+from models.catenary.contact_wire import height_polynomials
+from models.catenary.elements import NODE_DOFS
+
+
+class NodalLine:
+    """Matrices over the free degrees of freedom of the nodes in global axes, droppers included."""
+
+    def __init__(self, model):
+        self.model, mesh, static = model, model.mesh, model.static
+        self.free = np.flatnonzero(~mesh.fixed.ravel())
+        index = np.full(mesh.fixed.size, -1)
+        index[self.free] = np.arange(len(self.free))
+        self.B = dropper_rows(mesh, static.positions)[:, self.free].tocsr()
+        droppers = self.B.T @ sp.diags(model.dropper_stiffness) @ self.B
+        matrices = (static.matrices.K, static.matrices.M, static.matrices.C)
+        K, M, C = (matrix.tocsr()[self.free][:, self.free] for matrix in matrices)
+        self.K, self.M = (K + droppers).tocsc(), M.tocsc()
+        self.C = (C + model.definition.damping.of("dropper").alpha * droppers).tocsc()
+        self.size = len(self.free)
+        self._wires = [self._wire(chain, index) for chain in mesh.contact_chains()]
+
+    def _wire(self, chain, index):
+        pairs = np.stack([chain.nodes[:-1], chain.nodes[1:]], axis=1)
+        rows, static = height_polynomials(chain.nodes, self.model.static, np.zeros(len(self.model.mesh.points)))
+        return chain.nodes, index[element_dofs(pairs)], rows, static
+
+    def full(self, displacement):
+        """Return displacements of all nodes, zero where held, shape (n, 6)."""
+        result = np.zeros(self.model.mesh.fixed.size)
+        result[self.free] = displacement
+        return result.reshape(-1, NODE_DOFS)
+
+    def find(self, section, strip, displacement, guess):
+        """Return where a strip crosses a contact wire."""
+        nodes = self._wires[section][0]
+        moved = self.model.static.positions[nodes, :2] + self.full(displacement)[nodes, :2]
+
+        def positions(interval):
+            return moved[interval.first : interval.first + len(interval.plan_static) // 2].ravel().tolist()
+
+        return self.model.wires[section].find(strip, positions, guess)
+
+    def row(self, section, element, xi):
+        """Return the row of the height of a point of a contact wire, and its static height."""
+        _, dofs, rows, static = self._wires[section]
+        powers = xi ** np.arange(4)
+        row = np.zeros(self.size)
+        inside = dofs[element] >= 0
+        row[dofs[element][inside]] = (powers @ rows[element])[inside]
+        return row, float(powers @ static[element])
+

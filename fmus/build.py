@@ -12,7 +12,7 @@ import tempfile
 import tomllib
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,8 @@ _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
 #: Sources that are not carried along but decide about an FMU's bytes.
 _BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "repair.py", "shim.py")
 _REQUIREMENTS = b"numpy>=1.26\nscipy>=1.11\n"
+#: Most pantograph ports of a line: each costs variables, and no train has more.
+MAX_PORTS = 16
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
 
 _SCRIPT = '''"""Entry for pythonfmu. Generated; the name of this file holds the content hash."""
@@ -62,7 +64,11 @@ class {name}({base}):
 
     fingerprint = "{fingerprint}"
     description = {title!r}
-{settings}'''
+{settings}
+
+# pythonfmu runs this for every instance, and never gives the class back: so they share the first.
+{name} = globals().setdefault("first", {name})
+'''
 
 
 class BuildError(ValueError):
@@ -142,7 +148,7 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     """
     kind, _, rest = name.partition("_")
     stem, ports = _split_ports(rest, pantographs)
-    if kind == "Catenary" and (path := LIBRARY / "lines" / f"{stem}.toml").is_file():
+    if kind == "Catenary" and (path := _definition("lines", stem)) is not None:
         suffix = f"_P{ports}" if ports > 1 else ""
         return Recipe(
             f"Catenary_{stem}{suffix}",
@@ -152,8 +158,8 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
             path,
             {"pantographs": ports},
         )
-    path = LIBRARY / "pantographs" / f"{rest}.toml"
-    if kind == "Pantograph" and path.is_file() and (adapter := _PANTOGRAPHS.get(_head(path).get("type", ""))):
+    path = _definition("pantographs", rest) if kind == "Pantograph" else None
+    if path is not None and (adapter := _PANTOGRAPHS.get(_head(path).get("type", ""))):
         return Recipe(name, _head(path).get("title") or f"Pantograph {rest}", *adapter, path)
     known = ", ".join(known_names()) or "none"
     raise UnknownFmuError(
@@ -219,6 +225,11 @@ def _definitions(folder: str) -> list[Path]:
     return sorted((LIBRARY / folder).glob("*.toml"))
 
 
+def _definition(folder: str, name: str) -> Path | None:
+    # Looked up, not made into a path: a name could lead out of the library, and the FMU out of its folder.
+    return next((path for path in _definitions(folder) if path.stem == name), None)
+
+
 def _head(path: Path) -> dict[str, str]:
     """Return the plain texts of a definition; a file that cannot be read has none, the build says why."""
     try:
@@ -230,7 +241,7 @@ def _head(path: Path) -> dict[str, str]:
 
 def _split_ports(text: str, pantographs: int | None) -> tuple[str, int]:
     stem, separator, number = text.rpartition("_P")
-    if separator and number.isdigit() and int(number) > 0:
+    if separator and number.isascii() and number.isdigit() and len(number) <= 2 and 0 < int(number) <= MAX_PORTS:
         return stem, pantographs or int(number)
     return text, pantographs or 1
 
@@ -307,7 +318,8 @@ def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:
 
 def _script(wanted: Recipe, sources: _Sources) -> str:
     # Everything is imported at once: the folder of the first of two instances may be gone later.
-    imports = "\n".join(f"import {sources.package}.{name}" for name in sources.modules)
+    names = [name for name, module in sources.modules.items() if not module.is_optional]
+    imports = "\n".join(f"import {sources.package}.{name}" for name in names)
     settings = "".join(f"    {name} = {value!r}\n" for name, value in sorted(wanted.settings.items()))
     return _SCRIPT.format(
         title=wanted.title,
@@ -366,7 +378,8 @@ def _importable(folder: str, names: tuple[str, ...]) -> Iterator[None]:
     try:
         yield
     finally:
-        sys.path.remove(folder)
+        with suppress(ValueError):  # the script takes it away itself
+            sys.path.remove(folder)
         sys.dont_write_bytecode = no_bytecode
         for name in [n for n in sys.modules if n.partition(".")[0] in names]:
             del sys.modules[name]

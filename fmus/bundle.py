@@ -16,6 +16,8 @@ from pathlib import Path
 
 #: What a machine that runs an FMU must have besides Python itself.
 REQUIREMENTS = ("numpy", "scipy")
+#: What makes an FMU faster where it is installed.
+OPTIONAL = ("numba",)
 _DYNAMIC_IMPORTS = {"import_module", "__import__"}
 
 
@@ -43,6 +45,11 @@ class Module:
     def is_package(self) -> bool:
         """Whether other modules lie in it."""
         return self.path.name == "__init__.py"
+
+    @property
+    def is_optional(self) -> bool:
+        """Whether it needs what a machine may lack; then it is carried along, but not imported by its name."""
+        return any(_root(name) in OPTIONAL for node in _imports(self) for name in _imported_names(node))
 
     def inner_path(self) -> str:
         """Return where the file belongs below the private package, with forward slashes."""
@@ -142,7 +149,7 @@ def _own_imports(module: Module, roots: Mapping[str, Path]) -> list[str]:
         for name in _absolute_names(node, module):
             if _root(name) in roots:
                 own += _modules_of(node, name, roots)
-            elif _root(name) not in REQUIREMENTS and _root(name) not in sys.stdlib_module_names:
+            elif _root(name) not in (*REQUIREMENTS, *OPTIONAL, *sys.stdlib_module_names):
                 raise BundleError(
                     f"{module.path}, line {node.lineno}: imports {name}, but an FMU may only need "
                     f"{' and '.join(REQUIREMENTS)}"

@@ -18,8 +18,9 @@ from models.part import FloatArray
 _WIDEST_BAND = 64
 #: Rows on each side of a load that a local solution begins with.
 _FIRST_REACH = 96
-#: A solution is cut where it has fallen below this share of its largest value, less than rounding.
-CUT = 1e-16
+#: A solution is cut where it has fallen below this share of its largest value, less than its rounding: a solution
+#: with the effective stiffness of a line is right to about 1e-15 of its largest value.
+CUT = 1e-15
 
 
 class Factor(Protocol):
@@ -37,11 +38,14 @@ class Banded:
 
     Attributes
     ----------
+    matrix : sparse, shape (n, n)
     factor : ndarray, shape (width + 1, n)
         Lower triangle of the Cholesky factor, diagonal by diagonal.
     """
 
     def __init__(self, matrix: sp.coo_matrix, width: int) -> None:
+        self.matrix = matrix.tocsr()
+        self._reach = 0
         lower = matrix.row >= matrix.col
         band = np.zeros((width + 1, matrix.shape[0]), order="F")
         band[(matrix.row - matrix.col)[lower], matrix.col[lower]] = matrix.data[lower]
@@ -60,18 +64,26 @@ class Banded:
         A part of the factor is the factor of that part, so only rows near the load are visited: the solution
         on a window is exact once what it leaves outside is below rounding.
         """
-        n, reach = self.factor.shape[1], _FIRST_REACH
+        if not self._reach:
+            # How far a response reaches is a matter of the factor: told by its middle, not by what was asked before,
+            # so that the same question has the same answer to the last bit whatever came before it.
+            middle = self.factor.shape[1] // 2
+            begin, values = self._near(middle, np.ones((1, 1)), _FIRST_REACH)
+            self._reach = max(middle - begin, begin + len(values) - middle) + 2 * self.factor.shape[0]
+        return self._near(first, load, self._reach)
+
+    def _near(self, first: int, load: FloatArray, reach: int) -> tuple[int, FloatArray]:
+        n = self.factor.shape[1]
         while True:
             begin, end = max(first - reach, 0), min(first + len(load) + reach, n)
             right = np.zeros((end - begin, load.shape[1]), order="F")
             right[first - begin : first - begin + len(load)] = load
-            values = dpbtrs(self.factor[:, begin:end], right, lower=1)[0]
+            values = dpbtrs(self.factor[:, begin:end], right, lower=1, overwrite_b=1)[0]
             size = np.abs(values).max(axis=1)
-            edge = self.factor.shape[0]
-            left = begin == 0 or size[:edge].max() <= CUT * size.max()
-            right_hand = end == n or size[-edge:].max() <= CUT * size.max()
-            if left and right_hand:
-                return begin, np.ascontiguousarray(values)
+            smallest, edge = CUT * size.max(), self.factor.shape[0]
+            if (begin == 0 or size[:edge].max() <= smallest) and (end == n or size[-edge:].max() <= smallest):
+                kept = np.flatnonzero(size > smallest)
+                return begin + int(kept[0]), np.ascontiguousarray(values[kept[0] : kept[-1] + 1])
             reach *= 2
 
 

@@ -10,12 +10,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.catenary.band import CUT, Factor
+from models.catenary.product import Product
 from models.part import FloatArray, IntArray
 
 #: Droppers whose response is kept.
 _KEPT_DROPPERS = 256
-#: Attachments of the contact wires whose response is kept: strips come by once.
-_KEPT_ATTACHMENTS = 24
+#: Displacements of attachments whose response is kept: four strips on two wires meet fewer at a time.
+_KEPT_PLACES = 256
 
 
 @dataclass(frozen=True)
@@ -46,21 +47,6 @@ class Columns:
         return result
 
 
-def joined(parts: Sequence[Columns]) -> Columns:
-    """Return the columns of several as one, side by side."""
-    rows = slice(min(part.rows.start for part in parts), max(part.rows.stop for part in parts))
-    droppers = np.unique(np.concatenate([part.dropper_index for part in parts]))
-    count = sum(part.values.shape[1] for part in parts)
-    values, stretch = np.zeros((rows.stop - rows.start, count)), np.zeros((len(droppers), count))
-    first = 0
-    for part in parts:
-        own = slice(first, first + part.values.shape[1])
-        values[part.rows.start - rows.start : part.rows.stop - rows.start, own] = part.values
-        stretch[np.searchsorted(droppers, part.dropper_index), own] = part.dropper_stretch
-        first = own.stop
-    return Columns(rows, values, droppers, stretch)
-
-
 class Compliance:
     """Local responses of the attachments.
 
@@ -74,44 +60,67 @@ class Compliance:
 
     def __init__(self, factor: Factor, B: sp.csr_matrix) -> None:
         self._factor, self._B = factor, B
-        self._by_place = B.tocsc()
-        self._attachments: dict[int, Columns] = {}
+        self._kept: dict[int, Columns] = {}
+        self._whole, self._elongate = np.zeros(B.shape[1]), Product(B)
         self.dropper_columns = DropperColumns(self)
 
-    def attachment(self, places: IntArray) -> Columns:
-        """Return the responses to unit loads on one attachment, whose displacements are at ``places``."""
-        kept, key = self._attachments, int(places[0])
-        found = kept.get(key)
+    def unit(self, place: int) -> Columns:
+        """Return the response to a unit load on one displacement of an attachment."""
+        kept = self._kept
+        found = kept.get(place)
         if found is None:
-            found = self.columns(places, np.eye(len(places)))
-            while len(kept) >= _KEPT_ATTACHMENTS:
+            found = self._response(place, np.ones((1, 1)))
+            while len(kept) >= _KEPT_PLACES:
                 del kept[next(iter(kept))]
-            kept[key] = found
+            kept[place] = found
         return found
 
-    def columns(self, places: IntArray, load: FloatArray) -> Columns:
-        """Return the responses to loads of shape (len(places), n) at some displacements of the attachments."""
-        first = int(places.min())
-        local = np.zeros((int(places.max()) - first + 1, load.shape[1]))
-        local[places - first] = load
-        begin, values = self._factor.near(first, local)
-        rows = slice(begin, begin + len(values))
-        part = self._by_place[:, rows]
-        touched = np.unique(part.indices)
-        stretch = part.tocsr()[touched] @ values
-        size = np.abs(stretch).max(axis=1)
-        near = size > CUT * size.max(initial=0.0)
-        return Columns(rows, values, touched[near], np.ascontiguousarray(stretch[near]))
+    def prepare(self, places: IntArray) -> None:
+        """Find one of the responses to unit loads at ``places`` that is not known yet, ahead of its use."""
+        for place in places.tolist():
+            if place not in self._kept:
+                self.unit(place)
+                return
+
+    def units(self, places: IntArray) -> Columns:
+        """Return the responses to unit loads at ``places``, side by side."""
+        parts = [self.unit(place) for place in places.tolist()]
+        first = min(part.rows.start for part in parts)
+        droppers = np.unique(np.concatenate([part.dropper_index for part in parts]))
+        values = np.zeros((max(part.rows.stop for part in parts) - first, len(parts)))
+        stretch = np.zeros((len(droppers), len(parts)))
+        for k, part in enumerate(parts):
+            values[part.rows.start - first : part.rows.stop - first, k] = part.values[:, 0]
+            stretch[np.searchsorted(droppers, part.dropper_index), k] = part.dropper_stretch[:, 0]
+        size = np.abs(values).max(axis=1)
+        kept = np.flatnonzero(size > CUT * size.max())
+        rows = slice(first + int(kept[0]), first + int(kept[-1]) + 1)
+        return Columns(rows, np.ascontiguousarray(values[kept[0] : kept[-1] + 1]), droppers, stretch)
 
     def dropper(self, index: int) -> Columns:
         """Return the response to a unit force in a dropper."""
         row = self._B[[index]].tocoo()
-        return self.columns(row.col, row.data[:, None])
+        first = int(row.col.min())
+        load = np.zeros((int(row.col.max()) - first + 1, 1))
+        load[row.col - first, 0] = row.data
+        return self._response(first, load)
 
     @property
     def droppers(self) -> int:
         """Return the number of droppers."""
         return int(self._B.shape[0])
+
+    def _response(self, first: int, load: FloatArray) -> Columns:
+        """Return the response to a load of shape (k, 1) on the displacements from ``first``."""
+        begin, values = self._factor.near(first, load)
+        rows = slice(begin, begin + len(values))
+        self._whole[rows] = values[:, 0]
+        stretch = np.zeros(self._B.shape[0])
+        self._elongate.add(self._whole, stretch)
+        self._whole[rows] = 0.0
+        size = np.abs(stretch)
+        near = np.flatnonzero(size > CUT * size.max(initial=0.0))
+        return Columns(rows, values, near, stretch[near, None])
 
 
 class DropperColumns(Sequence[Columns]):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,8 @@ class WireInterval:
         Its first element.
     modes : slice
         Its modes.
+    count, size : int
+        How many these are; how many local coordinates, m.
     sides : (ndarray, ndarray)
         Places of its two attachments' displacements.
     ends : ndarray, shape (e,)
@@ -48,6 +51,8 @@ class WireInterval:
 
     first: int
     modes: slice
+    count: int
+    size: int
     sides: tuple[IntArray, IntArray]
     ends: IntArray
     plan: FloatArray
@@ -57,11 +62,31 @@ class WireInterval:
 
     def positions(self, local: FloatArray) -> list[float]:
         """Return the positions of its nodes in plan, x and y in turn [m]."""
-        return (self.plan_static + self.plan @ local).tolist()
+        return (self.plan_static + self.plan.dot(local)).tolist()
 
 
-@dataclass(frozen=True)
-class Crossing:
+class Touch(NamedTuple):
+    """A point of a contact wire.
+
+    Attributes
+    ----------
+    interval : WireInterval
+    row : ndarray, shape (m,)
+        What unit local coordinates lift it by; or what a unit vertical force on it does to them.
+    modal, ends : ndarray, shape (n_span,), (e,)
+        The parts of ``row``.
+    height : float
+        Static height [m].
+    """
+
+    interval: WireInterval
+    row: FloatArray
+    modal: FloatArray
+    ends: FloatArray
+    height: float
+
+
+class Crossing(NamedTuple):
     """Where a strip crosses a wire in plan.
 
     Attributes
@@ -121,7 +146,7 @@ class ContactWire:
 
     def locate(self, x: float) -> tuple[int, float]:
         """Return the element at a position of the track and the share of the way along it, in the static shape."""
-        element = self._start(-1, x)
+        element = self.start(-1, x)
         start, end = self._starts[element : element + 2]
         return element, (x - start) / (end - start)
 
@@ -129,22 +154,17 @@ class ContactWire:
         """Return the interval that an element belongs to."""
         return self._of_element[element]
 
-    def height_row(self, element: int, xi: float) -> FloatArray:
-        """Return what unit local coordinates of the interval lift a point of an element by, shape (m,)."""
-        interval = self._of_element[element]
-        row: FloatArray = powers(xi) @ interval.height[element - interval.first]
-        return row
+    def next_places(self, element: int) -> IntArray:
+        """Return the displacements of the attachment that a strip on an element comes to after the next one."""
+        after = self._of_element[element].first + len(self._of_element[element].height)
+        return self._of_element[min(after, len(self._of_element) - 1)].sides[1]
 
-    def unit_force(self, element: int, xi: float) -> tuple[FloatArray, FloatArray]:
-        """Return what a unit vertical force does to the interval's modes and to its attachments' displacements."""
-        span = self._of_element[element].modes
-        row = self.height_row(element, xi)
-        return row[: span.stop - span.start], row[span.stop - span.start :]
-
-    def static_height(self, element: int, xi: float) -> float:
-        """Return the static height of a point of an element [m]."""
+    def touch(self, element: int, xi: float) -> Touch:
+        """Return a point of an element."""
         interval = self._of_element[element]
-        return float(powers(xi) @ interval.height_static[element - interval.first])
+        k, powers, count = element - interval.first, np.array((1.0, xi, xi * xi, xi * xi * xi)), interval.count
+        row = powers.dot(interval.height[k])
+        return Touch(interval, row, row[:count], row[count:], float(powers.dot(interval.height_static[k])))
 
     def find(self, strip: FloatArray, positions: Positions, guess: int) -> Crossing | None:
         """Find where a strip crosses the wire, walking from the element ``guess``.
@@ -162,7 +182,7 @@ class ContactWire:
             None beyond the wire's ends, or where the wire passes beside the strip.
         """
         a, b = strip[:, 0].tolist()
-        element = self._start(guess, (a[0] + b[0]) / 2.0)
+        element = self.start(guess, (a[0] + b[0]) / 2.0)
         last = len(self._of_element) - 1
         interval: WireInterval | None = None
         at: Sequence[float] = ()
@@ -178,40 +198,33 @@ class ContactWire:
             share, xi = found
             step = -1 if xi < 0.0 else (1 if xi > 1.0 else 0)
             if step == 0 or step == -direction:
-                return self._crossing(a, b, element, min(max(xi, 0.0), 1.0), share) if 0.0 <= share <= 1.0 else None
+                return self.crossing(strip, element, min(max(xi, 0.0), 1.0), share) if 0.0 <= share <= 1.0 else None
             direction = step
             element += step
             if not 0 <= element <= last:
                 return None
 
-    def point(self, found: Crossing, local: FloatArray) -> tuple[float, float, float]:
-        """Return a point of the wire from the local coordinates of its interval [m]."""
+    def plan(self, found: Crossing, local: FloatArray) -> tuple[float, float]:
+        """Return a point of the wire in plan from the local coordinates of its interval [m]."""
         interval = self._of_element[found.element]
-        k = found.element - interval.first
-        x1, y1, x2, y2 = interval.positions(local)[2 * k : 2 * k + 4]
-        z = powers(found.xi) @ (interval.height_static[k] + interval.height[k] @ local)
-        return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1), float(z)
+        k = 2 * (found.element - interval.first)
+        x1, y1, x2, y2 = (interval.plan_static[k : k + 4] + interval.plan[k : k + 4].dot(local)).tolist()
+        return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1)
 
-    def _crossing(
-        self, a: Sequence[float], b: Sequence[float], element: int, xi: float, share: float
-    ) -> Crossing:
+    def crossing(self, strip: FloatArray, element: int, xi: float, share: float) -> Crossing:
+        """Return a crossing from its place on an element and on the strip."""
+        a, b = strip[:, 0, :2].tolist()
         start, end = self._starts[element : element + 2]
         x = start + xi * (end - start)
         from_wire_end = min(x - self._starts[0], self._starts[-1] - x)
-        from_strip_end = min(share, 1.0 - share) * math.dist(a[:2], b[:2])
-        return Crossing(element, xi, share, engagement(from_strip_end, from_wire_end))
+        return Crossing(element, xi, share, engagement(min(share, 1.0 - share) * math.dist(a, b), from_wire_end))
 
-    def _start(self, guess: int, x: float) -> int:
+    def start(self, guess: int, x: float) -> int:
         """Return where to begin walking; a guess that is far off (first step, reset) is replaced by a search."""
         if 0 <= guess < len(self._of_element) and abs(self._starts[guess] - x) < 5.0:
             return guess
         found = int(np.searchsorted(self._starts, x)) - 1
         return min(max(found, 0), len(self._of_element) - 1)
-
-
-def powers(xi: float) -> FloatArray:
-    """Return [1, xi, xi^2, xi^3]."""
-    return np.array([1.0, xi, xi * xi, xi * xi * xi])
 
 
 def height_polynomials(
@@ -259,6 +272,8 @@ def _intervals(
             WireInterval(
                 first=first,
                 modes=span,
+                count=span.stop - span.start,
+                size=local.shape[1],
                 sides=sides,
                 ends=np.concatenate(sides),
                 plan=np.ascontiguousarray(plan.reshape(2 * (count + 1), -1)),

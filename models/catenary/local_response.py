@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,7 @@ class LocalSolutionError(RuntimeError):
     """Slack and contact forces of a step were not found."""
 
 
-@dataclass(frozen=True)
-class OpenContact:
+class OpenContact(NamedTuple):
     """A strip over a wire before the contact force acts.
 
     Attributes
@@ -85,7 +85,7 @@ class OpenContact:
     @property
     def compliance(self) -> float:
         """Return how far the wire gives way at the contact [m/N]."""
-        return float(self.load @ (self.at_ends @ self.load) + self.modal @ self.yielding)
+        return float(self.load.dot(self.at_ends.dot(self.load)) + self.modal.dot(self.yielding))
 
     def moved_by(self, other: OpenContact) -> float:
         """Return how far the wire is moved here by a unit force at another contact [m/N]."""
@@ -93,8 +93,7 @@ class OpenContact:
         return moved + float(self.modal @ other.yielding) if self.interval == other.interval else moved
 
 
-@dataclass(frozen=True)
-class LocalForces:
+class LocalForces(NamedTuple):
     """Solution of the local problem.
 
     Attributes
@@ -223,7 +222,7 @@ class LocalProblem:
             return None
         elastic = free_force.copy()
         near = columns.dropper_index
-        elastic[near] += self.measure[near] * (columns.dropper_stretch @ (force * contact.load))
+        elastic[near] += self.measure[near] * columns.dropper_stretch.dot(force * contact.load)
         if elastic.min(initial=0.0) < 0.0:
             return None
         none = np.zeros(0, dtype=np.int64)

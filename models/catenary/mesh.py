@@ -179,8 +179,8 @@ def contact_wire_height(definition: CatenaryDefinition, section: Section, x: flo
 
 
 def _span_at(section: Section, x: float) -> Span:
-    starts = [s.start for s in section.spans]
-    return section.spans[max(0, min(bisect_right(starts, x) - 1, len(starts) - 1))]
+    place = bisect_right(section.spans, x, key=lambda span: span.start) - 1
+    return section.spans[max(0, min(place, len(section.spans) - 1))]
 
 
 def _pre_sag(definition: CatenaryDefinition, span: Span, x: float) -> float:
@@ -199,6 +199,7 @@ class _SectionMesher:
         self.definition, self.section, self.index, self.draft = definition, section, index, draft
         self.elements = definition.mesh.elements_between_droppers
         self.supports = [s.x for s in section.supports]
+        self._staggers = np.array([(s.x, s.stagger) for s in section.supports]).T
         self.droppers = [x for span in section.spans for x in span.droppers]
         self.hangers = [x for span in section.spans for x in span.hangers]
         self.lengths = _given_lengths((s.droppers, s.dropper_lengths) for s in section.spans)
@@ -233,7 +234,7 @@ class _SectionMesher:
         return wire
 
     def _lateral(self, x: float) -> float:
-        return float(np.interp(x, self.supports, [s.stagger for s in self.section.supports]))
+        return float(np.interp(x, *self._staggers))
 
     def _contact_height(self, x: float) -> float:
         return contact_wire_height(self.definition, self.section, x)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -10,10 +11,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.catenary.assembly import compression_ratio, dropper_rows, dropper_stiffness
-from models.catenary.compliance import Columns, Compliance, joined
-from models.catenary.contact_wire import ContactWire, Crossing, WireInterval
+from models.catenary.compiled import make_stepper
+from models.catenary.compliance import Compliance
+from models.catenary.contact_wire import ContactWire, WireInterval
 from models.catenary.elements import NODE_DOFS
-from models.catenary.equilibrium import StaticState, find_form
+from models.catenary.equilibrium import EquilibriumError, StaticState, find_form
 from models.catenary.interval_modes import IntervalModes, interval_modes
 from models.catenary.intervals import (
     Interval,
@@ -24,8 +26,10 @@ from models.catenary.intervals import (
     without_rounding,
 )
 from models.catenary.local_response import LocalForces, LocalProblem, OpenContact
+from models.catenary.meeting import FreeMotion, Meeting, Reaction, local_motion
 from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.parameters import CatenaryDefinition
+from models.catenary.product import Product, inner
 from models.catenary.stepping import LineMotion, Stepper
 from models.contact import CONTACT_LAWS
 from models.part import FloatArray, IntArray, Snapshot
@@ -114,64 +118,13 @@ class StripMotion:
 
 
 @dataclass(frozen=True)
-class _Reaction:
-    """How a wire gives way about one of its intervals.
-
-    Attributes
-    ----------
-    interval : WireInterval
-    coupling : ndarray, shape (n_span, e)
-        mu G of its modes with its attachments.
-    columns : Columns
-        Response to unit loads at its attachments.
-    at_ends : ndarray, shape (e, e)
-        The same at the attachments themselves.
-    """
-
-    interval: WireInterval
-    coupling: FloatArray
-    columns: Columns
-    at_ends: FloatArray
-
-
-@dataclass(frozen=True)
 class _Step:
     """What belongs to one step size."""
 
     stepper: Stepper
     compliance: Compliance
     local: LocalProblem
-    reactions: dict[tuple[int, int], _Reaction] = field(default_factory=dict)
-
-
-class _FreeMotion:
-    """Local motion of a contact wire at the end of a step, without forces that are found inside it."""
-
-    def __init__(self, reaction: Callable[[WireInterval], _Reaction], stepper: Stepper, motion: LineMotion) -> None:
-        self._reaction, self._stepper, self._motion = reaction, stepper, motion
-        self._known: dict[int, FloatArray] = {}
-
-    def __call__(self, interval: WireInterval) -> FloatArray:
-        """Return its local coordinates and their rates, shape (2, m)."""
-        found = self._known.get(interval.first)
-        if found is None:
-            found = self._known[interval.first] = self._of(interval)
-        return found
-
-    def positions(self, interval: WireInterval) -> list[float]:
-        """Return the positions in plan of its nodes, x and y in turn [m]."""
-        return interval.positions(self(interval)[0])
-
-    def _of(self, interval: WireInterval) -> FloatArray:
-        stepper, span = self._stepper, interval.modes
-        change = np.concatenate((stepper.modal[span], stepper.attached.take(interval.ends)))
-        count = span.stop - span.start
-        change[:count] -= stepper.inverse[span] * (self._reaction(interval).coupling @ change[count:])
-        result = local_motion(interval, self._motion)
-        result[0] += change
-        change *= stepper.newmark.a1
-        np.subtract(change, result[1], out=result[1])
-        return result
+    reactions: dict[tuple[int, int], Reaction] = field(default_factory=dict)
 
 
 class CatenaryModel:
@@ -184,7 +137,7 @@ class CatenaryModel:
     Raises
     ------
     EquilibriumError
-        If the line has no static equilibrium of the wanted shape.
+        If the line has no static equilibrium of the wanted shape, or none that it could move about.
     """
 
     def __init__(self, definition: CatenaryDefinition) -> None:
@@ -199,10 +152,11 @@ class CatenaryModel:
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
         self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.points)
         #: Coordinates of the line.
-        self.modes = self._modes([part for parts in by_wire for part in parts])
+        with self._solvable("move in modes of its intervals"):
+            self.modes = self._modes([part for parts in by_wire for part in parts])
         self.B = self._dropper_rows()
         self._rest_load = self.B.T @ self.rest_compensation
-        self._stretch = self.B.T.tocsc()
+        self._elongate, self._stretch = Product(self.B), self.B.T.tocsc()
         self.wires = tuple(self._wires(by_wire))
         self.uplift_places = self.modes.place[self.mesh.support_nodes * NODE_DOFS + 2]
         self._law = CONTACT_LAWS[definition.contact.law]
@@ -242,6 +196,8 @@ class CatenaryModel:
         ------
         LocalSolutionError
             If slack and contact forces are not found.
+        EquilibriumError
+            If the line cannot make steps of this length.
         """
         now = self._step(step)
         free_force = self._begin(now, state)
@@ -251,7 +207,7 @@ class CatenaryModel:
         self._apply(now, contacts, forces)
         now.stepper.finish(state.motion)
         self._note(state, contacts, forces)
-        return self._result(state, contacts, crossings, forces)
+        return self._result(now, state, contacts, crossings, forces)
 
     def push(self, state: CatenaryState, step: float, forces: Sequence[tuple[int, float, float]]) -> None:
         """Advance the line by one time step under given vertical forces on its contact wires.
@@ -274,11 +230,11 @@ class CatenaryModel:
         elastic = self._begin(now, state)
         placed = [(s, *self.wires[s].locate(x), force) for s, x, force in forces]
         for s, element, xi, force in placed:
-            reaction = self._reaction(now, s, self.wires[s].interval(element))
-            modal, ends = self.wires[s].unit_force(element, xi)
-            columns = reaction.columns
-            load = force * (ends - (modal * now.stepper.inverse[reaction.interval.modes]) @ reaction.coupling)
-            now.stepper.press(reaction.interval.modes, force * modal)
+            touch = self.wires[s].touch(element, xi)
+            reaction = self._reaction(now, s, touch.interval)
+            columns, span = reaction.columns, touch.interval.modes
+            load = force * (touch.ends - (touch.modal * now.stepper.inverse[span]) @ reaction.coupling)
+            now.stepper.press(span, force * touch.modal)
             now.stepper.attached[columns.rows] += columns.values @ load
             near = columns.dropper_index
             elastic[near] += self.dropper_stiffness[near] * (columns.dropper_stretch @ load)
@@ -308,11 +264,11 @@ class CatenaryModel:
                 if found is None:
                     continue
                 state.element[p, s] = found.element
-                local = motion(wire.interval(found.element))
-                delta, rate = self._penetration(wire, found, strip, local)
+                local, touch = motion(wire.interval(found.element)), wire.touch(found.element, found.xi)
+                delta, rate = self._penetration(Meeting(found, touch, *local.dot(touch.row).tolist()), strip)
                 law = self._law(delta, rate, max(rate, 0.0), self.definition.contact)
                 result.force[p, s] = law.scaled(found.engagement).force
-                result.point[p, s] = wire.point(found, local[0])
+                result.point[p, s] = *wire.plan(found, local[0]), touch.height + touch.row.dot(local[0])
         return result
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
@@ -330,8 +286,8 @@ class CatenaryModel:
         m, modes = state.motion, self.modes
         (q, rate), (x, v) = m.modal, m.attached
         # q' M_q q' + 2 q' G x' = q' (2 momentum - q')
-        kinetic = rate @ (2.0 * m.momentum - rate) + v @ (modes.M @ v)
-        return float(0.5 * (kinetic + (modes.eigenvalue * q) @ q + x @ (modes.K @ x)))
+        kinetic = inner(rate, 2.0 * m.momentum - rate) + inner(v, modes.M @ v)
+        return 0.5 * (kinetic + inner(modes.eigenvalue * q, q) + inner(x, modes.K @ x))
 
     def displacement(self, state: CatenaryState) -> FloatArray:
         """Return the displacements and rotations of all nodes from the static shape [m, rad], shape (n, 6)."""
@@ -350,6 +306,7 @@ class CatenaryModel:
         nodal = plan_rotation(self._angles).T @ velocity.ravel()
         motion.modal[1], motion.attached[1] = self.modes.coordinates(nodal)
         modes = self.modes
+        motion.prepared = np.zeros(0)
         motion.momentum[...] = motion.modal[1] + modes.coupling @ (modes.turn @ motion.attached[1])
 
     def _modes(self, parts: Sequence[Interval]) -> IntervalModes:
@@ -363,6 +320,16 @@ class CatenaryModel:
         K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
         rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
         return interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel())
+
+    @contextmanager
+    def _solvable(self, doing: str) -> Iterator[None]:
+        """Say in words that matrices are not positive definite: their parts are too different, or it buckles."""
+        try:
+            yield
+        except np.linalg.LinAlgError as error:
+            raise EquilibriumError(
+                f"line '{self.definition.name}' cannot {doing}: {error}; check masses, tensions and stiffnesses"
+            ) from error
 
     def _dropper_rows(self) -> sp.csr_matrix:
         """Return the rows of dropper elongation over the attachments' displacements, which are in global axes."""
@@ -386,7 +353,8 @@ class CatenaryModel:
 
     def _new_step(self, step: float) -> _Step:
         newmark = Newmark(step)
-        stepper = Stepper(self.modes, newmark)
+        with self._solvable(f"make steps of {step:g} s"):
+            stepper = make_stepper(self.modes, newmark)
         compliance = Compliance(stepper.factor, self.B)
         local = LocalProblem(
             measure=self.dropper_stiffness,
@@ -406,82 +374,88 @@ class CatenaryModel:
         pressed = 2.0 * self._rest_load
         if state.slack.size:
             pressed -= self._stretch[:, state.slack] @ state.compensation
-        load = []
+        known = []
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
-            interval = self.wires[s].interval(element)
-            modal, ends = self.wires[s].unit_force(element, xi)
-            load.append((interval.modes, force * modal))
-            pressed[interval.ends] += force * ends
-        now.stepper.begin(state.motion, pressed, load)
-        x = state.motion.attached[0] + now.stepper.attached
-        return self.static.elastic_force + self.dropper_stiffness * (self.B @ x)
+            touch = self.wires[s].touch(element, xi)
+            interval, reaction = touch.interval, self._reaction(now, s, touch.interval)
+            pressed[interval.ends] += force * (touch.ends - touch.modal.dot(reaction.yielding))
+            known.append((interval.modes, force * touch.modal))
+        now.stepper.begin(state.motion, pressed)
+        for span, modal in known:
+            now.stepper.press(span, modal)
+        np.add(state.motion.attached[0], now.stepper.attached, out=pressed)
+        elastic = np.zeros(len(self.dropper_stiffness))
+        self._elongate.add(pressed, elastic)
+        elastic *= self.dropper_stiffness
+        elastic += self.static.elastic_force
+        return elastic
 
     def _open_contacts(
         self, now: _Step, state: CatenaryState, motion: StripMotion
-    ) -> tuple[list[OpenContact], list[tuple[int, int, Crossing]]]:
+    ) -> tuple[list[OpenContact], list[tuple[int, int, Meeting]]]:
         contacts, crossings = [], []
         for s, wire in enumerate(self.wires):
-            free = _FreeMotion(partial(self._reaction, now, s), now.stepper, state.motion)
+            free = FreeMotion(partial(self._reaction, now, s), now.stepper, state.motion)
             for p, strip in enumerate(motion.strip):
-                found = wire.find(strip, free.positions, int(state.element[p, s]))
-                if found is None:
+                met = free.meet(wire, strip, int(state.element[p, s]))
+                if met is None:
                     continue
-                crossings.append((p, s, found))
+                found = met.crossing
+                crossings.append((p, s, met))
                 state.element[p, s] = found.element
-                delta, rate = self._penetration(wire, found, strip, free(wire.interval(found.element)))
+                delta, rate = self._penetration(met, strip)
+                impact = float(state.impact_velocity[p, s])
                 # One that was closed stays among the candidates: other forces of the step may keep it so.
-                if delta > 0.0 or state.impact_velocity[p, s] > 0.0:
-                    contacts.append(self._open_contact(now, state, (p, s), found, delta, rate))
+                if delta > 0.0 or impact > 0.0:
+                    contacts.append(self._open_contact(now, (p, s), met, delta, rate, impact))
+                now.compliance.prepare(wire.next_places(found.element))
         return contacts, crossings
 
-    def _penetration(
-        self, wire: ContactWire, found: Crossing, strip: FloatArray, local: FloatArray
-    ) -> tuple[float, float]:
-        """Return penetration and its velocity; ``local`` is the interval's motion, shape (2, m)."""
-        rise, rate = (local @ wire.height_row(found.element, found.xi)).tolist()
+    def _penetration(self, met: Meeting, strip: FloatArray) -> tuple[float, float]:
+        """Return penetration and its velocity."""
+        share = met.crossing.share
         (z_a, v_a), (z_b, v_b) = strip[:, :, 2].tolist()
-        height = wire.static_height(found.element, found.xi) + rise - self._radii
-        return z_a + found.share * (z_b - z_a) - height, v_a + found.share * (v_b - v_a) - rate
+        height = met.touch.height + met.rise - self._radii
+        return z_a + share * (z_b - z_a) - height, v_a + share * (v_b - v_a) - met.rate
 
     def _open_contact(
         self,
         now: _Step,
-        state: CatenaryState,
         which: tuple[int, int],
-        found: Crossing,
+        met: Meeting,
         penetration: float,
         velocity: float,
+        impact_velocity: float,
     ) -> OpenContact:
-        p, s = which
-        reaction = self._reaction(now, s, self.wires[s].interval(found.element))
-        interval = reaction.interval
-        modal, ends = self.wires[s].unit_force(found.element, found.xi)
-        yielding = modal * now.stepper.inverse[interval.modes]
+        touch = met.touch
+        interval = touch.interval
+        reaction = self._reaction(now, which[1], interval)
         return OpenContact(
-            pantograph=p,
-            section=s,
-            place=(found.element, found.xi),
+            pantograph=which[0],
+            section=which[1],
+            place=(met.crossing.element, met.crossing.xi),
             penetration=penetration,
             velocity=velocity,
-            impact_velocity=float(state.impact_velocity[p, s]),
-            engagement=found.engagement,
+            impact_velocity=impact_velocity,
+            engagement=met.crossing.engagement,
             interval=interval.modes,
-            modal=modal,
-            yielding=yielding,
+            modal=touch.modal,
+            yielding=touch.modal * now.stepper.inverse[interval.modes],
             places=interval.ends,
-            load=ends - yielding @ reaction.coupling,
+            load=touch.ends - touch.modal.dot(reaction.yielding),
             columns=reaction.columns,
             at_ends=reaction.at_ends,
         )
 
-    def _reaction(self, now: _Step, section: int, interval: WireInterval) -> _Reaction:
+    def _reaction(self, now: _Step, section: int, interval: WireInterval) -> Reaction:
         """Return how a wire gives way about an interval; found once per interval that a strip visits."""
         kept = now.reactions
         found = kept.get((section, interval.first))
         if found is None:
-            columns = joined([now.compliance.attachment(ends) for ends in interval.sides if ends.size])
+            columns = now.compliance.units(interval.ends)
             coupling = now.stepper.coupling(interval.modes, interval.ends)
-            found = _Reaction(interval, coupling, columns, columns.at(interval.ends))
+            yielding = now.stepper.inverse[interval.modes, None] * coupling
+            found = Reaction(coupling, yielding, columns, columns.at(interval.ends))
             while len(kept) >= _KEPT_INTERVALS * len(self.wires):
                 del kept[next(iter(kept))]
             kept[(section, interval.first)] = found
@@ -523,24 +497,20 @@ class CatenaryModel:
 
     def _result(
         self,
+        now: _Step,
         state: CatenaryState,
         contacts: Sequence[OpenContact],
-        crossings: Sequence[tuple[int, int, Crossing]],
+        crossings: Sequence[tuple[int, int, Meeting]],
         forces: LocalForces,
     ) -> ContactResult:
         result = self._empty_result(len(state.element))
         for contact, force in zip(contacts, forces.contact.tolist(), strict=True):
             result.force[contact.pantograph, contact.section] = force
-        for p, s, found in crossings:
-            wire = self.wires[s]
-            result.point[p, s] = wire.point(found, local_motion(wire.interval(found.element), state.motion)[0])
+        for p, s, met in crossings:
+            now.stepper.place(self.wires[s], met.crossing, met.touch, state.motion, result.point[p, s])
         return result
 
     def _empty_result(self, pantographs: int) -> ContactResult:
         shape = (pantographs, len(self.wires))
         return ContactResult(np.zeros(shape), np.full((*shape, 3), np.nan))
 
-
-def local_motion(interval: WireInterval, motion: LineMotion) -> FloatArray:
-    """Return an interval's local coordinates and their rates, shape (2, m)."""
-    return np.concatenate((motion.modal[:, interval.modes], motion.attached.take(interval.ends, axis=1)), axis=1)

@@ -272,9 +272,7 @@ class _StaticResponse:
     def uplift(self, wire: ContactWire, x: float, force: float) -> float:
         """Return the rise of a contact wire under a vertical force on it [m]."""
         model = self._model
-        element, xi = wire.locate(x)
-        interval = wire.interval(element)
-        modal, ends = wire.unit_force(element, xi)
+        interval, _, modal, ends, _ = wire.touch(*wire.locate(x))
         load = self._rest.copy()
         load[interval.ends] += force * ends
         displacement = self._solve(load)

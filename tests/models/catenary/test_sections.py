@@ -30,7 +30,7 @@ def pair(section_maker, sections_maker):
 def height(model, section, x):
     wire = model.wires[section]
     element, xi = wire.locate(x)
-    return wire.static_height(element, xi)
+    return wire.touch(element, xi).height
 
 
 def lateral(model, section, x):

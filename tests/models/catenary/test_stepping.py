@@ -5,10 +5,13 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from models.catenary.band import Banded, Sparse, factorised
-from models.catenary.compliance import Compliance, joined
+from models.catenary.band import CUT, Banded, Sparse, factorised
+from models.catenary.compiled import CompiledStepper, KernelError, _cached, kernels, make_stepper
+from models.catenary.compliance import Compliance
 from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.product import Product
+from models.catenary.stepping import Stepper
+from models.coupled import CoupledModel
 from models.library import load_line
 from models.time_integration import Newmark
 from tests.models.nodal_line import NodalLine
@@ -126,17 +129,26 @@ def test_a_solution_that_does_not_die_out_is_whole():
     assert values[:, 0] == pytest.approx(splu(matrix.tocsc()).solve(load), rel=1e-9)
 
 
-def test_columns_joined_answer_like_one_solution(model):
+def test_responses_to_unit_loads_are_columns_of_the_inverse(model):
     now = model._step(1e-3)
     interval = model.wires[0].intervals[40]
-    one = now.compliance.columns(interval.ends, np.eye(len(interval.ends)))
-    two = joined([now.compliance.attachment(ends) for ends in interval.sides])
+    columns = now.compliance.units(interval.ends)
     everywhere = np.arange(len(model.modes.attached))
-    assert two.at(everywhere) == pytest.approx(one.at(everywhere), abs=1e-14 * np.abs(one.values).max())
-    stretch = np.zeros((2, len(model.dropper_stiffness), len(interval.ends)))
-    for k, columns in enumerate((one, two)):
-        stretch[k, columns.dropper_index] = columns.dropper_stretch
-    assert stretch[1] == pytest.approx(stretch[0], abs=1e-14 * np.abs(stretch).max())
+    unit = np.eye(len(everywhere))[interval.ends]
+    whole = np.stack([now.stepper.factor.solve(load) for load in unit], axis=1)
+    assert columns.at(everywhere) == pytest.approx(whole, abs=1e-14 * np.abs(whole).max())
+    stretch = np.zeros((len(model.dropper_stiffness), len(interval.ends)))
+    stretch[columns.dropper_index] = columns.dropper_stretch
+    # Both ends of a dropper may lie where a column is cut.
+    assert stretch == pytest.approx(model.B @ whole, abs=4.0 * CUT * np.abs(whole).max())
+
+
+def test_what_a_strip_comes_to_is_prepared_one_response_at_a_time(model):
+    now = model._step(1e-3)
+    places = model.wires[0].intervals[30].sides[1]
+    for count in range(1, len(places) + 1):
+        now.compliance.prepare(places)
+        assert sum(place in now.compliance._kept for place in places.tolist()) == count
 
 
 def test_compliance_of_droppers_is_symmetric(model):
@@ -157,3 +169,129 @@ def test_products_with_and_without_scipy_s_routine(routine):
     expected = result + matrix @ vector
     product.add(vector, result)
     assert result == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.fixture
+def compiled_kernels():
+    pytest.importorskip("numba")
+    return kernels()
+
+
+def test_compiled_steps_are_the_plain_ones(model, compiled_kernels):
+    """Two steppers over one motion each, with forces on an interval and on attachments in every step."""
+    newmark = Newmark(1e-3)
+    steppers = Stepper(model.modes, newmark), CompiledStepper(model.modes, newmark, compiled_kernels)
+    rng = np.random.default_rng(2)
+    motions = []
+    for _ in steppers:
+        state, _ = _moving(model, 6)
+        motions.append(state.motion)
+    span = model.wires[0].intervals[12].modes
+    for _ in range(30):
+        pressed = 10.0 * rng.standard_normal(len(model.modes.attached))
+        force = rng.standard_normal(span.stop - span.start)
+        for stepper, motion in zip(steppers, motions, strict=True):
+            stepper.begin(motion, pressed)
+            stepper.press(span, force)
+            stepper.finish(motion)
+    for name in ("modal", "momentum", "attached"):
+        plain, compiled = (getattr(motion, name) for motion in motions)
+        for one, other in zip(np.atleast_2d(plain), np.atleast_2d(compiled), strict=True):
+            assert np.abs(other - one).max() < 1e-11 * np.abs(one).max(), name
+
+
+def test_a_step_that_was_prepared_is_forgotten_when_the_step_size_changes(model, compiled_kernels):
+    """Back and forth between step sizes, against the plain stepper."""
+    sizes = [Newmark(h) for h in (1e-3, 0.5e-3)]
+    plain = [Stepper(model.modes, n) for n in sizes]
+    compiled = [CompiledStepper(model.modes, n, compiled_kernels) for n in sizes]
+    motions = [_moving(model, 7)[0].motion for _ in range(2)]
+    still = np.zeros(len(model.modes.attached))
+    for n in range(20):
+        for steppers, motion in zip((plain, compiled), motions, strict=True):
+            steppers[n % 3 // 2].begin(motion, still)
+            steppers[n % 3 // 2].finish(motion)
+    assert motions[1].modal[0] == pytest.approx(motions[0].modal[0], abs=1e-11 * np.abs(motions[0].modal[0]).max())
+
+
+def test_a_compiled_step_goes_on_from_a_snapshot_bit_for_bit(model, compiled_kernels, monkeypatch):
+    monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
+    fresh = CatenaryModel(model.definition)
+    assert isinstance(fresh._step(1e-3).stepper, CompiledStepper)
+    state, _ = _moving(fresh, 8)
+    for _ in range(5):
+        fresh.step(state, 1e-3, _far())
+    saved, other = state.snapshot(), fresh.initial_state()
+    other.restore(saved)
+    for each in (state, other):
+        for _ in range(5):
+            fresh.step(each, 1e-3, _far())
+    assert all(np.array_equal(a, other.snapshot()[name]) for name, a in state.snapshot().items())
+
+
+def test_kernels_can_be_left_out_or_insisted_on(model, monkeypatch):
+    newmark = Newmark(1e-3)
+    monkeypatch.setenv("OPENPANTO_KERNEL", "numpy")
+    assert type(make_stepper(model.modes, newmark)) is Stepper
+    monkeypatch.setenv("OPENPANTO_KERNEL", "cuda")
+    with pytest.raises(KernelError, match="'cuda'; use auto, numpy or numba"):
+        make_stepper(model.modes, newmark)
+    monkeypatch.setattr("models.catenary.compiled.importlib.util.find_spec", lambda _: None)
+    monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
+    with pytest.raises(KernelError, match="numba is not installed"):
+        make_stepper(model.modes, newmark)
+    monkeypatch.setenv("OPENPANTO_KERNEL", "auto")
+    assert type(make_stepper(model.modes, newmark)) is Stepper
+
+
+def test_kernels_are_kept_in_the_cache_and_a_changed_copy_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    source = b"VALUE = 1\n"
+    copy = _cached(source, "key")
+    assert copy.read_bytes() == source
+    copy.write_bytes(b"VALUE = 2\n")
+    assert _cached(source, "key").read_bytes() == source
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
+    (tmp_path / "openpanto").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    copy = _cached(b"x = 1\n", "key")
+    assert copy.read_bytes() == b"x = 1\n"
+    assert not copy.is_relative_to(tmp_path)
+
+
+def test_a_whole_run_is_the_same_with_and_without_kernels(short_line, cx, compiled_kernels, monkeypatch):
+    """Contact found, contact force, droppers, points of contact: a strip over many intervals."""
+    records = []
+    for kernel in ("numpy", "numba"):
+        monkeypatch.setenv("OPENPANTO_KERNEL", kernel)
+        pantograph = cx.with_values({"start_position": 60.0, "raise_duration": 0.05})
+        records.append(CoupledModel(CatenaryModel(short_line), [pantograph]).run(1.0, 1e-3))
+    plain, compiled = records
+    assert plain.contact_force.max() > 100.0
+    for name in ("contact_force", "uplift", "dropper_force", "contact_point", "strip_height"):
+        one, other = getattr(plain, name)[1:], getattr(compiled, name)[1:]
+        assert np.nanmax(np.abs(other - one)) < 1e-10 * np.nanmax(np.abs(one)), name
+
+
+def test_a_constant_force_pushes_like_a_load_in_nodal_coordinates(model):
+    """Forces on two places of the first wire, which move on by an element and stand still."""
+    line, newmark = NodalLine(model), Newmark(1e-3)
+    state = model.initial_state()
+    lu = splu((line.K + newmark.a0 * line.M + newmark.a1 * line.C).tocsc())
+    d, v, a = (np.zeros(line.size) for _ in range(3))
+    first = model.wires[0].ends[0]
+    for n in range(6):
+        forces = [(0, first + 61.0 + 0.3 * n, 20.0), (0, first + 75.5, -10.0)]
+        model.push(state, newmark.step, forces)
+        right = line.M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a)
+        right += line.C @ (newmark.a1 * d + newmark.a4 * v + newmark.a5 * a)
+        for section, x, force in forces:
+            right += force * line.row(section, *model.wires[section].locate(x))[0]
+        new = lu.solve(right)
+        acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
+        v = v + 0.5 * newmark.step * (a + acceleration)
+        d, a = new, acceleration
+    assert not state.slack.size
+    assert model.displacement(state).ravel()[line.free] == pytest.approx(d, abs=1e-9 * np.abs(d).max())

@@ -1,76 +1,124 @@
-"""How a line's cost grows with its length: ``python benchmarks/line_length.py [SPANS ...]``.
+"""How a line's cost grows with its length and with the pantographs on it.
 
-A simple line of 50 m spans in LN2's materials; building, memory, and steps at 1 ms with a strip on the wire, each
-compared with the shortest line in the same run.
+    python benchmarks/line_length.py [--spans 10 20 50 100 200] [--pantographs 1 2 3 4]
+
+A simple line of 50 m spans in LN2's materials under CX pantographs at 300 km/h. Start-up and memory are those of a
+process of its own for every length; steps of 1 ms run by turns. Ratios are to the first of each list.
 """
 
 from __future__ import annotations
 
-import resource
+import argparse
+import json
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 
-import numpy as np
-from timing import by_turns, table
+from lines import long_line
+from timing import by_turns, memory, on_one_thread, peak_memory, table
 
-from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.parameters import CatenaryDefinition, read
-from models.definition import Table
-from models.library import line_path
+from models.catenary.model import CatenaryModel
+from models.coupled import CoupledModel
+from models.library import load_lumped
 
 STEP = 1e-3
-STEPS = 100
+STEPS = 50
+#: Where the first pantograph starts, and how far the others are behind it [m].
+START, BEHIND = 350.0, 85.0
 
 
-def line(spans: int) -> CatenaryDefinition:
-    """Return LN2 with ``spans`` equal spans."""
-    data = Table.load(line_path("LN2")).data
-    rule = {"start": [0.0, "m", "benchmark"], "count": spans, "length": [50.0, "m", "benchmark"]}
-    return read(Table.from_dict(data | {"spans": rule | {"droppers": data["spans"]["droppers"]}}, "benchmark"))
+def main() -> None:
+    on_one_thread()
+    options = _options()
+    if options.alone is not None:
+        print(json.dumps(start_up(options.alone)))
+        return
+    lengths(options.spans)
+    pantographs(options.pantographs)
 
 
-def steps(model: CatenaryModel) -> Callable[[], None]:
-    """Return a function that moves a strip along the wire."""
-    state = model.initial_state()
-    place = {"x": 140.0}
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--spans", nargs="+", type=int, default=[10, 20, 50, 100, 200])
+    parser.add_argument("--pantographs", nargs="+", type=int, default=[1, 2, 3, 4])
+    # What the process is told that measures one length.
+    parser.add_argument("--alone", type=int, help=argparse.SUPPRESS)
+    return parser.parse_args()
+
+
+def coupled(model: CatenaryModel, count: int = 1) -> CoupledModel:
+    """Return a line under pantographs, its first step done."""
+    places = [START - BEHIND * i for i in range(count)]
+    result = CoupledModel(model, [load_lumped("CX").with_values({"start_position": x}) for x in places])
+    result.step(STEP, STEP)
+    return result
+
+
+def steps(system: CoupledModel) -> Callable[[], None]:
+    """Return a function that runs on."""
+    clock = {"n": 1}
 
     def run() -> None:
         for _ in range(STEPS):
-            place["x"] += 83.0 * STEP
-            x = 140.0 + (place["x"] - 140.0) % 200.0
-            strip = np.array([[[[x, y, 5.08], [83.0, 0.0, 0.0]] for y in (0.7, -0.7)]])
-            model.step(state, STEP, StripMotion(strip, np.zeros(1)))
+            clock["n"] += 1
+            system.step(STEP, clock["n"] * STEP)
 
     return run
 
 
-def main(lengths: list[int]) -> None:
-    models, built, memory = {}, {}, {}
-    for spans in lengths:
-        begin = time.perf_counter()
-        models[spans] = CatenaryModel(line(spans))
-        models[spans]._stepper(STEP)
-        built[spans] = time.perf_counter() - begin
-        memory[spans] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    best = by_turns({str(n): steps(m) for n, m in models.items()}, rounds=5)
-    first = lengths[0]
+def start_up(spans: int) -> dict[str, float]:
+    """Return what building a line takes and what it needs."""
+    before = memory()
+    begin = time.process_time()
+    model = CatenaryModel(long_line(spans))
+    built = time.process_time()
+    coupled(model)
+    first = time.process_time()
+    unknowns = int((~model.mesh.fixed).sum())
+    grown, peak = memory() - before, peak_memory() - before
+    return {"unknowns": unknowns, "build": built - begin, "first": first - built, "memory": grown, "peak": peak}
+
+
+def _start_up_apart(spans: int) -> dict[str, float]:
+    command = [sys.executable, __file__, "--alone", str(spans)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def lengths(spans: list[int]) -> None:
+    """Print the cost over the number of spans."""
+    alone = {n: _start_up_apart(n) for n in spans}
+    best = by_turns({str(n): steps(coupled(CatenaryModel(long_line(n)))) for n in spans})
+    each = {n: best[str(n)] / STEPS for n in spans}
+    first = spans[0]
     rows = [
         (
             str(n),
-            str(len(models[n].free)),
-            f"{built[n]:.2f}",
-            f"{built[n] / built[first]:.1f}",
-            f"{1e3 * best[str(n)] / STEPS:.3f}",
-            f"{best[str(n)] / best[str(first)]:.1f}",
+            f"{a['unknowns']:.0f}",
+            f"{a['build']:.2f}",
+            f"{a['build'] / alone[first]['build']:.1f}",
+            f"{a['first']:.2f}",
+            f"{a['memory']:.0f}",
+            f"{a['peak']:.0f}",
+            f"{1e3 * each[n]:.3f}",
+            f"{each[n] / each[first]:.2f}",
             f"{n / first:.1f}",
-            f"{memory[n]:.0f}",
         )
-        for n in lengths
+        for n, a in alone.items()
     ]
-    columns = ("spans", "dof", "build s", "ratio", "ms per step", "ratio", "length ratio", "peak MB so far")
+    columns = ("spans", "unknowns", "build s", "ratio", "first step s", "MB", "peak", "ms a step", "ratio", "of spans")
     table("Cost over length", columns, rows)
 
 
+def pantographs(counts: list[int]) -> None:
+    """Print the cost over the number of pantographs."""
+    model = CatenaryModel(long_line(20))
+    best = by_turns({str(n): steps(coupled(model, n)) for n in counts})
+    first = best[str(counts[0])]
+    rows = [(name, f"{1e3 * t / STEPS:.3f}", f"{t / first:.2f}") for name, t in best.items()]
+    table("Cost over pantographs, 20 spans", ("pantographs", "ms a step", "ratio"), rows)
+
+
 if __name__ == "__main__":
-    main([int(a) for a in sys.argv[1:]] or [10, 25, 50, 100, 200])
+    main()

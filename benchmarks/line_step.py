@@ -1,66 +1,99 @@
 """What a step of the line costs, and on what: ``python benchmarks/line_step.py [LINE]``.
 
-The bare model under a lumped pantograph at 1 ms, its shares, and the same line as FMU called by fmpy.
+The bare model without a load and under a CX pantograph, both at 1 ms, and the same line as FMU called by fmpy; then
+what the steps under the pantograph are spent on, measured by clocks around the parts of a step.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 
-import numpy as np
+from clocks import Clocks, Parts
 from fmu_calls import stepped
-from timing import by_turns, table
+from timing import by_turns, on_one_thread, table
 
+from models.catenary import local_response
 from models.catenary.model import CatenaryModel
 from models.coupled import CoupledModel
 from models.library import load_line, load_lumped
+from models.pantograph.lumped import LumpedModel
 
 STEP = 1e-3
-STEPS = 400
-
-
+STEPS = 200
 def main(name: str) -> None:
-    begin = time.perf_counter()
+    on_one_thread()
+    begin = time.process_time()
     model = CatenaryModel(load_line(name))
-    built = time.perf_counter() - begin
+    built = time.process_time() - begin
+    under = under_pantograph(model)
+    fmu = stepped(f"Catenary_{name}")
+    jobs = {
+        "line": without_load(model),
+        "line under a pantograph, monolithic": under,
+        "line as FMU, without contact": lambda: fmu(STEPS),
+    }
+    best = by_turns(jobs)
+    each = {job: t / STEPS for job, t in best.items()}
+    rows = [(job, f"{1e3 * t:.3f}", f"{STEP / t:.2f}", f"{t / each['line']:.2f}") for job, t in each.items()]
+    unknowns = int((~model.mesh.fixed).sum())
+    title = f"{name}: {unknowns} unknowns, built in {built:.2f} s, steps of {1e3 * STEP:g} ms"
+    table(title, ("", "ms a step", "times real time", "ratio"), rows)
+    shares(under, parts(model))
+
+
+def parts(model: CatenaryModel) -> Parts:
+    """Return part of a step -> class and methods that it is done in; what they call in another part counts there."""
+    stepper = type(model._step(STEP).stepper)
+    return {
+        f"free changes: products, band solution ({stepper.__name__})": (stepper, ("begin",)),
+        f"new motion: product ({stepper.__name__})": (stepper, ("finish",)),
+        "finding the contact": (CatenaryModel, ("_open_contacts",)),
+        "contact force and slack droppers": (local_response.LocalProblem, ("solve",)),
+        "pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of")),
+        "rest of the line": (CatenaryModel, ("step",)),
+    }
+
+
+def without_load(model: CatenaryModel) -> Callable[[], None]:
+    """Return a function that steps a line at rest; the work does not depend on its motion."""
+    state = model.initial_state()
+
+    def steps() -> None:
+        for _ in range(STEPS):
+            model.push(state, STEP, ())
+
+    return steps
+
+
+def under_pantograph(model: CatenaryModel) -> Callable[[], None]:
+    """Return a function that steps a line under a pantograph, which has left its first swing behind."""
     first, last = model.wires[0].ends
     pantograph = load_lumped("CX").with_values({"start_position": first + 0.3 * (last - first)})
     coupled = CoupledModel(model, [pantograph])
     coupled.run(1.0, STEP)
-    clock = {"time": 1.0}
+    clock = {"n": round(1.0 / STEP)}
 
     def steps() -> None:
         for _ in range(STEPS):
-            clock["time"] += STEP
-            coupled.step(STEP, clock["time"])
+            clock["n"] += 1
+            coupled.step(STEP, clock["n"] * STEP)
 
-    state, stepper = coupled.line_state, model._stepper(STEP)
-    load = np.random.default_rng(1).standard_normal(len(model.free))
-    fmu = stepped(f"Catenary_{name}")
-    jobs = {
-        "whole step, monolithic": steps,
-        "  solve": lambda: _repeat(lambda: stepper.stiffness.solve(load)),
-        "  products": lambda: _repeat(lambda: stepper.product @ state.motion.ravel()),
-        "  dropper elongations": lambda: _repeat(lambda: model.B @ state.displacement),
-        "line as FMU, without contact": lambda: fmu(STEPS),
-    }
-    best = by_turns(jobs)
-    whole = best["whole step, monolithic"]
-    rows = [
-        (job, f"{1e3 * t / STEPS:.3f}", f"{100.0 * t / whole:.0f} %", f"{STEP * STEPS / t:.2f}")
-        for job, t in best.items()
-    ]
-    table(
-        f"{name}: {len(model.free)} degrees of freedom, built in {built:.2f} s, step {STEP} s",
-        ("", "ms per step", "share", "times real time"),
-        rows,
-    )
+    return steps
 
 
-def _repeat(job: object) -> None:
-    for _ in range(STEPS):
-        job()  # type: ignore[operator]
+def shares(steps: Callable[[], None], parts: Parts) -> None:
+    """Print what steps are spent on; the clocks themselves take a few per cent."""
+    clocks = Clocks()
+    begin = time.process_time()
+    with clocks.running(parts):
+        steps()
+    whole = time.process_time() - begin
+    spent = {part: clocks.spent[part] for part in parts}
+    spent["coupling"] = whole - sum(spent.values())
+    rows = [(part, f"{1e3 * t / STEPS:.3f}", f"{100.0 * t / whole:.0f} %") for part, t in spent.items()]
+    table("What a step under the pantograph is spent on", ("", "ms a step", "share"), rows)
 
 
 if __name__ == "__main__":

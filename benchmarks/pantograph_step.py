@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 from fmu_calls import stepped
-from timing import by_turns, table
+from timing import by_turns, on_one_thread, table
 
 from models.library import load_pantograph, pantograph_names
 from models.pantograph.lumped import LumpedPantographPart
@@ -52,6 +52,7 @@ def fmu_steps(name: str) -> Callable[[], None]:
 
 
 def main() -> None:
+    on_one_thread()
     jobs = {name: steps(name) for name in pantograph_names()}
     jobs |= {f"{name} as FMU": fmu_steps(name) for name in pantograph_names() if name.endswith("multibody")}
     best = by_turns(jobs, rounds=5)

@@ -1,0 +1,25 @@
+"""Lines as long as one likes, for benchmarks."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+from models.catenary.parameters import CatenaryDefinition, read
+from models.definition import Table
+from models.library import line_path
+
+#: Length of a span [m].
+SPAN = 50.0
+
+
+def long_line_file(spans: int) -> str:
+    """Return the definition file of LN2 with ``spans`` equal spans."""
+    rule = f'[spans]\nstart = [0, "m", "benchmark"]\ncount = {spans}\nlength = [{SPAN}, "m", "benchmark"]\n'
+    text = line_path("LN2").read_text(encoding="utf-8")
+    return re.sub(r"\[spans\]\n.*?(?=\n\[)", rule, text, count=1, flags=re.DOTALL)
+
+
+def long_line(spans: int) -> CatenaryDefinition:
+    """Return LN2 with ``spans`` equal spans."""
+    return read(Table.from_dict(tomllib.loads(long_line_file(spans)), "benchmark"))

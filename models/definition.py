@@ -12,13 +12,54 @@ Sources that begin with ``choice`` mark what the data leaves open.
 from __future__ import annotations
 
 import math
+import reprlib
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from models.units import to_si
+
+#: Longest message told in full [characters]: a value may be megabytes of nested lists; and most of them told.
+_LONGEST: Final = 400
+_MOST: Final = 100
+#: Deepest nesting of tables and lists; a definition needs five levels.
+_DEEPEST: Final = 20
+#: Magnitudes in SI beyond which no quantity of a line or pantograph lies, and squares and quotients stay finite.
+LARGEST: Final = 1e15
+SMALLEST: Final = 1e-15
+
+
+class _Shown(reprlib.Repr):
+    """Values as they are told: short, whatever is in them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlist = self.maxdict = self.maxlevel = 4
+        self.maxstring = self.maxother = self.maxlong = 80
+
+    def repr_int(self, x: int, level: int) -> str:
+        """Return a number; Python refuses to write out one of thousands of digits."""
+        return f"(a whole number of {x.bit_length()} bits)" if x.bit_length() > 1000 else super().repr_int(x, level)
+
+
+_shown = _Shown().repr
+
+
+def beyond_all(value: float) -> str:
+    """Return why a value in SI cannot be that of anything here, empty if it can."""
+    if not abs(value) <= LARGEST:
+        return f"is not finite, or larger than anything here can be ({LARGEST:g})"
+    return ""
+
+
+def one_line(text: str) -> str:
+    """Return text on one line, without control characters, its middle left out if it is very long."""
+    if len(text) > _LONGEST:
+        half = _LONGEST // 2
+        text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 @dataclass(frozen=True)
@@ -30,7 +71,8 @@ class Problem:
     text: str
 
     def __str__(self) -> str:
-        return f"{self.file}: {self.key}: {self.text}" if self.key else f"{self.file}: {self.text}"
+        parts = (self.file, self.key, self.text) if self.key else (self.file, self.text)
+        return ": ".join(map(one_line, parts))
 
 
 class DefinitionError(ValueError):
@@ -38,7 +80,10 @@ class DefinitionError(ValueError):
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(p) for p in self.problems))
+        lines = [str(p) for p in self.problems[:_MOST]]
+        if len(self.problems) > _MOST:
+            lines.append(f"... and {len(self.problems) - _MOST} more problems")
+        super().__init__("\n".join(lines))
 
 
 @dataclass(frozen=True)
@@ -102,8 +147,12 @@ class Table:
             raise DefinitionError([Problem(name, "", f"cannot be read ({error.strerror})")]) from error
         except UnicodeDecodeError as error:
             raise DefinitionError([Problem(name, "", f"is not UTF-8 text (byte {error.start})")]) from error
-        except tomllib.TOMLDecodeError as error:
+        except RecursionError as error:
+            raise _too_deep(name) from error
+        except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
             raise DefinitionError([Problem(name, "", f"is not TOML: {error}")]) from error
+        if _is_deep(data):
+            raise _too_deep(name)
         return cls(data, _Log(name))
 
     @classmethod
@@ -207,10 +256,10 @@ class Table:
                 return fallback
             value = int(numbers[0]) if numbers[0].is_integer() else numbers[0]
         if isinstance(value, bool) or not isinstance(value, int):
-            self.problem(name, f"{value!r} is not a whole number")
+            self.problem(name, f"{_shown(value)} is not a whole number")
             return fallback
         if not minimum <= value <= maximum:
-            self.problem(name, f"{value} is outside {minimum} ... {maximum}")
+            self.problem(name, f"{_shown(value)} is outside {minimum} ... {maximum}")
             return fallback
         return value
 
@@ -220,7 +269,7 @@ class Table:
         if entry is None:
             return default or ""
         if not isinstance(entry, str):
-            self.problem(name, f"{entry!r} is not a text in quotation marks")
+            self.problem(name, f"{_shown(entry)} is not a text in quotation marks")
             return default or ""
         allowed = list(choices) if choices is not None else None
         if allowed is not None and entry not in allowed:
@@ -233,7 +282,7 @@ class Table:
         if entry is None:
             return bool(default)
         if not isinstance(entry, bool):
-            self.problem(name, f"{entry!r} is neither true nor false")
+            self.problem(name, f"{_shown(entry)} is neither true nor false")
             return bool(default)
         return entry
 
@@ -297,17 +346,16 @@ class Table:
     ) -> tuple[float, ...] | None:
         form = "[[v1, v2, ...]" if many else "[value"
         if not (isinstance(entry, list) and len(entry) == 3 and all(isinstance(e, str) for e in entry[1:])):
-            self.problem(name, f'{entry!r} must be written {form}, "unit", "source"]')
+            self.problem(name, f'{_shown(entry)} must be written {form}, "unit", "source"]')
             return None
         raw, written_unit, source = entry
         if not source.strip():
             self.problem(name, "names no source; where none states the value, write 'choice: why'")
         values = raw if many and isinstance(raw, list) else [raw]
         if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
-            self.problem(name, f"{raw!r} is not a number")
+            self.problem(name, f"{_shown(raw)} is not a number")
             return None
-        if not all(math.isfinite(v) for v in values):
-            self.problem(name, f"{raw!r} is not finite")
+        if self._has_absurd(name, values):
             return None
         if length is not None and len(values) != length:
             self.problem(name, f"has {len(values)} values where {length} are needed")
@@ -317,15 +365,24 @@ class Table:
         except ValueError as error:
             self.problem(name, str(error))
             return None
+        if self._has_absurd(name, converted):
+            return None
         written = tuple(float(v) for v in values) if many else float(values[0])
         self._log.provenance[self.key(name)] = Quantity(written, written_unit, source)
         return converted
+
+    def _has_absurd(self, name: str, values: Sequence[float]) -> bool:
+        for value in values:
+            if text := beyond_all(value):
+                self.problem(name, f"{_shown(value)} {text}")
+                return True
+        return False
 
     def _check_range(
         self, name: str, values: tuple[float, ...], unit: str, minimum: float, maximum: float, positive: bool
     ) -> None:
         for value in values:
-            if positive and value <= 0.0:
+            if positive and value < SMALLEST:
                 self.problem(name, f"{value:g} {unit} must be greater than 0")
             elif not minimum <= value <= maximum:
                 self.problem(name, f"{value:g} {unit} is outside {minimum:g} ... {maximum:g} {unit}")
@@ -337,3 +394,16 @@ class Table:
                 self.problem(name, f"unknown key (known here: {known})")
         for child in self._children:
             child._report_unknown()
+
+
+def _too_deep(file: str) -> DefinitionError:
+    return DefinitionError([Problem(file, "", f"is not a definition: it is nested more than {_DEEPEST} levels")])
+
+
+def _is_deep(data: Any) -> bool:
+    """Whether values are nested deeper than allowed; found without recursion."""
+    level = [data]
+    for _ in range(_DEEPEST):
+        inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, (dict, list))]
+        level = [v for values in inner for v in values]
+    return bool(level)

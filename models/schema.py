@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from models.definition import Quantity, Table
+from models.definition import SMALLEST, Quantity, Table, beyond_all
 from models.part import Parameter, ParameterError
 
 _META = "openpanto"
@@ -124,7 +124,7 @@ def _parameter(name: str, value: float, spec: _Spec, provenance: Mapping[str, Qu
         value=float(value),
         unit=spec.unit,
         description=spec.description,
-        minimum=0.0 if spec.positive else (spec.minimum if math.isfinite(spec.minimum) else None),
+        minimum=spec.minimum if math.isfinite(spec.minimum) else (0.0 if spec.positive else None),
         maximum=spec.maximum if math.isfinite(spec.maximum) else None,
         source=origin.source if origin is not None else "choice: default",
         is_integer=spec.integer,
@@ -158,15 +158,17 @@ def _replaced_inside(inner: Any, index: int | None, path: list[str], name: str, 
 def _indexed(key: str) -> tuple[str, int | None]:
     """Split ``stage[2]`` into its name and number."""
     name, bracket, rest = key.partition("[")
-    return (name, int(rest[:-1])) if bracket and rest[:-1].isdigit() else (key, None)
+    number = rest[:-1]
+    is_index = bracket and rest.endswith("]") and number.isascii() and number.isdigit() and len(number) <= 9
+    return (name, int(number)) if is_index else (key, None)
 
 
 def _check(name: str, value: float, spec: _Spec) -> None:
-    if not math.isfinite(value):
-        raise ParameterError(f"parameter '{name}': {value} is not finite")
+    if text := beyond_all(value):
+        raise ParameterError(f"parameter '{name}': {value:g} {text}")
     if spec.integer and not float(value).is_integer():
         raise ParameterError(f"parameter '{name}': {value:g} is not a whole number")
-    if spec.positive and value <= 0.0:
+    if spec.positive and value < SMALLEST:
         raise ParameterError(f"parameter '{name}': {value:g} {spec.unit} must be greater than 0")
     if not spec.minimum <= value <= spec.maximum:
         raise ParameterError(

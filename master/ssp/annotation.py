@@ -19,9 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from lxml import etree
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from master.ssp.xml import SSC, Reader, children, elements, tag
+from master.ssp.xml import SSC, Reader, children, elements, namespace, tag
 
 NAMESPACE: Final = "urn:openpanto:ssp"
 OSP_TYPE: Final = "com.opensimulationplatform"
@@ -110,6 +111,9 @@ _SECTIONS: Final[dict[str, type[_Settings]]] = {
     "Record": Record,
 }
 _LISTS: Final = ("order", "variables")
+_TEXTS: Final = (*_LISTS, "scheme", "parameter")
+#: What an ``osp:Algorithm`` may hold.
+_ALGORITHMS: Final = ("FixedStepAlgorithm", "VariableStepAlgorithm")
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,9 @@ def parse_annotations(nodes: list[Any], reader: Reader) -> Annotations:
     entries = [a for n in nodes for a in children(n, SSC, "Annotation")]
     ours = [a for a in entries if a.get("type") == NAMESPACE]
     steps = [s for a in entries if a.get("type") == OSP_TYPE if (s := parse_osp(a, reader)) is not None]
+    if len(set(steps)) > 1:
+        told = " and ".join(f"{s:g} s" for s in steps)
+        reader.problem(entries[0], "step", f"macro steps of {told} are asked for; one is needed")
     for extra in ours[1:]:
         reader.problem(extra, "annotation", f"a second annotation of type {NAMESPACE}; one is enough")
     settings = parse_run(ours[0], reader) if ours else RunSettings()
@@ -133,20 +140,28 @@ def parse_annotations(nodes: list[Any], reader: Reader) -> Annotations:
 
 def parse_osp(node: Any, reader: Reader) -> float | None:
     """Return the macro step [s] from ``osp:Algorithm/osp:FixedStepAlgorithm``."""
-    for element in node.iter():
-        if isinstance(element.tag, str) and tag(element) == "FixedStepAlgorithm":
-            step = reader.number(element, "baseStepSize")
-            if step == step and step <= 0:
-                reader.problem(element, "step", f"baseStepSize='{step:g}' must be greater than 0")
-                return None
-            return step if step == step else None
-    return None
+    steps = [_fixed_step(e, reader) for e in node.iter(etree.Element) if tag(e) in _ALGORITHMS]
+    if len(steps) > 1:
+        reader.problem(node, "step", f"{len(steps)} algorithms are asked for; one is needed")
+    return steps[0] if steps else None
+
+
+def _fixed_step(element: Any, reader: Reader) -> float | None:
+    if tag(element) != "FixedStepAlgorithm":
+        reader.problem(element, "unsupported", f"{tag(element)} is not supported; use FixedStepAlgorithm")
+        return None
+    step = reader.number(element, "baseStepSize")
+    if step <= 0:
+        reader.problem(element, "step", f"baseStepSize='{step:g}' must be greater than 0")
+        return None
+    return step if step == step else None
 
 
 def parse_run(annotation: Any, reader: Reader) -> RunSettings:
     """Parse ``panto:Run``; every mistake becomes a problem and leaves that section at its default."""
     found: dict[str, list[_Settings]] = {name: [] for name in _SECTIONS}
     for run in elements(annotation):
+        _check_plain(run, reader, "Run")
         for section in elements(run):
             parsed = parse_section(section, reader)
             if parsed is not None:
@@ -158,12 +173,33 @@ def parse_run(annotation: Any, reader: Reader) -> RunSettings:
     return RunSettings.model_validate({**single, "records": (*DEFAULT_RECORDS, *found["Record"])})
 
 
+def _check_plain(node: Any, reader: Reader, name: str) -> None:
+    """Report an element that is not the one expected, or has attributes, of which it knows none."""
+    if (tag(node), namespace(node)) != (name, NAMESPACE):
+        reader.problem(node, "annotation", f"unknown element '{tag(node)}' (expected: {name} of {NAMESPACE})")
+    for attribute in node.attrib:
+        reader.problem(node, "annotation", f"{name} has no attribute '{attribute}'")
+
+
+def check_places(root: Any, read: list[Any], reader: Reader) -> None:
+    """Report annotations of ours that stand where nobody reads them."""
+    for node in root.iter(f"{{{SSC}}}Annotation"):
+        if node.get("type") == NAMESPACE and node.getparent() not in read:
+            text = "is not read here; put it into the ssd:Annotations of the description or its DefaultExperiment"
+            reader.problem(node, "annotation", f"an annotation of type {NAMESPACE} {text}")
+
+
 def parse_section(node: Any, reader: Reader) -> _Settings | None:
     """Parse one element of ``panto:Run`` by its own model."""
-    model = _SECTIONS.get(tag(node))
+    model = _SECTIONS.get(tag(node)) if namespace(node) == NAMESPACE else None
     if model is None:
         reader.problem(node, "annotation", f"unknown element '{tag(node)}' (known: {', '.join(_SECTIONS)})")
         return None
+    if next(elements(node), None) is not None:
+        reader.problem(node, "annotation", f"{tag(node)} has an element inside, which nothing reads; remove it")
+    for name, raw in node.attrib.items():
+        if "_" in raw and name not in _TEXTS:  # Python, and so pydantic, reads 1_000 as a number
+            reader.problem(node, "number", f"{tag(node)} {name}='{raw}' is not a number")
     values: dict[str, Any] = {k: v.split() if k in _LISTS else v for k, v in node.attrib.items()}
     try:
         return model.model_validate(values)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import lzma
 import stat
+import struct
 import tempfile
+import unicodedata
 import zipfile
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -18,6 +22,24 @@ SSD_NAME: Final = "SystemStructure.ssd"
 #: Bounds on an archive's contents; generous for scenarios with a dozen FMUs.
 MAX_BYTES: Final = 2 * 1024**3
 MAX_FILES: Final = 10_000
+#: Largest factor by which a member may grow, once it is larger than this [bytes]: files of a scenario, and an FMU's,
+#: stay below 100; a bomb is 1000 times as large as what holds it.
+MAX_RATIO: Final = 200
+_SMALL: Final = 10 * 1024**2
+#: What reading a damaged or unusual archive raises: zipfile documents only the first two.
+_UNREADABLE: Final = (
+    zipfile.BadZipFile,
+    zipfile.LargeZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+    MemoryError,
+)
 
 
 @dataclass(frozen=True)
@@ -67,48 +89,104 @@ def extract(archive: Path, folder: Path) -> None:
     Raises
     ------
     ScenarioError
-        If it is not a zip archive, is damaged or encrypted, is larger than `MAX_BYTES`, or has members that
-        would land outside ``folder`` or are symbolic links.
+        If it is not a zip archive, is damaged or unsafe (`check_members`).
     """
     try:
         with zipfile.ZipFile(archive) as file:
-            for member in _checked_members(archive, file):
+            members = file.infolist()
+            check_members(members)
+            for member in members:
                 file.extract(member, folder)
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, NotImplementedError, RuntimeError) as error:
+    except UnsafeArchiveError as error:
+        raise _refusal(archive, error.rule, str(error)) from error
+    except _UNREADABLE as error:
         raise _refusal(archive, "archive", f"is not a readable .ssp archive ({error})") from error
     except OSError as error:
-        raise _refusal(archive, "archive", f"cannot be extracted ({error.strerror or error})") from error
+        # The system's errors have a number and a text; bzip2's own, of damaged data, has neither.
+        what = "cannot be extracted" if error.strerror else "is not a readable .ssp archive"
+        raise _refusal(archive, "archive", f"{what} ({error.strerror or error})") from error
+
+
+def read_member(archive: Path, name: str) -> bytes:
+    """Return a member of an archive, none of whose members is unsafe.
+
+    Raises
+    ------
+    ValueError
+        With the reason, if it is not a readable zip archive, is unsafe, or has no such member.
+    """
+    try:
+        with zipfile.ZipFile(archive) as file:
+            check_members(file.infolist())
+            return file.read(name)
+    except UnsafeArchiveError as error:
+        raise ValueError(str(error)) from error
+    except KeyError:
+        raise ValueError(f"holds no {name}") from None
+    except (*_UNREADABLE, OSError) as error:
+        raise ValueError(f"is not a readable archive ({error})") from error
 
 
 def inside(root: Path, source: str) -> Path | None:
-    """Return the file that a relative URI names, None if it is absolute or lies outside ``root``."""
+    """Return the file that a relative URI names, None if it is absolute or lies outside ``root``.
+
+    A name that no file can have (too long, a circle of links) is one that lies nowhere.
+    """
     pure = PurePosixPath(source)
     if not _is_tame(pure) or ":" in source.split("/")[0] or "\\" in source:
         return None
-    path = (root / pure).resolve()
+    try:
+        path = (root / pure).resolve()
+        path.is_file()
+    except (OSError, RuntimeError, ValueError):
+        return None
     return path if path.is_relative_to(root.resolve()) else None
 
 
-def _checked_members(archive: Path, file: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
-    members = file.infolist()
+class UnsafeArchiveError(Exception):
+    """An archive that must not be extracted; ``rule`` is a short name of what it violates."""
+
+    def __init__(self, rule: str, text: str) -> None:
+        self.rule = rule
+        super().__init__(text)
+
+
+def check_members(members: Sequence[zipfile.ZipInfo]) -> None:
+    """Check an archive's list of contents, before anything is extracted.
+
+    Raises
+    ------
+    UnsafeArchiveError
+        If there are more than `MAX_FILES` members, more than `MAX_BYTES` to unpack or `MAX_RATIO` times what is
+        packed, if members would land outside the folder or in each other's place, are links or are encrypted.
+    """
     if len(members) > MAX_FILES:
-        raise _refusal(archive, "archive-size", f"has {len(members)} files, more than {MAX_FILES}")
+        raise UnsafeArchiveError("archive-size", f"has {len(members)} files, more than {MAX_FILES}")
     size = sum(m.file_size for m in members)
     if size > MAX_BYTES:
-        raise _refusal(archive, "archive-size", f"would unpack to {size} bytes, more than {MAX_BYTES}")
+        raise UnsafeArchiveError("archive-size", f"would unpack to {size} bytes, more than {MAX_BYTES}")
+    taken: dict[str, str] = {}
     for member in members:
-        _check_member(archive, member)
-    return members
+        _check_member(member)
+        # Letters of either case are the same file on some systems: which member would win is left to chance.
+        key = unicodedata.normalize("NFC", PurePosixPath(member.filename).as_posix()).casefold()
+        if key in taken:
+            text = f"members '{taken[key]}' and '{member.filename}' would be written to the same place"
+            raise UnsafeArchiveError("archive-name", text)
+        taken[key] = member.filename
 
 
-def _check_member(archive: Path, member: zipfile.ZipInfo) -> None:
+def _check_member(member: zipfile.ZipInfo) -> None:
     name = member.filename
-    if not _is_tame(PurePosixPath(name)) or "\\" in name or ":" in name:
-        raise _refusal(archive, "archive-path", f"member '{name}' would be written outside the folder")
+    if not name.strip("/.") or not _is_tame(PurePosixPath(name)) or "\\" in name or ":" in name:
+        raise UnsafeArchiveError("archive-path", f"member '{name}' would be written outside the folder")
     if stat.S_ISLNK(member.external_attr >> 16):
-        raise _refusal(archive, "archive-link", f"member '{name}' is a symbolic link")
+        raise UnsafeArchiveError("archive-link", f"member '{name}' is a symbolic link")
     if member.flag_bits & 0x1:
-        raise _refusal(archive, "archive", f"member '{name}' is encrypted")
+        raise UnsafeArchiveError("archive", f"member '{name}' is encrypted")
+    if member.file_size > _SMALL and member.file_size > MAX_RATIO * max(member.compress_size, 1):
+        text = f"member '{name}' would grow from {member.compress_size} to {member.file_size} bytes"
+        raise UnsafeArchiveError("archive-size", f"{text}, more than {MAX_RATIO} times")
 
 
 def _is_tame(path: PurePosixPath) -> bool:

@@ -159,6 +159,8 @@ def _report_end(edge: _Edge, count: int, systems: dict[str, SystemNode], reader:
     where = f"connector '{name}' of system '{path or systems[''].name}'"
     if count > 1:
         text = f"{where} has {count} connections; one is allowed"
+    elif count == 1:
+        text = f"{where} is fed by itself: the connections of systems form a circle, into which no component leads"
     elif path:
         text = f"{where} is connected to nothing"
     else:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from master.ssp.annotation import Annotations, RunSettings, parse_annotations
+from master.ssp.annotation import Annotations, RunSettings, check_places, parse_annotations
 from master.ssp.archive import SSD_NAME, inside
 from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, SystemNode
 from master.ssp.flatten import flatten
@@ -63,6 +63,7 @@ def parse_structure(node: Any, root: Path, reader: Reader) -> Structure:
     if child(node, SSD, "Enumerations") is not None:
         reader.problem(child(node, SSD, "Enumerations"), "unsupported", "enumerations are not supported")
     annotated = [a for n in (experiment, node) if n is not None for a in children(n, SSD, "Annotations")]
+    check_places(node, annotated, reader)
     flat = flatten(NO_SYSTEM if system is None else parse_system(system, root, reader), reader)
     return Structure(
         reader.text(node, "name"),
@@ -81,6 +82,7 @@ def parse_system(node: Any, root: Path, reader: Reader) -> SystemNode:
     if (found := child(node, SSD, "SignalDictionaries")) is not None:
         reader.problem(found, "unsupported", "signal dictionaries are not supported; connect components directly")
     inside_it = list(elements(child(node, SSD, "Elements")))
+    reader.unique(inside_it, "element")
     for element in inside_it:
         if tag(element) not in ("Component", "System"):
             what = f"element '{element.get('name')}' is a {tag(element)}, which is not supported"
@@ -121,7 +123,8 @@ def parse_component(node: Any, root: Path, reader: Reader) -> Component:
 
 def parse_connectors(node: Any, reader: Reader) -> tuple[Connector, ...]:
     """Parse the ``ssd:Connectors`` of a component or system."""
-    found = children(child(node, SSD, "Connectors"), SSD, "Connector")
+    found = list(children(child(node, SSD, "Connectors"), SSD, "Connector"))
+    reader.unique(found, f"'{reader.text(node, 'name')}': connector")
     return tuple(parse_connector(c, reader) for c in found)
 
 

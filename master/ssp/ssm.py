@@ -66,6 +66,15 @@ def parse_transformation(node: Any | None, reader: Reader) -> Conversion:
     return Conversion(reader.number(node, "factor", 1.0), reader.number(node, "offset", 0.0))
 
 
+def _check_targets(entries: tuple[Entry, ...], reader: Reader) -> None:
+    seen: set[str] = set()
+    for entry in entries:
+        if entry.target in seen:
+            text = f"'{entry.target}' is the target of two entries; remove one"
+            reader.report(entry.line, "mapping", text, entry.file)
+        seen.add(entry.target)
+
+
 def apply(entries: tuple[Entry, ...], parameters: Mapping[str, Parameter], reader: Reader) -> tuple[Parameter, ...]:
     """Return the parameters that a mapping makes of a set; what it does not name is not used.
 
@@ -78,6 +87,7 @@ def apply(entries: tuple[Entry, ...], parameters: Mapping[str, Parameter], reade
         Is told of entries without a parameter, and of transformations of what is no number.
     """
     mapped = []
+    _check_targets(entries, reader)
     for entry in entries:
         parameter = parameters.get(entry.source)
         if parameter is None:

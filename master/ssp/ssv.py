@@ -66,7 +66,9 @@ def parse_parameter_set(node: Any, reader: Reader) -> ParameterSet:
     """Parse ``ssv:ParameterSet``."""
     if child(node, SSV, "Enumerations") is not None:
         reader.problem(node, "unsupported", "enumerations in a parameter set are not supported; use Integer parameters")
-    parameters = [parse_parameter(p, reader) for p in children(child(node, SSV, "Parameters"), SSV, "Parameter")]
+    nodes = list(children(child(node, SSV, "Parameters"), SSV, "Parameter"))
+    reader.unique(nodes, "parameter")
+    parameters = [parse_parameter(p, reader) for p in nodes]
     return ParameterSet(
         reader.text(node, "name"),
         tuple(p for p in parameters if p is not None),
@@ -97,8 +99,21 @@ def _value(node: Any, reader: Reader, name: str) -> Value | None:
     raw = reader.text(node, "value")
     if kind == "String":
         return raw
+    return _whole(node, reader, name, raw)
+
+
+def _whole(node: Any, reader: Reader, name: str, raw: str) -> int | None:
     try:
-        return int(raw)
+        value = int(raw)
     except ValueError:
         reader.problem(node, "number", f"parameter '{name}': '{raw}' is not a whole number")
         return None
+    if not fits_integer(value):
+        reader.problem(node, "number", f"parameter '{name}': {raw} does not fit into an Integer of 32 bits")
+        return None
+    return value
+
+
+def fits_integer(value: float) -> bool:
+    """Whether a number is one that an FMI Integer can hold."""
+    return -(2**31) <= value < 2**31

@@ -90,8 +90,9 @@ COMMON: Final = {
 
 def parse_units(node: Any | None, reader: Reader) -> dict[str, Unit]:
     """Parse a list of ``ssc:Unit`` (inside ``ssd:Units`` or ``ssv:Units``)."""
-    units = (parse_unit(u, reader) for u in children(node, SSC, "Unit"))
-    return {u.name: u for u in units}
+    nodes = list(children(node, SSC, "Unit"))
+    reader.unique(nodes, "unit")
+    return {u.name: u for u in (parse_unit(n, reader) for n in nodes)}
 
 
 def parse_unit(node: Any, reader: Reader) -> Unit:
@@ -101,7 +102,11 @@ def parse_unit(node: Any, reader: Reader) -> Unit:
     if base is None:
         return Unit(name, (0,) * 8)
     powers = tuple(_power(base, b, reader) for b in BASE_UNITS)
-    return Unit(name, powers, reader.number(base, "factor", 1.0), reader.number(base, "offset", 0.0))  # type: ignore[arg-type]
+    factor = reader.number(base, "factor", 1.0)
+    if factor == 0.0:
+        reader.problem(base, "unit", f"unit '{name}': factor='0' would make every value 0")
+        factor = 1.0
+    return Unit(name, powers, factor, reader.number(base, "offset", 0.0))  # type: ignore[arg-type]
 
 
 def conversion(source: Unit, target: Unit) -> Conversion | None:

@@ -5,6 +5,7 @@ Problems are collected in a list (file, line, rule, text) instead of stopping at
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from master.errors import Problem
 from master.ssp.archive import SSD_NAME
 from master.ssp.elements import Binding, Component, Connection, Connector, Leg
 from master.ssp.ssd import Structure, parameter_names
-from master.ssp.ssv import Parameter, Value
+from master.ssp.ssv import Parameter, Value, fits_integer
 from master.ssp.units import COMMON, Conversion, Unit, conversion
 from master.system import Component as SystemComponent
 from master.system import Connection as SystemConnection
@@ -47,6 +48,9 @@ class Checker:
         self._structure = structure
         self._fmus = fmus
         self._problems = problems
+        # The first of a name counts; that there is a second one is reported elsewhere.
+        self._named = {c.name: c for c in reversed(structure.components)}
+        self._connectors = {(c.name, x.name): x for c in self._named.values() for x in reversed(c.connectors)}
 
     def connections(self) -> tuple[SystemConnection, ...]:
         """Return the connections that are sound, in the order of the SSD."""
@@ -117,12 +121,12 @@ class Checker:
         return self._directed(c, source, target)
 
     def _endpoint(self, element: str, name: str, line: int) -> _Endpoint | None:
-        component = next((x for x in self._structure.components if x.name == element), None)
+        component = self._named.get(element)
         if component is None:
             what = f"'{element}' is not a component" if element else f"connector '{name}' belongs to no component"
             self._report(line, "connection", what)
             return None
-        connector = next((x for x in component.connectors if x.name == name), None)
+        connector = self._connectors.get((element, name))
         if connector is None:
             self._report(line, "connection", f"component '{element}' declares no connector '{name}'")
             return None
@@ -155,7 +159,11 @@ class Checker:
             if not leg.suppress_unit_conversion:
                 total = total.then(self._convert(unit, wanted, units, leg.line, where))
             total, unit = total.then(leg.transformation), wanted
-        return total.then(self._convert(unit, fmu_units[1], units, c.line, where))
+        total = total.then(self._convert(unit, fmu_units[1], units, c.line, where))
+        if not (math.isfinite(total.factor) and math.isfinite(total.offset)):
+            text = f"{where}: factor {total.factor:g} and offset {total.offset:g} are not finite"
+            self._report(c.line, "number", text)
+        return total
 
     def _variable(self, end: _Endpoint) -> Variable | None:
         fmu = self._fmus.get(end.component.name)
@@ -237,6 +245,7 @@ class Checker:
         text = out_of_range(variable, value)
         if text:
             self._report(p.line, "range", f"{where} {text}", p.file)
+            return None
         return value if variable.type == "Real" else int(value)
 
 
@@ -253,7 +262,11 @@ def settable(variable: Variable, kind: str) -> str:
 
 
 def out_of_range(variable: Variable, value: float) -> str:
-    """Return how a value violates the declared minimum or maximum, empty if it does not."""
+    """Return how a value violates its type, the declared minimum or maximum; empty if it does not."""
+    if variable.type != "Real" and not (fits_integer(value) and float(value).is_integer()):
+        return f"= {value} is not a whole number of 32 bits"
+    if not math.isfinite(value):
+        return f"= {value:g} is not finite"
     if variable.minimum is not None and value < variable.minimum:
         return f"= {value:g} {variable.unit} is below its minimum {variable.minimum:g}"
     if variable.maximum is not None and value > variable.maximum:

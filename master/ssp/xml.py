@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib.resources
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,6 +29,33 @@ SCHEMAS: Final = {
     "ssm": "SystemStructureParameterMapping.xsd",
 }
 _VERSIONED: Final = ("SystemStructureDescription", "ParameterSet", "ParameterMapping")
+
+
+class XmlError(ValueError):
+    """A document that is not parsed; ``line`` says where, 0 for the whole of it."""
+
+    def __init__(self, line: int, text: str) -> None:
+        self.line = line
+        super().__init__(text)
+
+
+def safe_root(data: bytes) -> Any:
+    """Return the root element of a document that need not be trusted.
+
+    Raises
+    ------
+    XmlError
+        If it is not well-formed, or has a document type declaration: with it entities that read other files, or
+        expand without end.
+    """
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    try:
+        root = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        raise XmlError(error.lineno or 0, f"is not well-formed XML: {error.msg}") from error
+    if root.getroottree().docinfo.doctype:
+        raise XmlError(int(root.sourceline or 0), "a document type declaration is not allowed")
+    return root
 
 
 @dataclass
@@ -55,19 +83,13 @@ class Reader:
 
     def parse(self, path: Path) -> Any | None:
         """Return the root element of ``path``; None (and a problem) if it is not well-formed XML."""
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
         try:
-            tree = etree.fromstring(path.read_bytes(), parser).getroottree()
+            return safe_root(path.read_bytes())
         except OSError as error:
-            self.problems.append(Problem(self.file, 0, "file", f"cannot be read ({error.strerror})"))
-            return None
-        except etree.XMLSyntaxError as error:
-            self.problems.append(Problem(self.file, error.lineno or 0, "xml", f"is not well-formed XML: {error.msg}"))
-            return None
-        if tree.docinfo.doctype:
-            self.problem(tree.getroot(), "xml", "a document type declaration is not allowed")
-            return None
-        return tree.getroot()
+            self.report(0, "file", f"cannot be read ({error.strerror})")
+        except XmlError as error:
+            self.report(error.line, "xml", str(error))
+        return None
 
     def check_schema(self, root: Any, kind: str) -> None:
         """Validate against the official SSP 1.0 schema of ``kind`` ('ssd', 'ssv' or 'ssm').
@@ -76,8 +98,7 @@ class Reader:
         """
         if root.get("version") == "2.0":
             root = _as_first_version(root)
-        folder = importlib.resources.files("fmpy") / "ssp" / "schema" / SCHEMAS[kind]
-        schema = etree.XMLSchema(file=str(folder))
+        schema = _schema(kind)
         schema.validate(root)
         for entry in schema.error_log:
             self.problems.append(Problem(self.file, entry.line, "schema", _plain(entry.message)))
@@ -85,6 +106,17 @@ class Reader:
     def text(self, node: Any, name: str, default: str = "") -> str:
         """Return an attribute; absence is reported by the schema check."""
         return str(node.get(name, default))
+
+    def unique(self, nodes: Iterable[Any], what: str) -> None:
+        """Report elements that have the name of one before them: which of them counts would be a guess."""
+        first: dict[str, int] = {}
+        for node in nodes:
+            name = self.text(node, "name")
+            if name in first:
+                where = f", first in line {first[name]}" if first[name] else ""
+                self.problem(node, "name", f"{what} '{name}' is there twice{where}; remove one")
+            else:
+                first[name] = int(node.sourceline or 0)
 
     def number(self, node: Any, name: str, default: float | None = None) -> float:
         """Return an attribute as a finite number, NaN (and a problem) if it is none."""
@@ -95,7 +127,8 @@ class Reader:
                 return math.nan
             return default
         try:
-            value = float(raw)
+            # Python reads 1_000, and the digits of every script; XML does not.
+            value = float(raw) if raw.isascii() and "_" not in raw else math.nan
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
@@ -113,9 +146,19 @@ class Reader:
         return raw in ("true", "1")
 
 
+@cache
+def _schema(kind: str) -> Any:
+    return etree.XMLSchema(file=str(importlib.resources.files("fmpy") / "ssp" / "schema" / SCHEMAS[kind]))
+
+
 def tag(node: Any) -> str:
     """Return the local name of an element."""
     return str(etree.QName(node).localname)
+
+
+def namespace(node: Any) -> str:
+    """Return the namespace of an element, empty if it has none."""
+    return str(etree.QName(node).namespace or "")
 
 
 def children(node: Any | None, namespace: str, name: str) -> Iterator[Any]:

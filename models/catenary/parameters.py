@@ -6,6 +6,7 @@ A line has one or more *sections*, mechanically independent wires; each section 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -15,6 +16,7 @@ from typing import Literal
 from models import schema
 from models.contact import CONTACT_LAWS
 from models.definition import Quantity, Table
+from models.energy import monitoring
 from models.part import Parameter
 from models.schema import count, quantity
 
@@ -23,17 +25,24 @@ LINE_TYPES: tuple[LineType, ...] = ("simple", "stitched", "compound")
 GRAVITY = 9.81
 #: Poisson ratio 0.3: G = E / 2.6 (round solid section).
 SHEAR_RATIO = 2.6
+#: Shortest internal step [s]: a thousandth of the usual one, below which a run would never end.
+SHORTEST_STEP = 1e-6
+#: Most spans of a section, droppers of a span and droppers of a section.
+MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wire:
-    """A tensioned wire of round section."""
+    """A tensioned wire of round section.
 
-    area: float = quantity("m2", "cross-section", positive=True)
-    mass: float = quantity("kg/m", "mass per length", positive=True)
-    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True)
-    tension: float = quantity("N", "tension", positive=True)
-    bending_stiffness: float | None = quantity("N.m2", "bending stiffness EI", default=None, minimum=0.0)
+    The limits here and below are not those of good design: beyond them a value was written in another unit.
+    """
+
+    area: float = quantity("m2", "cross-section", positive=True, minimum=1e-8, maximum=0.1)
+    mass: float = quantity("kg/m", "mass per length", positive=True, minimum=1e-4, maximum=1e3)
+    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e6, maximum=1e14)
+    tension: float = quantity("N", "tension", positive=True, minimum=1.0, maximum=1e8)
+    bending_stiffness: float | None = quantity("N.m2", "bending stiffness EI", default=None, minimum=0.0, maximum=1e9)
 
     @property
     def EI(self) -> float:
@@ -54,10 +63,12 @@ class StitchWire(Wire):
 class Dropper:
     """A dropper: carries tension only."""
 
-    stiffness: float | None = quantity("N/m", "axial stiffness (instead of EA/L)", default=None, minimum=1.0)
-    area: float | None = quantity("m2", "cross-section", default=None, minimum=1e-9)
-    youngs_modulus: float | None = quantity("Pa", "Young's modulus", default=None, minimum=1.0)
-    mass: float = quantity("kg/m", "mass per length", minimum=0.0)
+    stiffness: float | None = quantity(
+        "N/m", "axial stiffness (instead of EA/L)", default=None, minimum=1.0, maximum=1e12
+    )
+    area: float | None = quantity("m2", "cross-section", default=None, minimum=1e-9, maximum=0.1)
+    youngs_modulus: float | None = quantity("Pa", "Young's modulus", default=None, minimum=1.0, maximum=1e14)
+    mass: float = quantity("kg/m", "mass per length", minimum=0.0, maximum=1e3)
     compression_ratio: float = quantity(
         "1", "stiffness in compression over that in tension", default=0.0, minimum=0.0, maximum=1.0
     )
@@ -67,10 +78,10 @@ class Dropper:
 class SteadyArm:
     """A steady arm: pinned at its registration end, clamped to the contact wire."""
 
-    area: float = quantity("m2", "cross-section", positive=True)
-    mass: float = quantity("kg/m", "mass per length", minimum=0.0)
-    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True)
-    length: float = quantity("m", "length", positive=True)
+    area: float = quantity("m2", "cross-section", positive=True, minimum=1e-8, maximum=0.1)
+    mass: float = quantity("kg/m", "mass per length", minimum=0.0, maximum=1e3)
+    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e6, maximum=1e14)
+    length: float = quantity("m", "length", positive=True, minimum=0.05, maximum=20.0)
     angle: float = quantity(
         "rad", "angle to the horizontal, from the registration end; negative: falls towards the wire",
         minimum=-1.2, maximum=1.2,
@@ -81,9 +92,9 @@ class SteadyArm:
 class Clamps:
     """Lumped masses on the wires."""
 
-    dropper_upper: float = quantity("kg", "claw of a dropper on the wire above", default=0.0, minimum=0.0)
-    dropper_lower: float = quantity("kg", "claw of a dropper on the wire below", default=0.0, minimum=0.0)
-    steady_arm: float = quantity("kg", "clamp of a steady arm", default=0.0, minimum=0.0)
+    dropper_upper: float = quantity("kg", "claw of a dropper on the wire above", default=0.0, minimum=0.0, maximum=1e3)
+    dropper_lower: float = quantity("kg", "claw of a dropper on the wire below", default=0.0, minimum=0.0, maximum=1e3)
+    steady_arm: float = quantity("kg", "clamp of a steady arm", default=0.0, minimum=0.0, maximum=1e3)
     stitch_wire: float = quantity("kg", "clamp of a stitch wire on the messenger wire", default=0.0, minimum=0.0)
 
 
@@ -234,8 +245,12 @@ class Section:
 class Profile:
     """Static heights of the wires."""
 
-    contact_wire_height: float = quantity("m", "height of the contact wire at the supports", positive=True)
-    encumbrance: float = quantity("m", "messenger wire above contact wire at the supports", positive=True)
+    contact_wire_height: float = quantity(
+        "m", "height of the contact wire at the supports", positive=True, maximum=100.0
+    )
+    encumbrance: float = quantity(
+        "m", "messenger wire above contact wire at the supports", positive=True, minimum=0.05, maximum=20.0
+    )
     pre_sag: float = quantity(
         "1", "sag of the contact wire over the span length", default=0.0, minimum=-0.01, maximum=0.01
     )
@@ -282,7 +297,10 @@ class CatenaryDefinition:
         "order of the extrapolation of the strip inside a step: 0 held, 1 velocity, 2 acceleration",
         default=2, minimum=0, maximum=2,
     )  # fmt: skip
-    time_step: float = quantity("s", "longest internal time step", default=1e-3, positive=True, maximum=0.1)
+    monitor_energy: int = monitoring()
+    time_step: float = quantity(
+        "s", "longest internal time step", default=1e-3, minimum=SHORTEST_STEP, maximum=0.1
+    )
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
 
     def parameters(self) -> tuple[Parameter, ...]:
@@ -345,7 +363,7 @@ def read(table: Table) -> CatenaryDefinition:
         steady_arm=schema.read(SteadyArm, arm) if arm is not None else None,
         messenger_support=schema.read(MessengerSupport, support) if support is not None else None,
         pre_sag_between=profile_table.text("pre_sag_between", default="supports", choices=("supports", "droppers")),
-        time_step=table.quantity("time_step", "s", default=1e-3, positive=True, maximum=0.1),
+        time_step=table.quantity("time_step", "s", default=1e-3, minimum=SHORTEST_STEP, maximum=0.1),
         provenance=table.provenance,
     )
     _check_stitch(table, definition)
@@ -372,13 +390,19 @@ def _check_stitch_length(table: Table, section: Section, length: float) -> None:
         table.problem("stitch_wire.length", f"{length:g} m: the stitch wires of neighbouring supports overlap")
         return
     first, last = section.ends.working
-    droppers = [x for span in section.spans for x in span.droppers]
+    droppers = sorted(x for span in section.spans for x in span.droppers)
     for support in (x for x in supports[1:-1] if first <= x <= last):
-        left = any(support - half < x < support for x in droppers)
-        if not (left and any(support < x < support + half for x in droppers)):
+        left = _any_between(droppers, support - half, support)
+        if not (left and _any_between(droppers, support, support + half)):
             text = f"{length:g} m: no dropper hangs on one half of the stitch wire at {support:g} m"
             table.problem("stitch_wire.length", text)
             return
+
+
+def _any_between(x: Sequence[float], low: float, high: float) -> bool:
+    """Whether one of the values, in rising order, lies between two others."""
+    after = bisect_right(x, low)
+    return after < len(x) and x[after] < high
 
 
 def _check_auxiliary(table: Table, profile: Profile) -> None:
@@ -459,14 +483,14 @@ def _span(start: float, end: float, droppers: _Hung, hangers: _Hung) -> Span:
 
 
 def _read_boundaries(table: Table) -> list[float]:
-    start = table.quantity("start", "m")
+    start = table.quantity("start", "m", minimum=-1e7, maximum=1e7)
     if table.has("length"):
-        length = table.quantity("length", "m", positive=True)
-        lengths = [length] * table.integer("count", minimum=1, maximum=10000)
+        length = table.quantity("length", "m", positive=True, maximum=1e4)
+        lengths = [length] * table.integer("count", minimum=1, maximum=MAX_SPANS)
     else:
-        lengths = list(table.quantities("lengths", "m", positive=True))
-        if table.has("lengths") and not lengths:
-            table.problem("lengths", "gives no span")
+        lengths = list(table.quantities("lengths", "m", positive=True, maximum=1e4))
+        if table.has("lengths") and not 1 <= len(lengths) <= MAX_SPANS:
+            table.problem("lengths", f"gives {len(lengths)} spans, not 1 ... {MAX_SPANS}")
     boundaries = [start]
     for length in lengths or [math.nan]:
         boundaries.append(round(boundaries[-1] + length, 9))
@@ -484,10 +508,15 @@ def _read_hung(table: Table, boundaries: Sequence[float], rule_name: str, list_n
     rule = table.table(rule_name)
     if rule is None and len(listed) < count:
         table.problem(rule_name, f"a table [{table.key(rule_name)}] is missing, and not every span lists its own")
-    result = []
+    result: list[_Hung] = []
+    total = 0
     for index, (a, b) in enumerate(pairwise(boundaries), 1):
         own = listed.get(index, rule)
         result.append(_hung(own, index, b - a) if own is not None else _Hung())
+        total += len(result[-1].offsets)
+        if total > MAX_DROPPERS:
+            table.problem(rule_name, f"the first {index} spans have more than {MAX_DROPPERS} droppers already")
+            return [_Hung()] * count
     return result
 
 
@@ -498,7 +527,7 @@ def _read_listed(table: Table, count: int, list_name: str) -> dict[int, Table]:
         last = entry.integer("to", default=first, minimum=first)
         if last > count:
             entry.problem("span", f"there is no span {last}: the line has {count}")
-        if repeated := [i for i in range(first, last + 1) if i in listed]:
+        if repeated := [i for i in range(first, min(last, count) + 1) if i in listed]:
             entry.problem("span", f"span {repeated[0]} is listed twice")
         if last > count or repeated:
             _hung(entry, first, math.nan)
@@ -528,7 +557,7 @@ def _dropper_rule(table: Table, length: float) -> tuple[float, ...]:
         spacing = table.quantity("spacing", "m", positive=True)
         number = _fitting_number(table, length, first, spacing)
     else:
-        number = table.integer("count", minimum=2, maximum=1000)
+        number = table.integer("count", minimum=2, maximum=MAX_HUNG)
         spacing = (length - 2.0 * first) / (number - 1)
     return tuple(first + i * spacing for i in range(number))
 
@@ -541,6 +570,9 @@ def _fitting_number(table: Table, length: float, first: float, spacing: float) -
     if gaps < 0.0 or abs(gaps - round(gaps)) > 1e-6:
         text = f"droppers from {first:g} m every {spacing:g} m do not fit a span of {length:g} m"
         table.problem("spacing", text)
+        return 0
+    if gaps >= MAX_HUNG:
+        table.problem("spacing", f"{spacing:g} m: makes more than {MAX_HUNG} droppers in a span of {length:g} m")
         return 0
     return round(gaps) + 1
 
@@ -608,15 +640,16 @@ def _read_stagger(table: Table, boundaries: Sequence[float], registered: Sequenc
         values = {i: amplitude * (-1.0) ** n for n, i in enumerate(inner)}
     anchors = table.quantity("anchor", "m", default=0.0)
     known = {0: anchors, len(boundaries) - 1: anchors} | values
-    return [_straight(known, boundaries, i) for i in range(len(boundaries))]
+    held = sorted(known)
+    return [_straight(known, held, boundaries, i) for i in range(len(boundaries))]
 
 
-def _straight(known: Mapping[int, float], x: Sequence[float], i: int) -> float:
-    """Interpolate the wire's plan position between the supports that hold it."""
-    left = max(k for k in known if k <= i)
-    right = min(k for k in known if k >= i)
-    if left == right:
-        return known[left]
+def _straight(known: Mapping[int, float], held: Sequence[int], x: Sequence[float], i: int) -> float:
+    """Interpolate the wire's plan position between the supports that hold it, ``held`` in rising order."""
+    if i in known:
+        return known[i]
+    after = bisect_left(held, i)
+    left, right = held[after - 1], held[after]
     share = (x[i] - x[left]) / (x[right] - x[left])
     return known[left] + share * (known[right] - known[left])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Identify and print the values with their standard deviations."""
     response = read_response(arguments.response, arguments.kind)
     try:
-        model = identify(response, arguments.stages, dict(_fixed(text) for text in arguments.fix))
+        model = identify(response, arguments.stages, _all_fixed(arguments.fix))
     except ValueError as error:
         raise ParameterError(str(error)) from error
     print_table("Identified stages, bottom to top", ("value", "found", "standard deviation"), _rows(model))
@@ -46,6 +47,13 @@ def run(arguments: argparse.Namespace) -> int:
         _plot(response, model).savefig(arguments.plot, dpi=120)
         print(f"plot: {arguments.plot}")
     return 0
+
+
+def _all_fixed(texts: Sequence[str]) -> dict[str, float]:
+    given = [_fixed(text) for text in texts]
+    if twice := [name for name, _ in given if sum(name == other for other, _ in given) > 1]:
+        raise ParameterError(f"--fix {twice[0]}: is given twice")
+    return dict(given)
 
 
 def _fixed(text: str) -> tuple[str, float]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import math
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
+from models.definition import LARGEST, SMALLEST
 from models.part import ParameterError
 
 
@@ -44,6 +47,25 @@ def settings(given: Iterable[str], part: str) -> dict[str, float]:
     return result
 
 
+def finite(text: str) -> float:
+    """Read a finite number from the command line; argparse tells what is wrong with another."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= LARGEST or "_" in text or not text.isascii():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g})")
+    return value
+
+
+def positive(text: str) -> float:
+    """Read a number greater than 0 from the command line."""
+    value = finite(text)
+    if value < SMALLEST:
+        raise argparse.ArgumentTypeError(f"'{text}' must be greater than 0")
+    return value
+
+
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table, first column left, others right."""
     table = Table(title=title, title_justify="left")
@@ -53,6 +75,12 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
         table.add_row(*row)
     # Without markup: "[m]" is a unit here.
     Console(width=None if Console().is_terminal else 100, markup=False).print(table)
+
+
+def warn(texts: Iterable[str]) -> None:
+    """Tell what deserves a second look; the command goes on."""
+    for text in filter(None, texts):
+        print(f"warning: {text}", file=sys.stderr)
 
 
 def new_folder(path: Path) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from models.commands.options import add_settings, new_folder, print_table, settings
+from models.commands.options import add_settings, finite, new_folder, print_table, settings
 from models.library import load_pantograph
 from models.pantograph import lumped_characteristics as lumped
 from models.pantograph.multibody.characteristics import Rig
@@ -47,11 +47,11 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     """Register the verb."""
     parser = subparsers.add_parser("pantograph", help="statics over height, modes, apparent mass of a pantograph")
     parser.add_argument("pantograph", help="name in the library, or a definition file")
-    parser.add_argument("--force", type=float, default=157.5, help="contact force of the working point [N]")
+    parser.add_argument("--force", type=finite, default=157.5, help="contact force of the working point [N]")
     parser.add_argument(
-        "--heights", type=float, nargs=2, default=None, metavar=("FROM", "TO"), help="strip heights above rail [m]"
+        "--heights", type=finite, nargs=2, default=None, metavar=("FROM", "TO"), help="strip heights above rail [m]"
     )
-    parser.add_argument("--height", type=float, default=None, help="strip height of the working point [m]")
+    parser.add_argument("--height", type=finite, default=None, help="strip height of the working point [m]")
     parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
     add_settings(parser)
     parser.set_defaults(run=run)

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from models.catenary import statics
+from models.catenary import limits, statics
 from models.catenary.model import CatenaryModel
 from models.catenary.parameters import Span
+from models.catenary.part import CatenaryPart
 from models.commands import statics_plots
-from models.commands.options import add_settings, new_folder, print_table, settings
+from models.commands.options import add_settings, new_folder, positive, print_table, settings, warn
 from models.library import load_line
 from models.part import FloatArray, ParameterError
 
@@ -44,8 +45,8 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     parser.add_argument("line", help="name in the library, or a definition file")
     parser.add_argument("--span", type=int, default=None, help="span in detail, from 1 (default: the middle one)")
     parser.add_argument("--section", type=int, default=1, help="section of a line with overlaps, from 1 (default 1)")
-    parser.add_argument("--speed", type=float, default=300.0, help="speed of the wave figures, km/h (default 300)")
-    parser.add_argument("--force", type=float, default=100.0, help="force of the elasticity [N] (default 100)")
+    parser.add_argument("--speed", type=positive, default=300.0, help="speed of the wave figures, km/h (default 300)")
+    parser.add_argument("--force", type=positive, default=100.0, help="force of the elasticity [N] (default 100)")
     parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
     add_settings(parser)
     parser.set_defaults(run=run)
@@ -69,9 +70,8 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     Raises
     ------
     ParameterError
-        If the line has no such section or span, or speed or force are not positive.
+        If the line has no such section or span.
     """
-    _check_positive(speed=arguments.speed, force=arguments.force)
     definition = load_line(arguments.line).with_values(settings(arguments.set, "line"))
     section = arguments.section - 1
     if not 0 <= section < len(definition.sections):
@@ -81,7 +81,12 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     if not 1 <= number <= len(spans):
         raise ParameterError(f"--span {number}: the line has spans 1 to {len(spans)}")
     span = spans[number - 1]
-    model = CatenaryModel(definition)
+    part = CatenaryPart(definition)
+    model = part.model
+    warn([
+        limits.speed_warning(definition, arguments.speed / 3.6),
+        limits.slack_warning(part.droppers, model.static.dropper_force),
+    ])
     return LineStatics(
         model=model,
         section=section,
@@ -133,12 +138,6 @@ def write(folder: Path, result: LineStatics) -> None:
 
 
 _DROPPER_COLUMNS = ("from the support [m]", "length [m]", "tension [N]")
-
-
-def _check_positive(**values: float) -> None:
-    for name, value in values.items():
-        if not 0.0 < value < float("inf"):
-            raise ParameterError(f"--{name} {value:g}: must be greater than 0")
 
 
 def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:

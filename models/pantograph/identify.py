@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from models.definition import DefinitionError, Problem
+from models.definition import LARGEST, SMALLEST, DefinitionError, Problem
 from models.part import FloatArray
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -30,6 +30,10 @@ ComplexArray = npt.NDArray[np.complex128]
 #: What a response file may hold: displacement per force [m/N], force per acceleration [kg], per displacement [N/m].
 RESPONSE_KINDS: Final = ("receptance", "apparent_mass", "dynamic_stiffness")
 
+#: Most stages of a chain that a response at its top can tell apart.
+MAX_STAGES: Final = 6
+_HIGHEST_FREQUENCY: Final = 1e5
+_KINDS: Final = {"m": "mass", "c": "damping", "k": "stiffness"}
 _STARTS: Final = 40
 _SEED: Final = 20120
 #: Range of the starts: masses [kg], dampings [N.s/m], stiffnesses [N/m].
@@ -113,17 +117,9 @@ def read_response(path: Path, kind: str = "receptance") -> Response:
     """
     if kind not in RESPONSE_KINDS:
         raise DefinitionError([Problem(str(path), "", f"'{kind}' is none of {', '.join(RESPONSE_KINDS)}")])
-    try:
-        lines = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
-    except OSError as error:
-        raise DefinitionError([Problem(str(path), "", f"cannot be read ({error.strerror})")]) from error
-    except UnicodeDecodeError as error:
-        raise DefinitionError([Problem(str(path), "", f"is not UTF-8 text (byte {error.start})")]) from error
     problems: list[Problem] = []
     rows: list[tuple[float, float, float]] = []
-    for number, line in enumerate(lines, 1):
-        if not line or line[0].lstrip().startswith("#") or (not rows and not _numeric(line)):
-            continue
+    for number, line in _data_lines(_read_lines(path)):
         row = _row(line)
         if isinstance(row, str):
             problems.append(Problem(str(path), f"line {number}", row))
@@ -135,6 +131,29 @@ def read_response(path: Path, kind: str = "receptance") -> Response:
         raise DefinitionError(problems)
     data = np.array(rows)
     return _response(data[:, 0], data[:, 1] + 1j * data[:, 2], kind)
+
+
+def _read_lines(path: Path) -> list[list[str]]:
+    try:
+        return list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+    except OSError as error:
+        raise DefinitionError([Problem(str(path), "", f"cannot be read ({error.strerror})")]) from error
+    except UnicodeDecodeError as error:
+        raise DefinitionError([Problem(str(path), "", f"is not UTF-8 text (byte {error.start})")]) from error
+    except csv.Error as error:
+        raise DefinitionError([Problem(str(path), "", f"is not a table with commas ({error})")]) from error
+
+
+def _data_lines(lines: list[list[str]]) -> list[tuple[int, list[str]]]:
+    """Return the lines that must hold numbers, counted from 1: neither empty, nor comments, nor the titles."""
+    kept = [
+        (number, line)
+        for number, line in enumerate(lines, 1)
+        if any(cell.strip() for cell in line) and not line[0].lstrip().startswith("#")
+    ]
+    # Titles name all columns: a first line with a number in it is data, be it faulty.
+    has_titles = bool(kept) and not any(_is_number(cell) for cell in kept[0][1])
+    return kept[1:] if has_titles else kept
 
 
 def identify(
@@ -158,14 +177,20 @@ def identify(
     Raises
     ------
     ValueError
-        If a fixed name is unknown or the response has too few points.
+        If the number of stages or a fixed value is not possible, or the response has too few points.
     """
+    if not 1 <= stages <= MAX_STAGES:
+        raise ValueError(f"{stages} stages: 1 to {MAX_STAGES} can be found")
     given = dict(fixed or {})
     names = [f"{letter}{stage}" for letter in "mck" for stage in range(1, stages + 1)]
     unknown = sorted(set(given) - set(names))
     if unknown:
         raise ValueError(f"there is no value {', '.join(unknown)} to fix (there are {', '.join(names)})")
+    for name, value in given.items():
+        _check_fixed(name, value)
     free = [name for name in names if name not in given]
+    if not free:
+        raise ValueError("every value is fixed: there is nothing to find")
     if 2 * len(response.frequency) <= len(free):
         raise ValueError(f"{len(response.frequency)} frequencies are too few for {len(free)} unknown values")
     fit = _Fit(response, names, free, given)
@@ -219,12 +244,26 @@ class _Fit:
         return IdentifiedModel(m, c, k, deviations, math.sqrt(2.0 * result.cost / points))
 
 
-def _numeric(line: list[str]) -> bool:
+def _check_fixed(name: str, value: float) -> None:
+    lowest = SMALLEST if name[0] == "m" else 0.0
+    if not lowest <= value <= LARGEST:
+        rule = "greater than 0" if name[0] == "m" else "0 or greater"
+        raise ValueError(f"{name} = {value:g} cannot be: a {_KINDS[name[0]]} must be {rule}, and finite")
+
+
+def _is_number(cell: str) -> bool:
     try:
-        float(line[0])
+        _number(cell)
     except ValueError:
         return False
     return True
+
+
+def _number(cell: str) -> float:
+    # Python reads 1_000, and the digits of every script; in a table they are slips of the pen.
+    if "_" in cell or not cell.isascii():
+        raise ValueError(f"could not convert string to float: '{cell}'")
+    return float(cell)
 
 
 def _row(line: list[str]) -> tuple[float, float, float] | str:
@@ -232,15 +271,17 @@ def _row(line: list[str]) -> tuple[float, float, float] | str:
     if len(line) != 3:
         return f"has {len(line)} columns where frequency, real and imaginary part are needed"
     try:
-        f, real, imaginary = (float(cell) for cell in line)
+        f, real, imaginary = (_number(cell) for cell in line)
     except ValueError as error:
         return str(error)
     if not (math.isfinite(f) and math.isfinite(real) and math.isfinite(imaginary)):
         return "holds a value that is not finite"
-    if f <= 0.0:
-        return f"frequency {f:g} Hz must be greater than 0"
+    if not 0.0 < f <= _HIGHEST_FREQUENCY:
+        return f"frequency {f:g} Hz must be greater than 0 and at most {_HIGHEST_FREQUENCY:g} Hz"
     if real == 0.0 and imaginary == 0.0:
         return "the response is 0"
+    if not SMALLEST <= max(abs(real), abs(imaginary)) <= LARGEST:
+        return f"a response of {real:g} and {imaginary:g} is that of no pantograph"
     return f, real, imaginary
 
 

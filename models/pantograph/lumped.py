@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.energy import NO_BALANCE
 from models.extrapolation import ForceExtrapolation
+from models.pantograph.lumped_energy import LumpedBalance
 from models.pantograph.parameters import LumpedDefinition
 from models.part import FloatArray, Snapshot
 from models.time_integration import Newmark, steps_within
@@ -125,6 +127,7 @@ class LumpedPantographPart:
         self.strip = np.zeros((2, 2, 3))
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._base = np.zeros(2)
+        self._balance: LumpedBalance | None = None
         self.observed = _observed(len(definition.stage))
 
     def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
@@ -144,6 +147,7 @@ class LumpedPantographPart:
         load = self.model.load(0.0, base)
         load[-1] -= force
         self.state = self.model.initial_state(load)
+        self._balance = LumpedBalance(self.model, load, force) if self.definition.monitor_energy else None
         self._force.start(time, force)
         self._base[...] = base
         self._place_strip()
@@ -161,10 +165,23 @@ class LumpedPantographPart:
         self.time = start + step
         self._place_strip()
 
+    @property
+    def energy(self) -> FloatArray:
+        """Return the values of `models.energy.BALANCE` [J], shape (4,); 0 if the balance is not kept."""
+        return NO_BALANCE if self._balance is None else self._balance.balance(self.state)
+
+    @property
+    def contact_work(self) -> FloatArray:
+        """Return the work of the strip against the contact [J], shape (1,); 0 if the balance is not kept."""
+        return np.zeros(1) if self._balance is None else self._balance.contact_work
+
     def observation_values(self) -> FloatArray:
         """Return height, velocity and acceleration of every mass, shape (3 n,)."""
-        heights = self.definition.reference_height + self.state.displacement
-        return np.stack([heights, self.state.velocity, self.state.acceleration], axis=1).ravel()
+        values = np.empty((self.model.size, 3))
+        np.add(self.definition.reference_height, self.state.displacement, out=values[:, 0])
+        values[:, 1] = self.state.velocity
+        values[:, 2] = self.state.acceleration
+        return values.ravel()
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
@@ -175,6 +192,7 @@ class LumpedPantographPart:
             "acceleration": self.state.acceleration.copy(),
             "base": self._base.copy(),
             **self._force.snapshot(),
+            **({} if self._balance is None else self._balance.snapshot()),
         }
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -185,12 +203,18 @@ class LumpedPantographPart:
         )
         self._base[...] = snapshot["base"]
         self._force.restore(snapshot)
+        if self._balance is not None:
+            self._balance.restore(snapshot)
         self._place_strip()
 
     def _substep(self, time: float, h: float) -> None:
         load = self.model.load(time - self._start_time, self._base)
-        load[-1] -= self._force.at(time)
+        force = self._force.at(time)
+        load[-1] -= force
+        before = self.state.displacement
         self.model.advance(self.state, h, self.model.free_response(self.state, h, load))
+        if self._balance is not None:
+            self._balance.add(h, self.state.displacement - before, load, force)
 
     def _x(self, time: float) -> float:
         return self.definition.start_position + self.definition.speed * (time - self._start_time)
@@ -198,10 +222,10 @@ class LumpedPantographPart:
     def _place_strip(self) -> None:
         d = self.definition
         half = 0.5 * d.strip_length
-        height = d.reference_height + self.state.displacement[-1]
-        for end, side in enumerate((half, -half)):
-            self.strip[end, 0] = self._x(self.time), d.strip_offset + side, height
-            self.strip[end, 1] = d.speed, 0.0, self.state.velocity[-1]
+        height, velocity = d.reference_height + self.state.displacement.item(-1), self.state.velocity.item(-1)
+        x, y = self._x(self.time), d.strip_offset
+        ends = [[[x, y + side, height], [d.speed, 0.0, velocity]] for side in (half, -half)]
+        self.strip[...] = ends
 
 
 def _chain(values: list[float]) -> FloatArray:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from models import schema
 from models.definition import Quantity, Table
+from models.energy import monitoring
 from models.part import Parameter
 from models.schema import count, quantity
 
@@ -32,7 +33,9 @@ class Operation:
         "order of the extrapolation of the contact force inside a step: 0 held, 1 linear, 2 quadratic",
         default=2, minimum=0, maximum=2,
     )  # fmt: skip
-    time_step: float = quantity("s", "longest internal time step", default=1e-3, positive=True, maximum=0.1)
+    monitor_energy: int = monitoring()
+    # At least a thousandth of the usual one: a run in shorter steps would never end.
+    time_step: float = quantity("s", "longest internal time step", default=1e-3, minimum=1e-6, maximum=0.1)
 
     def raised(self, time: float) -> float:
         """Return the share of the uplift that acts at ``time``: 0 before raising, a ramp, then 1."""

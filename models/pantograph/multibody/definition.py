@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -244,6 +245,8 @@ class MechanismDefinition:
 
 _COMPONENTS: Final = {"inertia": ("xx", "yy", "zz")}
 _XYZ: Final = ("x", "y", "z")
+#: Names of bodies, joints and forces: parts of dotted parameter names.
+_NAME: Final = re.compile(r"[\w-]+")
 
 
 def load(path: Path) -> MechanismDefinition:
@@ -323,6 +326,9 @@ class _Reader:
         table = self.root.table(section)
         if table is None:
             return ()
+        for name in table.names():
+            if not _NAME.fullmatch(name):
+                table.problem(name, "a name is made of letters, digits, '_' and '-'")
         children = ((name, table.table(name)) for name in table.names())
         return tuple(read(name, child) for name, child in children if child is not None)
 

@@ -125,7 +125,7 @@ class Mechanism:
         self.constraints.compile(self.pool)
         self.forces.compile(self.pool)
         strip = definition.strip
-        self._strip_body = self.numbers[strip.body] if strip is not None else -1
+        self.strip_body = self.numbers[strip.body] if strip is not None else -1
         operation = definition.operation
         self._strip_point = np.array([0.0, operation.strip_offset, strip.height if strip is not None else 0.0])
         self._strip_halves = np.array([[0.0, 0.5, 0.0], [0.0, -0.5, 0.0]]) * operation.strip_length
@@ -229,13 +229,13 @@ class Mechanism:
         """
         A = self._strip_frame(y)[:3] if frame is None else frame
         centre = A @ self._strip_point
-        along = (inputs.lateral - y[3 * self._strip_body + 1] - centre[1]) / A[1, 1]
+        along = (inputs.lateral - y[3 * self.strip_body + 1] - centre[1]) / A[1, 1]
         x, side, _ = (centre + along * A[:, 1]).tolist()
         return np.array([0.0, 0.0, -inputs.force, -side * inputs.force, x * inputs.force, 0.0])
 
     def _strip_frame(self, y: FloatArray) -> FloatArray:
         """Return A and A w~ of the strip's body, shape (6, 3)."""
-        n, k = self.count, self._strip_body
+        n, k = self.count, self.strip_body
         A = rotation_matrices(y[3 * n + 4 * k : 3 * n + 4 * k + 4][None, :])[0]
         return np.concatenate([A, A @ skew(y[10 * n + 3 * k : 10 * n + 3 * k + 3][None, :])[0]])
 
@@ -248,8 +248,8 @@ class Mechanism:
         loads = self.forces.loads(kinematics, vectors, y[10 * self.count :].reshape(-1, 3), inputs.lift)
         loads += self._weights
         if inputs.force != 0.0:
-            frame = kinematics.frames[self._strip_body, :3]
-            loads[self._strip_body] += self.contact_load(y, inputs, frame)
+            frame = kinematics.frames[self.strip_body, :3]
+            loads[self.strip_body] += self.contact_load(y, inputs, frame)
         return loads
 
     def constraint_values(self, kinematics: Kinematics) -> ConstraintValues:
@@ -320,8 +320,8 @@ class Mechanism:
     def _unit_loads(self, W: FloatArray) -> FloatArray:
         """Return unit vertical force, moment about x and about y on the strip's body, scaled, shape (6 n, 3)."""
         units = np.zeros((self.count, 6, 3))
-        if self._strip_body >= 0:
-            units[self._strip_body] = W[self._strip_body, 2:5].T
+        if self.strip_body >= 0:
+            units[self.strip_body] = W[self.strip_body, 2:5].T
         return units.reshape(-1, 3)
 
     def _response(self, units: FloatArray, joints: FloatArray) -> FloatArray:
@@ -390,17 +390,28 @@ class Mechanism:
 
     def energy(self, y: FloatArray) -> float:
         """Return kinetic energy plus that of weights, springs and bump stops [J]; the base's weight left out."""
+        free = slice(self.driven, None)
+        weight = self.definition.gravity * (self.mass[free] @ self.split(y).r[free, 2])
+        return float(self.kinetic(y) + weight + self.forces.energy(self.pool.evaluate(self.kinematics(y))))
+
+    def kinetic(self, y: FloatArray) -> float:
+        """Return the kinetic energy of the bodies that the base does not drive [J]."""
         s, free = self.split(y), slice(self.driven, None)
-        kinetic = 0.5 * (self.mass[free] @ (s.v[free] ** 2).sum(axis=1) + (self.inertia * s.w**2)[free].sum())
-        weight = self.definition.gravity * (self.mass[free] @ s.r[free, 2])
-        return float(kinetic + weight + self.forces.energy(self.pool.evaluate(self.kinematics(y))))
+        return float(0.5 * (self.mass[free] @ (s.v[free] ** 2).sum(axis=1) + (self.inertia * s.w**2)[free].sum()))
+
+    def power_of_base(self, y: FloatArray, inputs: Inputs) -> float:
+        """Return the power that the base puts in through its joints [W]."""
+        if inputs.base[1] == 0.0:
+            return 0.0
+        found = self.evaluate(y.copy(), inputs)
+        return float(found.multipliers @ found.constraints.jacobian[:, : self.driven, 2].sum(axis=1)) * inputs.base[1]
 
     def strip_ends(self, y: FloatArray) -> FloatArray:
         """Return the strip's ends, shape (2, 2, 3): left A and right B; position, velocity [m, m/s]."""
-        if self._strip_body < 0:
+        if self.strip_body < 0:
             raise MechanismError(f"'{self.definition.name}' has no collector strip")
         local = self._strip_point + self._strip_halves
-        s, k = self.split(y), self._strip_body
+        s, k = self.split(y), self.strip_body
         ends = (local @ self._strip_frame(y).T).reshape(2, 2, 3)
         ends[:, 0] += s.r[k]
         ends[:, 1] += s.v[k]

@@ -8,10 +8,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from models.energy import NO_BALANCE
 from models.extrapolation import ForceExtrapolation, lead_of
 from models.pantograph.multibody.assembly import project
 from models.pantograph.multibody.definition import MechanismDefinition
-from models.pantograph.multibody.integration import History, Integrator
+from models.pantograph.multibody.energy import MechanismBalance
+from models.pantograph.multibody.integration import Advance, History, Integrator
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.statics import equilibrium, settle_springs
 from models.part import FloatArray, Snapshot
@@ -166,6 +168,7 @@ class MultibodyPantographPart:
         self._substep = definition.operation.time_step
         self._observation = np.zeros(len(self.observed))
         self._built: _Built | None = None
+        self._balance: MechanismBalance | None = None
 
     def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
         """Set the pantograph to rest (on its roof) at its reference height at ``time``.
@@ -197,7 +200,10 @@ class MultibodyPantographPart:
         s = built.mechanism.split(self._y)
         s.r[:, 2] += base[0]
         s.v[:, 2] += base[1]
-        self._remember(built.mechanism.evaluate(self._y, self._inputs(0.0), respond=True), self._inputs(0.0))
+        inputs = self._inputs(0.0)
+        self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
+        watched = self.definition.operation.monitor_energy
+        self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
 
     def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
         """Advance by ``step`` [s].
@@ -231,11 +237,22 @@ class MultibodyPantographPart:
         kinks = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
         first, history = self._continuation()
         done = built.integrator.advance(self._y, self._inputs, step, self._substep, kinks, first, history)
+        self._account(step, first, done)
         self._y, self._substep, self._history = done.y, done.step, done.history
         inputs = self._inputs(step)
         self._base.finish(step)
         self.time += step
         self._remember(done.evaluation, inputs)
+
+    @property
+    def energy(self) -> FloatArray:
+        """Return the values of `models.energy.BALANCE` [J], shape (4,); 0 if the balance is not kept."""
+        return NO_BALANCE if self._balance is None else self._balance.balance(self._y)
+
+    @property
+    def contact_work(self) -> FloatArray:
+        """Return the work of the strip against the contact [J], shape (1,); 0 if the balance is not kept."""
+        return np.zeros(1) if self._balance is None else self._balance.contact_work
 
     def observation_values(self) -> FloatArray:
         """Return the values of ``observed``."""
@@ -254,6 +271,7 @@ class MultibodyPantographPart:
             **self._force.snapshot(),
             **self._lateral.snapshot(),
             **self._base.snapshot(),
+            **({} if self._balance is None else self._balance.snapshot()),
         }
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -268,6 +286,8 @@ class MultibodyPantographPart:
         self._force.restore(snapshot)
         self._lateral.restore(snapshot)
         self._base.restore(snapshot)
+        if self._balance is not None:
+            self._balance.restore(snapshot)
 
     def _ready(self) -> _Built:
         if self._built is None:
@@ -278,6 +298,14 @@ class MultibodyPantographPart:
         """Keep the equations of motion at the end of a step: they begin the next one."""
         self._last = _Last(evaluation.acceleration, evaluation.response, inputs)
         self._show(evaluation)
+
+    def _account(self, step: float, first: FloatArray | None, done: Advance) -> None:
+        """Add a step to the energy balance, if it is kept."""
+        if self._balance is None:
+            return
+        if first is None:
+            first = self._ready().mechanism.evaluate(self._y.copy(), self._inputs(0.0)).rates
+        self._balance.add(step, (self._y, first), (done.y, done.evaluation.rates), self._inputs)
 
     def _continuation(self) -> tuple[FloatArray | None, History | None]:
         """Return the rates at the step's beginning under the inputs just received, and those before as if these had

@@ -1,0 +1,33 @@
+"""Patterns of variable names, in which ``*`` stands for anything."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+
+def matcher(pattern: str) -> Callable[[str], bool]:
+    """Return a test for names; ``*`` stands for anything, brackets for themselves.
+
+    Examples
+    --------
+    >>> matcher("*.dropper[*].force")("catenary.dropper[12].force")
+    True
+    """
+    first, *others = pattern.split("*")
+    if not others:
+        return lambda name: name == pattern
+    *inner, last = others
+
+    def fits(name: str) -> bool:
+        # From left to right, each part as early as it can be: a regular expression may try for ages.
+        if not (name.startswith(first) and name.endswith(last)):
+            return False
+        place, end = len(first), len(name) - len(last)
+        for part in inner:
+            found = name.find(part, place, end)
+            if found < 0:
+                return False
+            place = found + len(part)
+        return place <= end
+
+    return fits

@@ -1,0 +1,87 @@
+"""The JSON files of a results folder, read back: data of the shape they are used in, or a message."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from master.errors import MasterError, one_line
+
+
+class _Loose(BaseModel):
+    """Only what is computed with is checked; the rest is shown as it is."""
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+
+
+class _Contact(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    index: int
+    catenary: str
+    pantograph: str
+    prefix: str
+    told: str = ""
+    ends: dict[str, str] = {}
+
+
+class _Interval(_Loose):
+    start: float | None = None
+    end: float | None = None
+
+
+class _Settings(_Loose):
+    interval: _Interval = _Interval()
+
+
+class _Component(_Loose):
+    name: str
+    parameters: dict[str, Any] = {}
+
+
+class _Caution(_Loose):
+    component: str
+    text: str
+
+
+class _Summary(_Loose):
+    contacts: list[_Contact] = []
+    settings: _Settings = _Settings()
+    components: list[_Component] = []
+    warnings: list[_Caution] = []
+    scenario: str = ""
+    status: str = ""
+
+
+_SUMMARY: Final[TypeAdapter[Any]] = TypeAdapter(_Summary)
+_GEOMETRY: Final[TypeAdapter[Any]] = TypeAdapter(
+    dict[str, dict[str, float]], config=ConfigDict(strict=True, allow_inf_nan=False)
+)
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Read ``summary.json``; raises `MasterError` if it is not what a run has written."""
+    return _read(path, _SUMMARY)
+
+
+def read_geometry(path: Path) -> dict[str, dict[str, float]]:
+    """Read ``geometry.json``; raises `MasterError` if it is not what a run has written."""
+    return _read(path, _GEOMETRY)
+
+
+def _read(path: Path, shape: TypeAdapter[Any]) -> dict[str, Any]:
+    try:
+        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        shape.validate_python(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the whole"
+        raise MasterError(f"{path} is damaged: {one_line(where)}: {first['msg']}; run the scenario again") from error
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
+    except (ValueError, RecursionError) as error:
+        raise MasterError(f"{path} is damaged: {one_line(str(error))}; run the scenario again") from error
+    return data

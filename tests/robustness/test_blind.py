@@ -1,0 +1,172 @@
+"""Blindly changed scenarios: refused in words, or read as what now stands there."""
+
+from __future__ import annotations
+
+import contextlib
+import zipfile
+from xml.etree import ElementTree
+
+from hypothesis import given, settings
+
+from master.cli import main
+from master.scenario import open_scenario
+from tests.master.conftest import SSV, ssd_text
+from tests.robustness.mutation import changes
+from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_refused
+
+SSD = "SystemStructure.ssd"
+TEXTS = {SSD: ssd_text(), "parameters.ssv": SSV}
+MAPPING = """<?xml version="1.0" encoding="UTF-8"?>
+<ssm:ParameterMapping xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0">
+  <ssm:MappingEntry source="static_force" target="static_force">
+    <ssc:LinearTransformation factor="0.5" offset="10"/>
+  </ssm:MappingEntry>
+  <ssm:MappingEntry source="ripple" target="speed"/>
+</ssm:ParameterMapping>
+"""
+BINDING = '<ssd:ParameterBinding source="parameters.ssv"/>'
+MAPPED = ssd_text().replace(BINDING, f'{BINDING[:-2]}><ssd:ParameterMapping source="m.ssm"/></ssd:ParameterBinding>')
+
+
+def rewrite(scenario, **changed):
+    for name, text in TEXTS.items():
+        (scenario / name).write_text(text, encoding="utf-8")
+    for name, data in changed.items():
+        (scenario / name.replace("__", ".")).write_bytes(data)
+
+
+def verdict(scenario, *place):
+    """Whether the scenario is accepted; if not, that it is refused in words."""
+    answer = ask(main, "validate", scenario, "--no-build")
+    if answer.code:
+        assert_refused(answer, codes=(1,))
+        assert any(name in answer.err for name in place), answer.err
+        return False
+    assert_accepted(answer, "valid")
+    return True
+
+
+def told(data):
+    """What a description says, read by another parser and in another way than the master's."""
+    root = ElementTree.fromstring(data)
+    every = {n.tag.rpartition("}")[2]: [] for n in root.iter()}
+    for n in root.iter():
+        every[n.tag.rpartition("}")[2]].append(n)
+    wires = [tuple(n.get(k) for k in ("startElement", "startConnector", "endElement", "endConnector"))
+             for n in every["Connection"]]  # fmt: skip
+    steps = [float(n.get("baseStepSize")) for n in every.get("FixedStepAlgorithm", [])]
+    experiment = every["DefaultExperiment"][0]
+    interval = every.get("Interval", [ElementTree.Element("Interval")])[0]
+    return {
+        "components": [(n.get("name"), n.get("source")) for n in every["Component"]],
+        "wires": {frozenset((w[:2], w[2:])) for w in wires},
+        "times": (float(experiment.get("startTime", "0")), float(experiment.get("stopTime")), *(steps or [1e-3])),
+        "interval": tuple(None if interval.get(k) is None else float(interval.get(k)) for k in ("start", "end")),
+    }
+
+
+def read(scenario):
+    """The same, as the master has read it."""
+    with open_scenario(scenario, build=False) as opened:
+        s = opened.system
+        return {
+            "components": [(c.name, f"resources/{c.fmu.path.name}") for c in s.components],
+            "wires": {frozenset(((c.source, c.output), (c.target, c.input))) for c in s.connections},
+            "times": (s.start, s.stop, s.step),
+            "interval": (s.settings.interval.start, s.settings.interval.end),
+        }
+
+
+@settings(PROFILE, max_examples=600)
+@given(change=changes())
+def test_descriptions(scenario, change):
+    TRIED["description, blindly"] += 1
+    data = change(ssd_text().encode())
+    rewrite(scenario, SystemStructure__ssd=data)
+    if verdict(scenario, SSD):
+        assert read(scenario) == told(data)
+
+
+@settings(PROFILE, max_examples=500)
+@given(change=changes())
+def test_parameter_sets(scenario, change):
+    TRIED["parameter set, blindly"] += 1
+    data = change(SSV.encode())
+    rewrite(scenario, parameters__ssv=data)
+    if verdict(scenario, "parameters.ssv"):
+        values = {n.get("name"): float(n[0].get("value")) for n in ElementTree.fromstring(data).iter()
+                  if n.tag.endswith("}Parameter")}  # fmt: skip
+        with open_scenario(scenario, build=False) as opened:
+            assert opened.system.component("pantograph").parameters == values
+
+
+@settings(PROFILE, max_examples=400)
+@given(change=changes())
+def test_mappings(scenario, change):
+    TRIED["mapping, blindly"] += 1
+    data = change(MAPPING.encode())
+    rewrite(scenario, SystemStructure__ssd=MAPPED.encode(), m__ssm=data)
+    if not verdict(scenario, "m.ssm", "parameter 'pantograph."):
+        return
+    wanted, values = {}, {"static_force": 140.0, "ripple": 20.0}
+    for entry in (n for n in ElementTree.fromstring(data).iter() if n.tag.endswith("}MappingEntry")):
+        linear = next((n for n in entry if n.tag.endswith("}LinearTransformation")), ElementTree.Element("x"))
+        factor, offset = float(linear.get("factor", "1")), float(linear.get("offset", "0"))
+        wanted[entry.get("target")] = factor * values[entry.get("source")] + offset
+    with open_scenario(scenario, build=False) as opened:
+        assert opened.system.component("pantograph").parameters == wanted
+
+
+def packed(scenario, path):
+    rewrite(scenario)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for source in sorted(p for p in scenario.rglob("*") if p.is_file()):
+            file.write(source, source.relative_to(scenario).as_posix())
+    return path.read_bytes()
+
+
+@settings(PROFILE, max_examples=400)
+@given(change=changes())
+def test_archives(scenario, tmp_path_factory, change):
+    TRIED["archive, blindly"] += 1
+    folder = tmp_path_factory.getbasetemp()
+    whole = packed(scenario, folder / "whole.ssp")
+    path = folder / "changed.ssp"
+    path.write_bytes(change(whole))
+    if verdict(path, "changed.ssp", SSD, "parameters.ssv"):
+        assert read(path) == read(scenario)  # checksums: what is accepted is what was packed
+
+
+@settings(PROFILE, max_examples=400)
+@given(change=changes())
+def test_fmus(scenario, change):
+    TRIED["FMU, blindly"] += 1
+    rewrite(scenario)
+    path = scenario / "resources" / "ToyPantograph.fmu"
+    whole = path.read_bytes()
+    with contextlib.ExitStack() as stack:
+        stack.callback(path.write_bytes, whole)
+        path.write_bytes(change(whole))
+        verdict(scenario, "ToyPantograph.fmu")
+
+
+@settings(PROFILE, max_examples=400)
+@given(change=changes())
+def test_descriptions_of_fmus(scenario, change):
+    """Inside the archive, where no checksum protects them."""
+    TRIED["FMU's description, blindly"] += 1
+    rewrite(scenario)
+    path = scenario / "resources" / "ToyPantograph.fmu"
+    whole = path.read_bytes()
+    with zipfile.ZipFile(path) as file:
+        data = file.read("modelDescription.xml")
+    with contextlib.ExitStack() as stack:
+        stack.callback(path.write_bytes, whole)
+        with zipfile.ZipFile(path, "w") as file:
+            file.writestr("modelDescription.xml", change(data))
+        if verdict(scenario, "ToyPantograph.fmu", "pantograph"):
+            root = ElementTree.fromstring(change(data))
+            names = [n.get("name") for n in root.iter("ScalarVariable")]
+            with open_scenario(scenario, build=False) as opened:
+                assert list(opened.system.component("pantograph").fmu.variables) == names

@@ -1,0 +1,231 @@
+"""Broken definitions of lines and pantographs: every value, key and table, and blindly changed files."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models.catenary.parameters import read
+from models.commands import main
+from models.definition import DefinitionError, Table
+from models.library import line_path, load_line, load_pantograph, pantograph_path
+from tests.robustness.mutation import changes
+from tests.robustness.support import ANSWER_SECONDS, PROFILE, TRIED, ask, assert_quick, assert_worded
+
+LINES = ("LN2", "Re330", "Shinkansen", "LN2_overlap")
+PANTOGRAPHS = ("CX", "CX_multibody", "generic_multibody")
+FILES = {
+    **{f"line {n}": line_path(n) for n in LINES},
+    **{f"pantograph {n}": pantograph_path(n) for n in PANTOGRAPHS},
+}
+#: One value with unit and source on a line of its own.
+VALUE = re.compile(r'^(?P<key>\w+) = \[(?P<value>[^",]+(?:\[[^"]*\])?), "(?P<unit>[^"]*)", (?P<source>"[^\n]*")\]$')
+#: What may not stand in the place of a number.
+NO_NUMBERS = (
+    "nan", "inf", "-inf", "1e300", "-1e300", "true", '"12"', "{}", "[]", "[[1]]", "1979-05-27", "''", '[1, "2"]',
+    "9" * 4000, "9" * 5000, "0x" + "f" * 5000, "[" * 500 + "]" * 500, "[" * 5000 + "]" * 5000,
+)  # fmt: skip
+#: Tables whose tables have names of the user's choice.
+NAMED = ("body", "joint", "force")
+NO_UNITS = ("", "K", "furlong", "m/", "M", "kg.m3", "N m", "µm", "m" * 1000)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A broken file: its text, what the message must say."""
+
+    text: str
+    parts: tuple[str, ...]
+
+
+def load(kind: str, path: Path):
+    return load_line(str(path)) if kind.startswith("line") else load_pantograph(str(path))
+
+
+def places(text: str) -> Iterator[tuple[int, list[str], re.Match[str]]]:
+    lines = text.splitlines()
+    for i, line in enumerate(lines):
+        if found := VALUE.match(line):
+            yield i, lines, found
+
+
+def with_line(lines: list[str], index: int, *new: str) -> str:
+    return "\n".join([*lines[:index], *new, *lines[index + 1 :]]) + "\n"
+
+
+def wrong_values(text: str) -> Iterator[Case]:
+    for i, lines, m in places(text):
+        for bad in NO_NUMBERS:
+            yield Case(with_line(lines, i, f"{m['key']} = [{bad}, \"{m['unit']}\", {m['source']}]"), ("broken.toml",))
+
+
+def wrong_units(text: str) -> Iterator[Case]:
+    for i, lines, m in places(text):
+        for bad in NO_UNITS:
+            new = f"{m['key']} = [{m['value']}, \"{bad}\", {m['source']}]"
+            yield Case(with_line(lines, i, new), (m["key"], "unit"))
+
+
+def wrong_shapes(text: str) -> Iterator[Case]:
+    for i, lines, m in places(text):
+        key, value, unit, source = m["key"], m["value"], f'"{m["unit"]}"', m["source"]
+        for new in (
+            f"{key} = [{value}, {unit}]", f"{key} = [{value}]", f"{key} = []", f"{key} = {source}",
+            f'{key} = [{value}, {unit}, ""]', f"{key} = [{value}, {unit}, 1]", f"{key} = [{unit}, {value}, {source}]",
+            f"{key} = [{value}, {unit}, {source}, {source}]", f"{key} = {{value = {value}}}",
+        ):  # fmt: skip
+            yield Case(with_line(lines, i, new), (key,))
+
+
+def wrong_keys(text: str) -> Iterator[Case]:
+    for i, lines, m in places(text):
+        yield Case(with_line(lines, i, lines[i].replace(m["key"], f"{m['key']}_", 1)), (f"{m['key']}_", "unknown key"))
+        yield Case(with_line(lines, i, lines[i], lines[i]), ("broken.toml", "line"))
+        yield Case(with_line(lines, i, lines[i].replace("=", ":", 1)), ("broken.toml", "line"))
+    lines = text.splitlines()
+    for i, line in enumerate(lines):
+        if line.startswith("["):
+            open_, close = ("[[", "]]") if line.startswith("[[") else ("[", "]")
+            name = line.strip("[]")
+            if name.partition(".")[0] not in NAMED:
+                said = "broken.toml" if close == "]]" else f"{name.rpartition('.')[2]}_"
+                yield Case(with_line(lines, i, f"{open_}{name}_{close}"), (said,))
+            yield Case(with_line(lines, i, line, "zzz = 1"), ("zzz", "unknown key"))
+
+
+MAKERS = (wrong_values, wrong_units, wrong_shapes, wrong_keys)
+
+
+def refusal(kind: str, path: Path, text: str) -> str:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DefinitionError) as caught:
+        load(kind, path)
+    assert_worded(caught.value, "broken.toml")
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("maker", MAKERS, ids=lambda m: m.__name__)
+def test_every_value_and_key(tmp_path, kind, maker):
+    text = FILES[kind].read_text(encoding="utf-8")
+    cases = list(maker(text))
+    assert len(cases) > 10
+    for case in cases:
+        TRIED["definition, value by value"] += 1
+        said = refusal(kind, tmp_path / "broken.toml", case.text)
+        for part in case.parts:
+            assert part in said, (part, said)
+
+
+#: Keys whose values must be positive or, as a damping, not negative.
+SIGNED = {"start", "end", "angle", "listed", "anchor", "strip_offset", "position", "pre_sag", "amplitude", "heights",
+          "positions", "point_i", "point_j", "axis_i", "axis_j", "euler", "height", "start_position", "force", "moment",
+          "static_force", "static_moment", "free_length", "shortest", "longest", "direction", "gravity", "rise",
+          "minimum", "maximum", "spans", "beta"}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_negative_values_of_what_has_none(tmp_path, kind):
+    text = FILES[kind].read_text(encoding="utf-8")
+    for i, lines, m in places(text):
+        if m["key"] not in SIGNED and "[" not in m["value"]:
+            TRIED["definition, negative value"] += 1
+            new = f"{m['key']} = [-{m['value']}, \"{m['unit']}\", {m['source']}]"
+            if float(m["value"]) != 0.0:
+                assert m["key"] in refusal(kind, tmp_path / "broken.toml", with_line(lines, i, new))
+
+
+def table_of(lines: list[str], index: int) -> str:
+    """Return the dotted name of the table that a line is in; arrays of tables are numbered from 1."""
+    heads = [line for line in lines[:index] if line.startswith("[")]
+    if not heads:
+        return ""
+    name = heads[-1].strip("[]")
+    return f"{name}[{heads.count(heads[-1])}]" if heads[-1].startswith("[[") else name
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_value_changed_within_its_limits_is_there(tmp_path, kind):
+    """Sound inputs are taken as they are: the number as written is that of the definition."""
+    text, path = FILES[kind].read_text(encoding="utf-8"), tmp_path / "sound.toml"
+    parameters = {p.name: p for p in load(kind, FILES[kind]).parameters()}
+    found = 0
+    for i, lines, m in places(text):
+        full = f"{table_of(lines, i)}.{m['key']}".lstrip(".")
+        if full not in parameters or parameters[full].is_integer or not float(m["value"]):
+            continue
+        p = parameters[full]
+        factor = 0.97 if p.minimum is None or 0.97 * p.value >= p.minimum else 1.03
+        TRIED["definition, sound change"] += 1
+        new = f"{m['key']} = [{float(m['value']) * factor!r}, \"{m['unit']}\", {m['source']}]"
+        path.write_text(with_line(lines, i, new), encoding="utf-8")
+        after = {p.name: p.value for p in load(kind, path).parameters()}
+        assert [n for n in parameters if after[n] != parameters[n].value] == [full]
+        assert after[full] == pytest.approx(factor * p.value)
+        found += 1
+    assert found > 5
+
+
+def numbers(data) -> list:
+    """All that a file says, in order, for comparing what was read."""
+    if isinstance(data, dict):
+        return [x for k in sorted(data) for x in (k, *numbers(data[k]))]
+    return [x for v in data for x in numbers(v)] if isinstance(data, list) else [data]
+
+
+@settings(PROFILE, max_examples=900)
+@given(kind=st.sampled_from(sorted(FILES)), change=changes())
+def test_blindly(tmp_path_factory, kind, change):
+    TRIED["definition, blindly"] += 1
+    path = tmp_path_factory.getbasetemp() / "broken.toml"
+    path.write_bytes(change(FILES[kind].read_bytes()))
+    try:
+        definition = load(kind, path)
+    except DefinitionError as error:
+        assert_worded(error, "broken.toml")
+        return
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert definition.name == data["name"]
+    provenance = getattr(definition, "provenance", {})
+    for key, quantity in provenance.items():
+        if "[" not in key:
+            node = data
+            for part in key.split("."):
+                node = node[part]
+            written = list(quantity.value) if isinstance(quantity.value, tuple) else [quantity.value]
+            assert written == numbers([node[0]])
+
+
+@pytest.mark.parametrize(("verb", "kind"), [("statics", "line LN2"), ("pantograph", "pantograph CX_multibody")])
+def test_the_commands_say_the_same(tmp_path, verb, kind):
+    text, path = FILES[kind].read_text(encoding="utf-8"), tmp_path / "broken.toml"
+    cases = [c for maker in MAKERS for c in maker(text)][::5]
+    assert len(cases) > 100
+    for case in cases:
+        TRIED[f"models {verb}"] += 1
+        path.write_text(case.text, encoding="utf-8")
+        answer = ask(main, verb, path)
+        assert_quick(answer)
+        assert (answer.code, answer.err.startswith("error: ")) == (2, True), answer
+
+
+@pytest.mark.parametrize("name", ["Re330", "LN2", "C270"])
+def test_huge_lines_are_read_or_refused_at_once(name):
+    """Ten thousand spans are 500 km: slow to compute, not to read; ten million droppers are nothing."""
+    data = tomllib.loads(line_path(name).read_text(encoding="utf-8"))
+    data["spans"] |= {"length": [50, "m", "x"], "count": 10_000}
+    for unwanted in ("lengths", "end", "listed"):
+        data["spans"].pop(unwanted, None)
+    data["stagger"] = {"amplitude": [0.2, "m", "x"]}
+    answer = ask(lambda _: len(read(Table.from_dict(data)).sections[0].spans) - 10_000)
+    assert (answer.code, answer.seconds < 5 * ANSWER_SECONDS) == (0, True)
+    data["spans"]["droppers"] = {"first": [4.5, "m", "x"], "count": 1000}
+    with pytest.raises(DefinitionError, match="more than 100000 droppers"):
+        read(Table.from_dict(data))

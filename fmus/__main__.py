@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fmus import doctor
-from fmus.build import BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe
+from fmus.build import MAX_PORTS, BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe
 
 DEFAULT_FOLDER = Path("build/fmus")
 
@@ -19,12 +19,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code: int | None = options.run(options)
     except UnknownFmuError as error:
-        print(error, file=sys.stderr)
-        return 2
-    except (BuildError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
+        return _fail(str(error), 2)
+    except BuildError as error:
+        return _fail(str(error), 1)
+    except OSError as error:
+        return _fail(f"{error.filename or 'a file'}: {error.strerror or error}", 1)
+    except KeyboardInterrupt:
+        return _fail("interrupted", 1)
     return code or 0
+
+
+def _fail(text: str, code: int) -> int:
+    print(f"error: {text}", file=sys.stderr)
+    return code
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -48,10 +55,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} is not a number of pantographs")
-    return value
+    if not (text.isascii() and text.isdigit() and len(text) <= 2 and 1 <= int(text) <= MAX_PORTS):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of pantographs, 1 to {MAX_PORTS}")
+    return int(text)
 
 
 def _build(options: argparse.Namespace) -> None:

@@ -14,10 +14,10 @@ import math
 import sys
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
+from typing import Any, ClassVar, Generic, NoReturn, Protocol, TypeVar, cast
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -56,8 +56,13 @@ def hold(names: dict[str, Any]) -> None:
     Its loader runs the script once more for every instance and then releases the script's ``globals()``
     without having owned them; without this call the second instance in a process would crash. No container
     may hold that reference: it would give back, when Python ends, what the loader has taken away.
+
+    The loader also puts the script's folder in front of ``sys.path``, once for every instance. The script has imported
+    all that it ever will, so the folder goes again: a thousand instances would make every import of the host slow.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(names))
+    folder = str(Path(names["__file__"]).parent)
+    sys.path[:] = [place for place in sys.path if place != folder]
 
 
 class AdapterError(RuntimeError):
@@ -134,6 +139,16 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
     def _advance(self, part: PartT, inputs: FloatArray, step: float) -> None:
         """Let the part step from its time to its time plus ``step``."""
 
+    # What a subclass may say about its part; empty texts say nothing.
+
+    def _doubts(self, part: PartT, inputs: FloatArray) -> Iterable[str]:
+        """Return what deserves a second look in a part that has just been initialised."""
+        return ()
+
+    def _step_doubt(self, part: PartT, step: float) -> str:
+        """Return what is wrong with steps of a length that the part can make nevertheless."""
+        return ""
+
     # Life cycle, called by pythonfmu.
 
     def setup_experiment(
@@ -153,15 +168,19 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         self._initialise_if_changed()
         self._phase = _Phase.STEPPING
         self._stale_from = _NOTHING
+        if not self._failure:
+            self._look_at_start()
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Step the part; False (``fmi2Discard``) with the reason in the log if it cannot."""
         try:
             self._check_step(current_time, step_size)
+            if step_size > self._longest_step:
+                self._look_at_step(step_size)
             self._advance(self._part, self._checked_inputs(current_time), step_size)
             self._time = current_time + step_size
             self._read(self._output_places)
-            self._stale_from = self._table.local.start
+            self._stale_from = self._first_local
             self._check_outputs()
         except BaseException as error:
             self._break(error)
@@ -187,8 +206,9 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         if not vrs:
             return
         try:
-            inputs = self._table.inputs
-            if min(vrs) >= inputs.start and max(vrs) < inputs.stop:
+            if vrs == self._input_references:  # what most hosts do at every step
+                self._inputs[:] = values
+            elif min(vrs) >= self._first_input and max(vrs) < self._first_output:
                 self._values[vrs] = values
             else:
                 self._set_one_by_one(vrs, values)
@@ -276,11 +296,18 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         self._table = table = Table(self._definition.parameters(), self._make_ports(self._part))
         self._values = table.start_values()
         self._starts = self._values[table.parameters].copy()
-        self._output_places = table.places(table.outputs, table.ports.outputs)
-        self._local_places = table.places(table.local, table.ports.local)
-        self._calculated_places = table.places(table.calculated, table.ports.calculated)
+        self._first_input, self._first_output, self._first_local = (
+            kind.start for kind in (table.inputs, table.outputs, table.local)
+        )
+        self._input_references = list(range(self._first_input, self._first_output))
+        # Views: whoever writes to the values must write into the array, not replace it.
+        self._inputs, self._outputs = self._values[table.inputs], self._values[table.outputs]
+        self._output_places = self._places(table.outputs, table.ports.outputs)
+        self._local_places = self._places(table.local, table.ports.local)
+        self._calculated_places = self._places(table.calculated, table.ports.calculated)
         self._phase = _Phase.INSTANTIATED
         self._time = 0.0
+        self._longest_step = 0.0
         self._stale_from = _NOTHING
         self._part_parameters = self._starts.tobytes()
         self._is_built = False
@@ -331,13 +358,13 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
 
     def _checked_inputs(self, time: float) -> FloatArray:
         # A copy: a part may keep what it was given, to extrapolate from it.
-        inputs: FloatArray = self._values[self._table.inputs].copy()
-        if not np.isfinite(inputs).all():
+        inputs = self._inputs.copy()
+        if not _surely_finite(inputs):
             self._check_finite(self._table.inputs, time, "input", "the part that it comes from has failed")
         return inputs
 
     def _check_outputs(self) -> None:
-        if not np.isfinite(self._values[self._table.outputs]).all():
+        if not _surely_finite(self._outputs):
             why = "the model is unstable, try a shorter step"
             self._check_finite(self._table.outputs, self._time, "output", why)
 
@@ -348,7 +375,10 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
                 name = self._table.name(reference)
                 raise AdapterError(f"{kind} {name} is {value} at t = {time:.9g} s: {why}")
 
-    def _check_sizes(self, places: Sequence[tuple[slice, Port]]) -> None:
+    def _places(self, kind: slice, ports: Sequence[Port]) -> list[tuple[FloatArray, Port]]:
+        return [(self._values[place], port) for place, port in self._table.places(kind, ports)]
+
+    def _check_sizes(self, places: Sequence[tuple[FloatArray, Port]]) -> None:
         for _, port in places:
             count = np.size(port.read(self._part))
             if count != len(port.signals):
@@ -358,22 +388,26 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
                     "a change of how many there are needs another FMU, built from an edited definition"
                 )
 
-    def _read(self, places: Sequence[tuple[slice, Port]]) -> None:
+    def _read(self, places: Sequence[tuple[FloatArray, Port]]) -> None:
         for place, port in places:
-            self._values[place] = port.read(self._part).reshape(-1)
+            place[:] = port.read(self._part).reshape(-1)
 
     def _check_step(self, time: float, step: float) -> None:
+        is_ready = self._phase is _Phase.STEPPING and not (self._refused or self._broken)
+        if not (is_ready and 0.0 < step < math.inf and abs(time - self._time) <= _TIME_TOLERANCE * step):
+            self._refuse_step(time, step)
+
+    def _refuse_step(self, time: float, step: float) -> NoReturn:
         if self._failure:
             raise AdapterError(self._failure)
         if self._phase is not _Phase.STEPPING:
             raise AdapterError("a step was asked for before initialization mode ended")
         if not step > 0.0 or not math.isfinite(step):
             raise AdapterError(f"a step of {step:.9g} s at t = {time:.9g} s: it must be longer than 0")
-        if not abs(time - self._time) <= _TIME_TOLERANCE * step:
-            raise AdapterError(
-                f"a step from t = {time:.9g} s, but the model is at t = {self._time:.9g} s: "
-                "go on from there, or restore a state saved at the wanted time"
-            )
+        raise AdapterError(
+            f"a step from t = {time:.9g} s, but the model is at t = {self._time:.9g} s: "
+            "go on from there, or restore a state saved at the wanted time"
+        )
 
     def _set_one_by_one(self, references: Sequence[int], values: Sequence[float]) -> None:
         for reference, value in zip(references, values, strict=True):
@@ -397,6 +431,25 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         if references:
             text = f"the FMU has no {kind} variables (value reference {references[0]} asked for)"
             self._refuse(AdapterError(text))
+
+    # Warnings.
+
+    def _look_at_start(self) -> None:
+        try:
+            for text in self._doubts(self._part, self._inputs.copy()):
+                self._warn(text)
+        except BaseException as error:
+            self._break(error)
+
+    def _look_at_step(self, step: float) -> None:
+        """Warn of the first step that is too long, of that alone."""
+        text = self._step_doubt(self._part, step)
+        self._longest_step = math.inf if text else step
+        self._warn(text)
+
+    def _warn(self, text: str) -> None:
+        if text:
+            self.log(_clean(text), Fmi2Status.warning)
 
     # Saving and restoring.
 
@@ -482,6 +535,11 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         print(f"{who}: {text}", file=sys.stderr, flush=True)
         self._told = False
         return text
+
+
+def _surely_finite(values: FloatArray) -> bool:
+    """Return False if a value is not finite, or if they are too large to be added; cheap, and never warns."""
+    return math.isfinite(sum(values.tolist()))
 
 
 def _explain(error: BaseException) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from operator import attrgetter
 from pathlib import Path
 from typing import ClassVar
 
 from fmus.adapter import Adapter
-from fmus.ports import Port, Ports, Signal, vector
+from fmus.ports import Port, Ports, Signal, energy_ports, vector
+from models.catenary.limits import slack_warning, speed_warning, step_warning
 from models.catenary.parameters import CatenaryDefinition, load
 from models.catenary.part import CatenaryPart
 from models.part import FloatArray
@@ -52,7 +54,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         return Ports(
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
-            local=(_dropper_port(part),),
+            local=(_dropper_port(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
             calculated=(*_geometry_ports(part), *_section_ports(part), _wave_port()),
         )
 
@@ -61,6 +63,14 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
 
     def _advance(self, part: CatenaryPart, inputs: FloatArray, step: float) -> None:
         part.step(inputs.reshape(self.pantographs, 2, 2, 3), step)
+
+    def _doubts(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
+        along_track = inputs.reshape(self.pantographs, 2, 2, 3)[:, :, 1, 0]
+        yield slack_warning(part.droppers, part.model.static.dropper_force)
+        yield speed_warning(part.definition, float(abs(along_track).max()))
+
+    def _step_doubt(self, part: CatenaryPart, step: float) -> str:
+        return step_warning(part.definition, step)
 
 
 def _end(number: int, end: str) -> tuple[Signal, ...]:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,20 @@ _PLATFORMS: Final = {
     ("Darwin", "x86_64"): ("darwin64", ".dylib"),
 }
 _SECONDS: Final = 300
+#: Most that an FMU of ours may unpack to [bytes]; they take a few megabytes.
+_LARGEST: Final = 1024**3
+#: What reading something that is no FMU raises: zipfile documents only some of it.
+_UNREADABLE: Final = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    RuntimeError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+    ElementTree.ParseError,
+)
 _TRIAL: Final = """
 import sys
 folder, script, name = sys.argv[1:]
@@ -82,7 +97,7 @@ def examine(path: Path) -> list[Finding]:
     """Look at an FMU and at this machine; return all that was found."""
     try:
         package = read_package(path)
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, ElementTree.ParseError) as error:
+    except _UNREADABLE as error:
         return [Finding("missing", f"{path} is not an FMU of this kind ({error})")]
     python = ask()
     found = [*_platform(package), *_python(python)]
@@ -102,6 +117,8 @@ def read_package(path: Path) -> Package:
     """
     with zipfile.ZipFile(path) as file:
         names = frozenset(file.namelist())
+        if (size := sum(member.file_size for member in file.infolist())) > _LARGEST:
+            raise ValueError(f"it would unpack to {size} bytes, more than {_LARGEST}")
         root = ElementTree.fromstring(file.read("modelDescription.xml"))
         node = root.find("CoSimulation")
         if root.get("fmiVersion") != "2.0" or node is None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fmus.adapter import Adapter
-from fmus.ports import Port, Ports, Signal, vector
+from fmus.ports import Port, Ports, Signal, energy_ports, vector
 from models.pantograph.lumped import LumpedPantographPart
 from models.pantograph.parameters import LumpedDefinition, load_lumped
 from models.part import FloatArray
@@ -59,6 +59,7 @@ def pantograph_ports(part: Any) -> Ports:
             Port(tuple(s for end in "AB" for s in _end(end)), attrgetter("strip")),
             Port(tuple(Signal(*observed) for observed in part.observed), methodcaller("observation_values")),
         ),
+        local=energy_ports(["contact"]),
     )
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
 
+from models.energy import BALANCE
 from models.part import FloatArray, Parameter
 
 Causality = Literal["parameter", "input", "output", "local", "calculatedParameter"]
@@ -143,6 +145,16 @@ def vector(
         Signal(f"{prefix}{axis}", unit, f"{description}, {axis}", value)
         for axis, value in zip(AXES, starts, strict=True)
     )
+
+
+def energy_ports(contacts: Sequence[str]) -> tuple[Port, ...]:
+    """Return a part's energy balance and what is done at its contacts, which begin with these prefixes."""
+    unless = "0 unless monitor_energy is 1"
+    balance = tuple(Signal(f"energy.{name}", "J", f"{text}; {unless}") for name, text in BALANCE)
+    work = tuple(
+        Signal(f"{prefix}.work", "J", f"work of the strip against the contact force; {unless}") for prefix in contacts
+    )
+    return Port(balance, attrgetter("energy")), Port(work, attrgetter("contact_work"))
 
 
 def _signals(ports: Iterable[Port]) -> Iterable[Signal]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +20,7 @@ import numpy as np
 
 from master.algorithm import Algorithm, initialise
 from master.arrays import FloatArray
+from master.durable import write_whole
 from master.errors import MasterError, RunError, UsageError
 from master.network import Network
 from master.simulation import TimeGrid
@@ -65,6 +66,10 @@ class Checkpoint:
         What the coupling scheme remembers.
     scheme : str
         Name of the coupling scheme.
+    run : str
+        Identity of the run that it comes from.
+    observers : dict
+        What observers remember, by their names.
     """
 
     start: float
@@ -76,6 +81,8 @@ class Checkpoint:
     outputs: dict[str, float]
     memory: FloatArray
     scheme: str
+    run: str = ""
+    observers: dict[str, list[float | None]] = field(default_factory=dict)
 
     @property
     def time(self) -> float:
@@ -94,11 +101,14 @@ class Continuation:
         Where it was read.
     renewed : tuple of str
         Components that are not taken from it but start anew at its time.
+    is_same_run : bool
+        Whether it is the run that made the checkpoint that goes on, in its own folder, not a new one.
     """
 
     checkpoint: Checkpoint
     file: str
     renewed: tuple[str, ...] = ()
+    is_same_run: bool = False
 
     def grid(self, system: System) -> TimeGrid:
         """Return the communication points: those of the first run if the step is the same."""
@@ -121,10 +131,24 @@ class Continuation:
         for component in system.components:
             if component.name not in self.renewed:
                 found += _differences(component, self.checkpoint.components.get(component.name))
-        if system.stop <= self.checkpoint.time:
+        grid = self.grid(system)
+        if self.is_same_run:
+            found += self._changes(system)
+        # A run that was ended after its last step has its summary left to write.
+        if grid.count < grid.first or (grid.count == grid.first and not self.is_same_run):
             found.append(f"it was saved at {self.checkpoint.time:g} s, the run would end at {system.stop:g} s")
         if found:
             raise UsageError(f"{self.file} does not fit this run: " + "; ".join(found))
+
+    def _changes(self, system: System) -> list[str]:
+        c, scheme = self.checkpoint, system.settings.coupling.scheme
+        found = [f"a run that goes on in its own folder cannot renew '{name}'" for name in self.renewed]
+        if (system.start, system.step) != (c.start, c.step):
+            now = f"{system.step:g} s from {system.start:g} s on"
+            found.append(f"its step was {c.step:g} s from {c.start:g} s on, is {now}")
+        if scheme != c.scheme:
+            found.append(f"its scheme was {c.scheme}, is {scheme}")
+        return found
 
     def prepare(self, network: Network, algorithm: Algorithm, grid: TimeGrid) -> None:
         """Bring slaves, exchanged values and scheme to the checkpoint."""
@@ -151,32 +175,65 @@ class Continuation:
                 )
 
 
-@dataclass
-class CheckpointObserver:
-    """Observer that writes a checkpoint at a communication point.
+class Remembering(Protocol):
+    """An observer whose work has to go on where it was."""
+
+    name: str
+
+    def memory(self) -> list[float | None]:
+        """Return what it remembers from step to step."""
+
+    def recall(self, memory: Sequence[float | None]) -> None:
+        """Take such a memory back."""
+
+
+@dataclass(frozen=True)
+class Occasions:
+    """After how many macro steps checkpoints are written.
 
     Attributes
     ----------
-    path : Path
-        The file.
-    index : int
-        After how many macro steps.
+    once : int, optional
+        After so many.
+    every : int, optional
+        After every so many.
     """
 
-    system: System
-    algorithm: Algorithm
+    once: int | None = None
+    every: int | None = None
+
+    def __bool__(self) -> bool:
+        return self.once is not None or self.every is not None
+
+    def __contains__(self, index: int) -> bool:
+        return index == self.once or (self.every is not None and index % self.every == 0)
+
+
+@dataclass(frozen=True)
+class CheckpointObserver:
+    """Observer that writes checkpoints, each in the place of the one before.
+
+    Attributes
+    ----------
+    take : callable
+        index -> Checkpoint.
+    path : Path
+        The file.
+    occasions : Occasions
+        When.
+    """
+
+    take: Callable[[Network, int], Checkpoint]
     path: Path
-    index: int
-    written: bool = field(default=False, init=False)
+    occasions: Occasions
 
     def begin(self, time: float, network: Network) -> None:
         """Nothing to save yet."""
 
     def observe(self, index: int, time: float, network: Network) -> None:
-        """Write it if this is the step."""
-        if index == self.index:
-            write(self.path, take(self.system, network, self.algorithm, index))
-            self.written = True
+        """Write one if it is time."""
+        if index in self.occasions:
+            write(self.path, self.take(network, index))
 
     def finish(self) -> None:
         """Nothing to close."""
@@ -197,13 +254,36 @@ def index_at(system: System, time: float) -> int:
             f"--checkpoint {time:g}: not a communication point of the run, which goes from {system.start:g} s to "
             f"{system.stop:g} s in steps of {system.step:g} s"
         )
-    cannot = [c.name for c in system.components if not c.fmu.can_serialise]
-    if cannot:
-        raise UsageError(f"--checkpoint: the FMU of {', '.join(cannot)} cannot serialise its state")
+    _check_serialisable(system, "--checkpoint")
     return index
 
 
-def take(system: System, network: Network, algorithm: Algorithm, index: int) -> Checkpoint:
+def steps_between(system: System, period: float) -> int:
+    """Return the number of macro steps nearest to ``period`` [s], at least one.
+
+    Raises
+    ------
+    UsageError
+        If a component cannot be saved.
+    """
+    _check_serialisable(system, "--checkpoint-every")
+    return max(1, round(period / system.step))
+
+
+def _check_serialisable(system: System, option: str) -> None:
+    cannot = [c.name for c in system.components if not c.fmu.can_serialise]
+    if cannot:
+        raise UsageError(f"{option}: the FMU of {', '.join(cannot)} cannot serialise its state")
+
+
+def take(
+    system: System,
+    network: Network,
+    algorithm: Algorithm,
+    index: int,
+    observers: Sequence[Remembering] = (),
+    run: str = "",
+) -> Checkpoint:
     """Return the state of a system after ``index`` macro steps."""
     return Checkpoint(
         system.start,
@@ -215,18 +295,14 @@ def take(system: System, network: Network, algorithm: Algorithm, index: int) -> 
         dict(zip(network.output_names, network.outputs.tolist(), strict=True)),
         algorithm.memory(),
         algorithm.name,
+        run,
+        {observer.name: observer.memory() for observer in observers},
     )
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint; readers see the old file or the new one, never half of it."""
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_bytes(pack(checkpoint))
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise MasterError(f"{path} cannot be written ({error.strerror})") from error
+    write_whole(path, pack(checkpoint))
 
 
 def read(path: Path) -> Checkpoint:
@@ -257,6 +333,8 @@ def pack(checkpoint: Checkpoint) -> bytes:
         "outputs": list(c.outputs),
         "memory": len(c.memory),
         "states": {name: len(state) for name, state in c.states.items()},
+        "run": c.run,
+        "observers": c.observers,
     }
     text = json.dumps(header, allow_nan=False).encode()
     raw = numbers.astype("<f8").tobytes() + c.memory.astype("<f8").tobytes() + b"".join(c.states.values())
@@ -302,6 +380,8 @@ def _unpack_body(header: dict[str, Any], raw: bytes) -> Checkpoint:
         dict(zip(outputs, values[1], strict=True)),
         np.array(values[2]),
         header["scheme"],
+        header.get("run", ""),
+        header.get("observers", {}),
     )
 
 

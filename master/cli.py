@@ -10,19 +10,22 @@ import math
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
 
-from master import calibrate, checkpoint, export, report, results
+from master import calibrate, checkpoint, export, limits, report, results
+from master.caution import CautionObserver
 from master.checkpoint import Continuation
 from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
+from master.isolation import Isolation
 from master.progress import ProgressObserver
 from master.report import commands
 from master.results import Results
-from master.run import run
+from master.run import Manner, run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.ssp.annotation import SCHEMES, Calibration
 from master.ssp.archive import SSD_NAME, Package
@@ -35,6 +38,7 @@ from master.verify import command as verify_command
 
 VERBS: Final = ("run", "pack", "validate", "compare", "report", "calibrate", "verify", "study")
 _WIDTH: Final = 80
+_PLAIN: Final = Manner()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(console: Console, failure: object, code: int) -> int:
-    console.print(f"error: {failure}", style="red", markup=False, highlight=False)
+    console.print(f"error: {failure}", style="red", markup=False, highlight=False, emoji=False)
     return code
 
 
@@ -100,11 +104,32 @@ def _add_run(verbs: Any) -> None:
     parser.add_argument("--no-report", action="store_true", help="no plots, no report.html")
     parser.add_argument("--json", action="store_true", help="print summary.json instead of tables")
     parser.add_argument("--checkpoint", type=_number, metavar="T", help="write the whole state at time T to DIR")
-    parser.add_argument("--resume", type=Path, metavar="FILE", help="go on from a checkpoint instead of the start")
+    parser.add_argument(
+        "--checkpoint-every", type=_positive, metavar="T", help="write it after every T seconds of simulated time"
+    )
+    parser.add_argument(
+        "--resume",
+        type=Path,
+        metavar="DIR|FILE",
+        help="finish the run in results folder DIR from its last checkpoint; or begin a new run from checkpoint FILE",
+    )
     parser.add_argument(
         "--renew", action="append", default=[], metavar="COMPONENT", help="with --resume: this component starts anew"
     )
+    parser.add_argument("--energy", action="store_true", help="watch the energy balance, report its drift")
     parser.add_argument("--parquet", action="store_true", help="write the time series as Parquet too")
+    parser.add_argument("--isolate", action="store_true", help="each FMU in a process of its own: it may crash")
+    parser.add_argument(
+        "--step-timeout", type=_positive, metavar="S", help="with --isolate: a step of more than S seconds has failed"
+    )
+    parser.add_argument(
+        "--real-time",
+        type=_positive,
+        nargs="?",
+        const=1.0,
+        metavar="FACTOR",
+        help="keep to the wall clock, FACTOR simulated seconds a second (default 1)",
+    )
 
 
 def _add_overrides(parser: argparse.ArgumentParser) -> None:
@@ -136,8 +161,11 @@ def _add_calibrate(verbs: Any) -> None:
 
 
 def _number(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or "_" in text or not text.isascii():
         raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
     return value
 
@@ -160,30 +188,56 @@ def _overrides(options: argparse.Namespace) -> Overrides:
     return Overrides(options.stop, options.step, options.scheme, dict(options.set))
 
 
-def _tell(text: str) -> None:
-    Console(stderr=True).print(text, style="dim", markup=False, highlight=False)
+def _tell(text: str, console: Console | None = None) -> None:
+    (console or Console(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
 
 
 def _run(options: argparse.Namespace) -> int:
     tell = (lambda _: None) if options.quiet else _tell
-    with open_scenario(options.scenario, _overrides(options), tell, not options.no_build) as scenario:
-        folder = options.out or Path("results") / scenario.system.name
+    manner = _manner(options)
+    overrides = replace(_overrides(options), energy=options.energy)
+    with open_scenario(options.scenario, overrides, tell, not options.no_build) as scenario:
+        folder = _folder(options, scenario.system)
         _protect(folder, scenario.package)
         try:
-            done = _run_shown(scenario.system, folder, options.quiet, options.checkpoint, _continuation(options))
+            done = _run_shown(scenario.system, folder, options.quiet, manner)
         except RunError:
             if not options.no_report:
-                commands.report_what_there_is(folder)
+                _report_what_there_is(folder)
             raise
+    _tell_results(done, options)
+    return 0
+
+
+def _tell_results(done: Results, options: argparse.Namespace) -> None:
     if not options.no_report:
         report.write(done)
     if options.parquet:
-        export.write_parquet(folder)
+        export.write_parquet(done.folder)
     if options.json:
-        print((folder / results.SUMMARY).read_text(encoding="utf-8"), end="")
+        print((done.folder / results.SUMMARY).read_text(encoding="utf-8"), end="")
     elif not options.quiet:
         _show(done)
-    return 0
+
+
+def _report_what_there_is(folder: Path) -> None:
+    # Why the run stopped is what the user has to know, not that there is no room for its report either.
+    with suppress(OSError):
+        commands.report_what_there_is(folder)
+
+
+def _folder(options: argparse.Namespace, system: System) -> Path:
+    """Return where the results go: a run that is finished stays in its folder."""
+    out: Path = options.out or Path("results") / system.name
+    if options.resume is None or not options.resume.is_dir():
+        return out
+    resumed: Path = options.resume
+    if options.out is not None and out.resolve() != resumed.resolve():
+        raise UsageError(
+            f"--resume {resumed} finishes the run in that folder: leave --out away, or give the file "
+            f"{resumed / checkpoint.NAME} to begin a new run from it"
+        )
+    return resumed
 
 
 def _protect(folder: Path, package: Package) -> None:
@@ -193,26 +247,42 @@ def _protect(folder: Path, package: Package) -> None:
         )
 
 
+def _manner(options: argparse.Namespace) -> Manner:
+    if options.step_timeout is not None and not options.isolate:
+        raise UsageError(
+            "--step-timeout needs --isolate: only a process of its own can be ended when it does not return"
+        )
+    isolation = Isolation(options.step_timeout, options.real_time is not None) if options.isolate else None
+    every = options.checkpoint_every
+    return Manner(options.checkpoint, every, _continuation(options), isolation, options.real_time)
+
+
 def _continuation(options: argparse.Namespace) -> Continuation | None:
-    if options.resume is not None:
-        return Continuation(checkpoint.read(options.resume), str(options.resume), tuple(options.renew))
-    if options.renew:
-        raise UsageError("--renew says what a run does not take from its checkpoint; it needs --resume FILE")
-    return None
+    if options.resume is None:
+        if options.renew:
+            raise UsageError("--renew says what a run does not take from its checkpoint; it needs --resume FILE")
+        return None
+    is_same_run = options.resume.is_dir()
+    file = options.resume / checkpoint.NAME if is_same_run else options.resume
+    if is_same_run and not file.is_file():
+        raise UsageError(
+            f"{options.resume} holds no {checkpoint.NAME} to go on from: the run was started without "
+            "--checkpoint-every, or ended before the first one; run it again"
+        )
+    return Continuation(checkpoint.read(file), str(file), tuple(options.renew), is_same_run)
 
 
-def _run_shown(
-    system: System,
-    folder: Path,
-    quiet: bool,
-    save_at: float | None = None,
-    continuation: Continuation | None = None,
-) -> Results:
+def _run_shown(system: System, folder: Path, quiet: bool, manner: Manner = _PLAIN) -> Results:
     if quiet:
-        return run(system, folder, (), save_at, continuation)
-    progress = ProgressObserver(Console(stderr=True), system.start, system.stop)
+        return run(system, folder, (), manner)
+    console = Console(stderr=True)  # that of the progress bar, which then stays below
+    cautions = CautionObserver(lambda caution: _tell(str(caution), console))
+    if manner.real_time is not None:  # drawing takes more time than a step has
+        _tell(f"running for {(system.stop - system.start) / manner.real_time:g} s by the wall clock")
+        return run(system, folder, [cautions], manner)
+    progress = ProgressObserver(console, system.start, system.stop)
     try:
-        return run(system, folder, [progress], save_at, continuation)
+        return run(system, folder, [cautions, progress], manner)
     finally:
         progress.finish()
 
@@ -246,7 +316,30 @@ def _closing_lines(done: Results) -> list[str]:
         f"contact {p['contact']}: coupling added {p['energy']:.3g} J of {p['transferred']:.4g} J exchanged"
         for p in done.summary["interface_power"]
     ]
-    return [*lines, f"results in {done.folder}"]
+    lines += _energy_lines(done.summary["energy"])
+    return [*lines, *_punctuality_lines(performance.get("real_time")), f"results in {done.folder}"]
+
+
+def _energy_lines(found: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the drifts of the energy balances in one line, and a warning for each that is too large."""
+    drifts = ", ".join(f"{b['what']} {b['share']:.1g} of {b['passed']:.4g} J" for b in found)
+    beyond = [b for b in found if b["exceeded"] is not None]
+    warnings = [f"warning: the energy of {b['what']} does not balance: {b['text']}" for b in beyond]
+    return [f"energy drift: {drifts}", *warnings] if found else []
+
+
+def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
+    """Return how a run kept up with the wall clock, in words."""
+    if found is None:
+        return []
+    jitter, late = found["start_jitter"], found["lateness"]
+    return [
+        f"real time x {found['factor']:g}: {found['missed']} of {found['steps']} deadlines missed "
+        f"({100.0 * found['missed_share']:.3g} %), results late by up to {1e3 * late['maximum']:.3g} ms; "
+        f"steps took {1e3 * found['mean_step']:.3g} ms, the longest {1e3 * found['longest_step']:.3g} ms",
+        f"steps began late by {1e3 * jitter['mean']:.3g} ms on average, {1e3 * jitter['percentile_99']:.3g} ms at "
+        f"99 %, {1e3 * jitter['maximum']:.3g} ms at most",
+    ]
 
 
 def _validate(options: argparse.Namespace) -> int:
@@ -254,6 +347,8 @@ def _validate(options: argparse.Namespace) -> int:
         system = scenario.system
         counts = f"{len(system.components)} components, {len(system.connections)} connections"
         times = f"{system.start:g} s to {system.stop:g} s in steps of {system.step:g} s"
+        for text in limits.warnings(system):
+            _tell(f"warning: {text}")
         print(f"{system.name}: valid; {counts}, {times}, {system.settings.coupling.scheme}")
     return 0
 

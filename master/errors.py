@@ -4,6 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
+
+#: Longest value or text that is told in full [characters], and most problems that are told at once.
+_LONGEST: Final = 400
+_MOST: Final = 100
+
+
+def one_line(text: str) -> str:
+    r"""Return text on one line, without control characters, its middle left out if it is very long.
+
+    What a file or a command line holds may be megabytes long, or made to confuse a terminal.
+
+    Examples
+    --------
+    >>> print(one_line("soon\n\x1b[2J"))
+    soon\n\x1b[2J
+    """
+    if len(text) > _LONGEST:
+        half = _LONGEST // 2
+        text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 @dataclass(frozen=True)
@@ -28,8 +49,9 @@ class Problem:
     text: str
 
     def __str__(self) -> str:
-        where = f"{self.file}:{self.line}" if self.line else self.file
-        return f"{where}: {self.text} [{self.rule}]"
+        file = one_line(self.file)
+        where = f"{file}:{self.line}" if self.line else file
+        return f"{where}: {one_line(self.text)} [{self.rule}]"
 
 
 class MasterError(Exception):
@@ -41,7 +63,10 @@ class ScenarioError(MasterError):
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(p) for p in self.problems))
+        lines = [str(p) for p in self.problems[:_MOST]]
+        if len(self.problems) > _MOST:
+            lines.append(f"... and {len(self.problems) - _MOST} more problems")
+        super().__init__("\n".join(lines))
 
 
 class SlaveError(MasterError):

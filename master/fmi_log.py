@@ -19,13 +19,17 @@ from fmpy.logging import addLoggerProxy
 #: Messages kept per instance.
 _KEPT: Final = 20
 
-_messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=_KEPT))
+#: FMI status of a warning.
+_WARNING: Final = 1
+
+#: Status and text, by instance.
+_messages: defaultdict[str, deque[tuple[int, str]]] = defaultdict(lambda: deque(maxlen=_KEPT))
 
 
 def _log(_environment: Any, instance: bytes, status: int, _category: bytes, message: bytes) -> None:
     if status > 0:
         text = " ".join(message.decode("utf-8", "replace").split())
-        _messages[(instance or b"").decode("utf-8", "replace")].append(text)
+        _messages[(instance or b"").decode("utf-8", "replace")].append((status, text))
 
 
 def _callbacks() -> Any:
@@ -48,6 +52,12 @@ def clear(instance: str) -> None:
 
 
 def last_words(instance: str) -> str:
-    """Return the last message of an instance, empty if it said nothing."""
-    said = _messages.get(instance)
-    return said[-1] if said else ""
+    """Return the last error message of an instance, its last warning if there is none, empty if it said nothing."""
+    said = _messages.get(instance, ())
+    errors = [text for status, text in said if status > _WARNING]
+    return [*(text for _, text in said), *errors][-1] if said else ""
+
+
+def warnings(instance: str) -> tuple[str, ...]:
+    """Return the warnings of an instance, each once."""
+    return tuple(dict.fromkeys(text for status, text in _messages.get(instance, ()) if status == _WARNING))

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import hashlib
+import math
+import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import fmpy
 
+from master.ssp.archive import read_member
+from master.ssp.xml import XmlError, safe_root
 from master.system import Fmu, Variable
+
+_DESCRIPTION: Final = "modelDescription.xml"
+#: What FMPy raises without words of its own where it misses something.
+_UNWORDED: Final = (TypeError, AttributeError, LookupError, AssertionError)
+#: FMI 2.0 wants a C identifier; a path would lead out of the FMU.
+_IDENTIFIER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def read_fmu(path: Path) -> Fmu:
@@ -20,23 +31,50 @@ def read_fmu(path: Path) -> Fmu:
         With the reason, if it is not one.
     """
     try:
+        _check_variables(safe_root(read_member(path, _DESCRIPTION)))
+    except XmlError as error:
+        raise ValueError(f"is not a readable FMU ({_DESCRIPTION}:{error.line}: {error})") from error
+    except ValueError as error:
+        raise ValueError(f"is not a readable FMU ({error})") from error
+    try:
         description = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:  # FMPy raises bare exceptions of many kinds
-        raise ValueError(f"is not a readable FMU ({error})") from error
+        why = "it lacks what FMI 2.0 demands" if isinstance(error, _UNWORDED) else error
+        raise ValueError(f"is not a readable FMU ({_DESCRIPTION}: {why})") from error
     if description.fmiVersion != "2.0":
         raise ValueError(f"is an FMI {description.fmiVersion} FMU; FMI 2.0 is needed")
     if description.coSimulation is None:
         raise ValueError("has no co-simulation interface")
+    identifier = description.coSimulation.modelIdentifier
+    if not _IDENTIFIER.fullmatch(identifier or ""):
+        raise ValueError(f"has the modelIdentifier '{identifier}', which cannot be the name of a library")
     return Fmu(
         path=path,
-        guid=description.guid,
-        identifier=description.coSimulation.modelIdentifier,
-        variables={v.name: _variable(v) for v in description.modelVariables},
+        guid=description.guid or "",
+        identifier=identifier,
+        variables=_variables(description.modelVariables),
         can_restore=bool(description.coSimulation.canGetAndSetFMUstate),
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         tool=description.generationTool or "",
         can_serialise=bool(description.coSimulation.canSerializeFMUstate),
     )
+
+
+def _check_variables(root: Any) -> None:
+    for node in root.iter("ScalarVariable"):
+        reference = node.get("valueReference", "")
+        if not (node.get("name") and reference.isascii() and reference.isdigit() and int(reference[:11]) < 2**32):
+            text = f"a variable name='{node.get('name', '')}' with valueReference='{reference}' cannot be addressed"
+            raise XmlError(int(node.sourceline or 0), text)
+
+
+def _variables(declared: Sequence[Any]) -> dict[str, Variable]:
+    found: dict[str, Variable] = {}
+    for v in declared:
+        if v.name in found:
+            raise ValueError(f"declares the variable '{v.name}' twice")
+        found[v.name] = _variable(v)
+    return found
 
 
 def _variable(v: Any) -> Variable:
@@ -49,11 +87,20 @@ def _variable(v: Any) -> Variable:
         variability=v.variability or "continuous",
         unit=unit,
         start=v.start,
-        minimum=_number(v.min),
-        maximum=_number(v.max),
+        minimum=_limit(v, "min"),
+        maximum=_limit(v, "max"),
         description=v.description or "",
     )
 
 
-def _number(text: Any) -> float | None:
-    return None if text is None else float(text)
+def _limit(v: Any, name: str) -> float | None:
+    text = getattr(v, name)
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if math.isnan(value):
+        raise ValueError(f"declares {name}='{text}' for the variable '{v.name}', which is not a number")
+    return value

@@ -7,26 +7,54 @@ price of an exchange is that of the FMI call itself.
 from __future__ import annotations
 
 import ctypes
-import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from ctypes import byref, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
 from time import perf_counter
-from typing import Any, Final
+from typing import Any, Final, Protocol, runtime_checkable
 
-import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
 from master import fmi_log
 from master.arrays import FloatArray
-from master.errors import SlaveError
+from master.errors import SlaveError, one_line
 from master.ssp.ssv import Value
 from master.system import Component, Variable
+from master.unpacked import Unpacked
 
 _STATUS: Final = ("ok", "warning", "discard", "error", "fatal", "pending")
 _WARNING: Final = 1
 _FATAL: Final = 4
+
+
+class Readable(Protocol):
+    """Variables that are read together into an array."""
+
+    values: FloatArray
+
+    def read(self) -> None:
+        """Fill `values`."""
+
+
+@runtime_checkable
+class Recordable(Protocol):
+    """A slave with variables beside those that are exchanged."""
+
+    name: str
+    stepping_time: float
+
+    def group(self, names: Sequence[str]) -> Readable:
+        """Return a group for further variables."""
+
+
+@runtime_checkable
+class Cautious(Protocol):
+    """A slave that may warn."""
+
+    name: str
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return its warnings so far, each once and on one line."""
 
 
 class Group:
@@ -91,7 +119,6 @@ class Instance:
         self.stepping_time = 0.0
         self._dead = False
         fmi_log.clear(self.name)
-        self._folder = tempfile.mkdtemp(prefix="fmu-")
         self._fmu = self._load()
         self.handle = self._fmu.component
         self._do_step: Callable[..., int] = self.function("fmi2DoStep")
@@ -177,13 +204,18 @@ class Instance:
         """Return the FMU's last warning or error message."""
         return fmi_log.last_words(self.name)
 
+    def warnings(self) -> tuple[str, ...]:
+        """Return the FMU's warnings so far, each once and on one line."""
+        return tuple(one_line(text) for text in fmi_log.warnings(self.name))
+
     def close(self) -> None:
         """Terminate and free the instance and its files; an FMU that died is only forgotten."""
         if not self._dead:
             self._dead = True
             self.function("fmi2Terminate")(self.handle)
             self._fmu.freeInstance()
-        shutil.rmtree(self._folder, ignore_errors=True)
+            self._unpacked.release()
+        self._unpacked.remove()
 
     def error(self, doing: str, status: int) -> SlaveError:
         """Return the error for a failed call, in the FMU's own words if it said any."""
@@ -213,17 +245,23 @@ class Instance:
     def _load(self) -> Any:
         fmu = self.component.fmu
         try:
-            fmpy.extract(str(fmu.path), unzipdir=self._folder)
+            self._unpacked = unpacked = Unpacked(fmu)
+        except Exception as error:
+            raise self._unloadable(error) from error
+        try:
             slave = FMU2Slave(
                 instanceName=self.name,
                 guid=fmu.guid,
                 modelIdentifier=fmu.identifier,
-                unzipDirectory=self._folder,
+                unzipDirectory=unpacked.folder,
             )
             slave.instantiate(callbacks=fmi_log.CALLBACKS, loggingOn=True)
         except Exception as error:  # FMPy raises bare exceptions
-            shutil.rmtree(self._folder, ignore_errors=True)
-            said = fmi_log.last_words(self.name)
-            reason = f"{error}" + (f": {said}" if said else "")
-            raise SlaveError(f"component '{self.name}': {fmu.path.name} cannot be loaded ({reason})") from error
+            unpacked.remove()
+            raise self._unloadable(error) from error
         return slave
+
+    def _unloadable(self, error: Exception) -> SlaveError:
+        said = fmi_log.last_words(self.name)
+        reason = f"{error}" + (f": {said}" if said else "")
+        return SlaveError(f"component '{self.name}': {self.component.fmu.path.name} cannot be loaded ({reason})")

@@ -9,10 +9,10 @@ step do better than this says: it is judged by the values at the communication p
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
+from typing import TypeVar
 
 from master.arrays import FloatArray
 from master.contacts import Contact
@@ -41,23 +41,36 @@ class InterfacePower:
     rms: float
 
 
+#: Floats, or arrays of samples.
+_Values = TypeVar("_Values", float, FloatArray)
+
+
 def power_residual(
-    force_given: FloatArray, force_told: FloatArray, velocity_given: FloatArray, velocity_told: FloatArray
-) -> FloatArray:
-    """Return the power that the coupling adds [W], shape (n,).
+    force_given: _Values, force_told: _Values, velocity_given: _Values, velocity_told: _Values
+) -> _Values:
+    """Return the power that the coupling adds [W].
 
     Parameters
     ----------
-    force_given, force_told : ndarray, shape (n,)
+    force_given, force_told : float, or ndarray, shape (n,)
         Contact force that the catenary computed and that the pantograph used [N].
-    velocity_given, velocity_told : ndarray, shape (n,)
+    velocity_given, velocity_told : float, or ndarray, shape (n,)
         Upward strip velocity that the pantograph computed and that the catenary used [m/s].
     """
     return force_given * velocity_told - force_told * velocity_given
 
 
+@dataclass(frozen=True)
+class _Port:
+    """Places of a contact's force and of the velocities of the strip's ends among the outputs and the inputs."""
+
+    contact: int
+    given: tuple[int, int, int]
+    told: tuple[int, int, int]
+
+
 class PowerObserver:
-    """Observer that collects what is given and told at each contact.
+    """Observer that sums up what is given and told at each contact.
 
     Parameters
     ----------
@@ -65,50 +78,62 @@ class PowerObserver:
         Contacts; those whose strip velocity is not exchanged are left out.
     network : Network
         The network that will be run.
-    rows : int
-        Steps to expect.
     """
 
-    def __init__(self, contacts: Sequence[Contact], network: Network, rows: int) -> None:
-        self._outputs = {n: i for i, n in enumerate(network.output_names)}
-        self._inputs = {n: i for i, n in enumerate(network.input_names)}
-        self._contacts = [c for c in contacts if self._names(c) is not None]
-        places = [p for c in self._contacts if (p := self._names(c)) is not None]
-        self._given = np.array([i for given, _ in places for i in given], dtype=np.intp)
-        self._told = np.array([i for _, told in places for i in told], dtype=np.intp)
-        self._table: FloatArray = np.zeros((rows, 2, len(self._given)))
+    name = "interface power"
+
+    def __init__(self, contacts: Sequence[Contact], network: Network) -> None:
+        outputs = {n: i for i, n in enumerate(network.output_names)}
+        inputs = {n: i for i, n in enumerate(network.input_names)}
+        self._ports = [p for c in contacts if (p := _port(c, outputs, inputs)) is not None]
+        # For each contact: sum of the residual, of the passed power, of the residual's square; and the steps.
+        self._sums = [[0.0, 0.0, 0.0] for _ in self._ports]
         self._count = 0
 
     def begin(self, time: float, network: Network) -> None:
         """Nothing has passed yet."""
 
     def observe(self, index: int, time: float, network: Network) -> None:
-        """Keep the exchanged values of a step."""
-        row = self._table[self._count]
-        np.take(network.outputs, self._given, out=row[0], mode="clip")
-        np.take(network.inputs, self._told, out=row[1], mode="clip")
+        """Add the exchanged values of a step."""
+        given, told = network.outputs.item, network.inputs.item
+        for port, sums in zip(self._ports, self._sums, strict=True):
+            # The strip's middle stands for the point of contact.
+            (f, a, b), (f_told, a_told, b_told) = port.given, port.told
+            force, velocity = given(f), 0.5 * (given(a) + given(b))
+            residual = power_residual(force, told(f_told), velocity, 0.5 * (told(a_told) + told(b_told)))
+            sums[0] += residual
+            sums[1] += abs(force * velocity)
+            sums[2] += residual * residual
         self._count += 1
 
     def finish(self) -> None:
         """Nothing to close."""
 
+    def memory(self) -> list[float | None]:
+        """Return the sums, from which another observer of the same contacts goes on."""
+        return [float(self._count), *(value for sums in self._sums for value in sums)]
+
+    def recall(self, memory: Sequence[float | None]) -> None:
+        """Go on from the sums of another observer."""
+        count, *values = (value or 0.0 for value in memory)
+        self._count = round(count)
+        self._sums = [values[i : i + 3] for i in range(0, len(values), 3)]
+
     def summary(self, step: float) -> tuple[InterfacePower, ...]:
         """Return the residuals of all contacts."""
-        done = self._table[: self._count].reshape(self._count, 2, len(self._contacts), 3)
-        return tuple(self._summarise(c.index, done[:, :, i], step) for i, c in enumerate(self._contacts))
+        steps = max(self._count, 1)
+        return tuple(
+            InterfacePower(port.contact, residual * step, passed * step, math.sqrt(square / steps))
+            for port, (residual, passed, square) in zip(self._ports, self._sums, strict=True)
+        )
 
-    def _summarise(self, index: int, rows: FloatArray, step: float) -> InterfacePower:
-        given, told = rows[:, 0], rows[:, 1]
-        # force and the velocities of both ends; the strip's middle stands for the point of contact
-        residual = power_residual(given[:, 0], told[:, 0], given[:, 1:].mean(axis=1), told[:, 1:].mean(axis=1))
-        passed = np.abs(given[:, 0] * given[:, 1:].mean(axis=1))
-        rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
-        return InterfacePower(index, float(residual.sum() * step), float(passed.sum() * step), rms)
 
-    def _names(self, contact: Contact) -> tuple[list[int], list[int]] | None:
-        port = contact.prefix.removesuffix(".contact")
-        given = [contact.force, contact.end("A", "vz"), contact.end("B", "vz")]
-        told = [contact.force_input, f"{port}.A.vz", f"{port}.B.vz"]
-        if any(n not in self._outputs for n in given) or any(n not in self._inputs for n in told):
-            return None
-        return [self._outputs[n] for n in given], [self._inputs[n] for n in told]
+def _port(contact: Contact, outputs: dict[str, int], inputs: dict[str, int]) -> _Port | None:
+    port = contact.prefix.removesuffix(".contact")
+    given = (contact.force, contact.end("A", "vz"), contact.end("B", "vz"))
+    told = (contact.force_input, f"{port}.A.vz", f"{port}.B.vz")
+    if any(n not in outputs for n in given) or any(n not in inputs for n in told):
+        return None
+    f, a, b = (outputs[n] for n in given)
+    f_told, a_told, b_told = (inputs[n] for n in told)
+    return _Port(contact.index, (f, a, b), (f_told, a_told, b_told))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -55,10 +55,18 @@ class Uplift:
 
 
 class GeometryObserver:
-    """Observer that reads all Real calculated parameters once, when they are known."""
+    """Observer that reads all Real calculated parameters once, when they are known.
 
-    def __init__(self, system: System) -> None:
+    Parameters
+    ----------
+    system : System
+    tell : callable
+        Is given them.
+    """
+
+    def __init__(self, system: System, tell: Callable[[Geometry], None] = lambda _: None) -> None:
         self._system = system
+        self._tell = tell
         self.geometry: Geometry = {}
 
     def begin(self, time: float, network: Network) -> None:
@@ -71,6 +79,7 @@ class GeometryObserver:
                 values = group(names)
                 values.read()
                 self.geometry[component.name] = dict(zip(names, values.values.tolist(), strict=True))
+        self._tell(self.geometry)
 
     def observe(self, index: int, time: float, network: Network) -> None:
         """Nothing changes."""

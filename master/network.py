@@ -75,6 +75,8 @@ class Network:
         What the slaves last said.
     input_names, output_names : tuple of str
         ``component.variable`` for each entry.
+    is_plain : bool
+        Whether no wire converts what passes through it.
     """
 
     def __init__(self, slaves: Sequence[Slave], connections: Sequence[Connection]) -> None:
@@ -88,14 +90,19 @@ class Network:
         self._from: IntArray = np.zeros(len(self.inputs), dtype=np.intp)
         self._wire(connections)
         self._slices = self._bind()
-        self._plain = bool(np.all(self._factor == 1.0) and np.all(self._offset == 0.0))
+        self.is_plain = bool(np.all(self._factor == 1.0) and np.all(self._offset == 0.0))
 
     def gather(self, outputs: FloatArray | None = None) -> None:
         """Set all inputs from ``outputs`` (default: the current ones)."""
         np.take(self.outputs if outputs is None else outputs, self._from, out=self.inputs, mode="clip")
-        if not self._plain:
+        if not self.is_plain:
             self.inputs *= self._factor
             self.inputs += self._offset
+
+    def converted(self, outputs: FloatArray) -> FloatArray:
+        """Return what the inputs would be told if the outputs were these, shape (n_inputs,)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # who asks looks whether it is finite
+            return np.take(outputs, self._from) * self._factor + self._offset
 
     def gather_for(self, index: int) -> None:
         """Set the inputs of one slave from the current outputs."""

@@ -27,6 +27,8 @@ _PADDING: Final = 2.0
 FILTER_REACH: Final = 2.0 / CUTOFF
 #: Half the width of the filter's edge [Hz].
 _HALF_EDGE: Final = 0.25
+#: A position this near to a bound of the interval is on it [m].
+_ON_BOUND: Final = 1e-6
 
 FILTER_NOTE: Final = (
     "zero-phase low-pass 0-20 Hz by discrete Fourier transform (raised-cosine edge 19.75-20.25 Hz, "
@@ -153,12 +155,16 @@ def band_pass(signal: FloatArray, step: float, low: float, high: float) -> Float
 
 
 def interval_mask(position: FloatArray, start: float | None, end: float | None) -> BoolArray:
-    """Return which samples lie in the interval of interest, ends included, shape (n,)."""
+    """Return which samples lie in the interval of interest, shape (n,).
+
+    Its end belongs to it, its beginning does not, so that samples stand for steps and intervals side by side share
+    none. A sample on a bound is told by less than recorded digits, so it counts as on the bound within a micrometre.
+    """
     inside = np.ones(len(position), dtype=np.bool_)
     if start is not None:
-        inside &= position >= start
+        inside &= position > start + _ON_BOUND
     if end is not None:
-        inside &= position <= end
+        inside &= position <= end + _ON_BOUND
     return inside
 
 

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import csv
+import io
+import itertools
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TextIO
+from typing import Final
 
 import numpy as np
 
 from master.arrays import FloatArray
+from master.durable import LineFile
 from master.errors import MasterError
 from master.network import Network
+from master.pattern import matcher
 
-#: Rows kept back before they are written.
+#: Rows kept back before they are written, and the simulated time that they may span [s].
 ROWS_PER_FLUSH: Final = 250
+LONGEST_UNWRITTEN: Final = 1.0
 NUMBER_FORMAT: Final = "%.10g"
 _HEADER: Final = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
 
@@ -58,18 +64,6 @@ class Recording:
 EMPTY: Final = Recording(np.zeros(0), (), (), np.zeros((0, 0)))
 
 
-def matcher(pattern: str) -> Callable[[str], bool]:
-    """Return a test for names; ``*`` stands for anything, brackets for themselves.
-
-    Examples
-    --------
-    >>> matcher("*.dropper[*].force")("catenary.dropper[12].force")
-    True
-    """
-    compiled = re.compile("".join(".*" if part == "*" else re.escape(part) for part in re.split(r"(\*)", pattern)))
-    return lambda name: compiled.fullmatch(name) is not None
-
-
 def header(names: Sequence[str], units: Sequence[str]) -> list[str]:
     """Return column titles: ``time [s]``, then ``name [unit]``."""
     titles = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
@@ -86,7 +80,10 @@ class Source:
 
 
 class Recorder:
-    """Observer that records sources every ``every``-th step, in memory and in a CSV file.
+    """Observer that records sources every ``every``-th step in a CSV file, row by row as the run goes on.
+
+    A row is written at the latest when `ROWS_PER_FLUSH` are waiting, or when waiting for the next one would leave more
+    than `LONGEST_UNWRITTEN` of simulated time unwritten, so that a process that is killed loses no more than that.
 
     Parameters
     ----------
@@ -96,31 +93,48 @@ class Recorder:
         Groups of variables.
     units : mapping
         Unit by name.
-    rows : int
-        Rows to expect (a bound).
     every : int
         Steps between rows.
+    keep : int, optional
+        Rows of a file that is there already to keep and to go on after, which makes the first of them the start.
+    is_steady : bool
+        Whether every row costs the same; otherwise many are made into text at once, which costs less in all.
+
+    Raises
+    ------
+    MasterError
+        If the file cannot be written, or what is to be kept is not there.
     """
 
     def __init__(
-        self, path: Path, sources: Sequence[Source], units: Mapping[str, str], rows: int, every: int = 1
+        self,
+        path: Path,
+        sources: Sequence[Source],
+        units: Mapping[str, str],
+        every: int = 1,
+        keep: int = 0,
+        is_steady: bool = False,
     ) -> None:
         self.names = tuple(n for s in sources for n in s.names)
         self.units = tuple(units.get(n, "") for n in self.names)
         self._sources = tuple(sources)
         self._every = every
-        self._table: FloatArray = np.zeros((rows, 1 + len(self.names)))
-        self._columns = self._make_columns()
-        self._count = 0
-        self._written = 0
-        self._format = ",".join([NUMBER_FORMAT] * self._table.shape[1]) + "\n"
-        self._file: TextIO = path.open("w", encoding="utf-8", newline="")
-        csv.writer(self._file, lineterminator="\n").writerow(header(self.names, self.units))
-        self._file.flush()
+        self._format = ",".join([NUMBER_FORMAT] * (len(self.names) + 1)) + "\n"
+        self._is_steady = is_steady
+        self._waiting: list[list[float]] = []
+        self._lines: list[str] = []
+        self._count = 0  # rows not written yet, as numbers or as lines
+        self._oldest = self._latest = -math.inf
+        self._goes_on = keep > 0
+        titles = _title_line(self.names, self.units)
+        self._file = LineFile(path, _end_of_rows(path, titles, keep) if keep else 0)
+        if not keep:
+            self._file.write(titles)
 
     def begin(self, time: float, network: Network) -> None:
-        """Record the start."""
-        self._record(time)
+        """Record the start, unless it is the last row of a file that is gone on with."""
+        if not self._goes_on:
+            self._record(time)
 
     def observe(self, index: int, time: float, network: Network) -> None:
         """Record the end of a step, if one is due."""
@@ -129,38 +143,68 @@ class Recorder:
 
     def finish(self) -> None:
         """Write what is left and close the file."""
-        if not self._file.closed:
-            self._flush()
-            self._file.close()
+        if self._file.is_open:
+            try:
+                self._write()
+            finally:
+                self._file.close()
+
+    def sync(self) -> None:
+        """Write what is waiting and wait until it is on the disk."""
+        self._write()
+        self._file.sync()
 
     @property
     def recording(self) -> Recording:
-        """What was recorded so far."""
-        done = self._table[: self._count]
-        return Recording(done[:, 0], self.names, self.units, done[:, 1:])
-
-    def _make_columns(self) -> list[tuple[Source, slice]]:
-        columns, first = [], 1
-        for source in self._sources:
-            columns.append((source, slice(first, first + len(source.names))))
-            first += len(source.names)
-        return columns
+        """What is in the file."""
+        return load(self._file.path)
 
     def _record(self, time: float) -> None:
-        row = self._table[self._count]
-        row[0] = time
-        for source, part in self._columns:
+        values = [time]
+        for source in self._sources:
             source.read()
-            row[part] = source.values
+            values += source.values.tolist()
+        if self._count == 0:
+            self._oldest = time
         self._count += 1
-        if self._count - self._written >= ROWS_PER_FLUSH:
-            self._flush()
+        self._waiting.append(values)
+        if self._is_steady:
+            self._format_rows()
+        spacing, self._latest = time - self._latest, time
+        if self._count >= ROWS_PER_FLUSH or time + spacing > self._oldest + LONGEST_UNWRITTEN:
+            self._write()
 
-    def _flush(self) -> None:
-        rows = self._table[self._written : self._count]
-        self._file.writelines(self._format % tuple(row) for row in rows.tolist())
-        self._file.flush()
-        self._written = self._count
+    def _format_rows(self) -> None:
+        self._lines += [self._format % tuple(row) for row in self._waiting]
+        self._waiting.clear()
+
+    def _write(self) -> None:
+        self._format_rows()
+        lines, self._count = "".join(self._lines), 0
+        self._lines.clear()  # before writing: what cannot be written now is not tried again
+        if lines:
+            self._file.write(lines)
+
+
+def _title_line(names: Sequence[str], units: Sequence[str]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(header(names, units))
+    return text.getvalue()
+
+
+def _end_of_rows(path: Path, titles: str, rows: int) -> int:
+    """Return how long a recording with these titles is up to and with its row number ``rows`` [bytes]."""
+    try:
+        with path.open("rb") as file:
+            same = file.readline() == titles.encode()
+            sizes = [len(line) for line in itertools.islice(file, rows) if line.endswith(b"\n")]
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror})") from error
+    if not same:
+        raise MasterError(f"{path} holds other variables than this run records: it cannot be gone on with")
+    if len(sizes) < rows:
+        raise MasterError(f"{path} has {len(sizes)} rows, the run that is to go on had made {rows}: some are lost")
+    return len(titles.encode()) + sum(sizes)
 
 
 def load(path: Path) -> Recording:
@@ -175,19 +219,25 @@ def load(path: Path) -> Recording:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise MasterError(f"{path} cannot be read ({error})") from error
-    lines = text[: text.rfind("\n") + 1].splitlines()
-    titles = next(csv.reader(lines[:1]), [])
+    first, _, rest = text[: text.rfind("\n") + 1].partition("\n")
+    titles = next(csv.reader([first]), [])
     if titles[:1] != ["time [s]"]:
         raise MasterError(f"{path} is not a recording: its first column is not 'time [s]'")
-    return _table(path, titles[1:], [line.split(",") for line in lines[1:]])
+    return _table(path, titles[1:], rest)
 
 
-def _table(path: Path, titles: Sequence[str], rows: Sequence[Sequence[str]]) -> Recording:
+def _table(path: Path, titles: Sequence[str], rows: str) -> Recording:
+    columns = len(titles) + 1
     try:
-        table = np.array(rows, dtype=np.float64).reshape(len(rows), len(titles) + 1)
+        table = np.loadtxt(io.StringIO(rows), delimiter=",", ndmin=2, comments=None) if rows else np.zeros((0, columns))
     except ValueError as error:
         raise MasterError(f"{path} is not a recording: {error}") from error
+    if table.shape[1] != columns:
+        raise MasterError(f"{path} is not a recording: {columns} titles, but {table.shape[1]} columns")
+    time = table[:, 0]
+    if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+        raise MasterError(f"{path} is not a recording: its times are not finite, or do not increase from row to row")
     parts = [m for t in titles if (m := _HEADER.fullmatch(t))]
     names = tuple(m["name"] for m in parts)
     units = tuple(m["unit"] or "" for m in parts)
-    return Recording(table[:, 0], names, units, table[:, 1:])
+    return Recording(time, names, units, table[:, 1:])

@@ -15,8 +15,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from master import stored
+from master.checkpoint import NAME as CHECKPOINT
 from master.contacts import Contact, lateral_position, track_position
+from master.durable import PART, write_whole
+from master.energy import Balance, drift_events, find_balances
 from master.errors import MasterError
+from master.events import MOST_EVENTS, Event, find_events
 from master.line import Geometry, Uplift, support_uplifts
 from master.quality import FILTER_NOTE, Criterion, Quality, assess, judge
 from master.recorder import Recording, load
@@ -28,6 +33,8 @@ GEOMETRY: Final = "geometry.json"
 TIMESERIES: Final = "timeseries.csv"
 REPORT: Final = "report.html"
 _OURS: Final = ("timeseries*.csv", "timeseries*.parquet", SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
+#: What a run that was killed may leave half written.
+_PARTS: Final = tuple(name + PART for name in (SUMMARY, GEOMETRY, CHECKPOINT))
 
 
 @dataclass(frozen=True)
@@ -84,6 +91,19 @@ class Results:
     def assessments(self) -> tuple[Assessment, ...]:
         """Return figures and verdict of every contact that has samples in the interval."""
         return assess_contacts(self.recordings, self.contacts, self.interval, self.uplifts)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened when: losses of contact, slack droppers, energy that does not balance."""
+        found = find_events(self.recordings, self.contacts, self.geometry)
+        end = max((float(r.time[-1]) for r in self.recordings if len(r.time)), default=0.0)
+        drifts = drift_events(self.balances, end)
+        return tuple(sorted((*found, *drifts), key=lambda e: (e.time, e.kind, e.what)))
+
+    @property
+    def balances(self) -> tuple[Balance, ...]:
+        """The energy balances that were recorded."""
+        return find_balances(self.recordings, self.contacts)
 
     @property
     def followings(self) -> tuple[Following, ...]:
@@ -149,13 +169,16 @@ def prepare(folder: Path) -> None:
 def _empty(folder: Path) -> None:
     if not folder.is_dir():
         raise MasterError(f"{folder} is a file, not a results folder; choose another with --out")
-    if not any(folder.iterdir()):
+    left = list(folder.iterdir())
+    if all(path.name in _PARTS for path in left):  # nothing, or a run that was killed at once
+        for path in left:
+            path.unlink()
         return
     if not is_ours(folder):
         raise MasterError(
             f"{folder} exists and is not a results folder of this tool; it is left alone, choose another with --out"
         )
-    for pattern in _OURS:
+    for pattern in (*_OURS, *_PARTS):
         for path in folder.glob(pattern):
             path.unlink()
 
@@ -185,11 +208,22 @@ def is_ours(folder: Path) -> bool:
     return made_by(folder / SUMMARY, GENERATOR)
 
 
+def identity(folder: Path) -> str:
+    """Return which run it is whose results lie in a folder.
+
+    Raises
+    ------
+    MasterError
+        If it is not a results folder of ours.
+    """
+    return str(_summary(folder).get("run", ""))
+
+
 def made_by(path: Path, generator: str) -> bool:
     """Whether a JSON file says that it is from ``generator``."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return False
     return isinstance(found, dict) and found.get("generator") == generator
 
@@ -201,9 +235,7 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one go."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+    write_whole(path, text.encode())
 
 
 def read(folder: Path) -> Results:
@@ -212,23 +244,29 @@ def read(folder: Path) -> Results:
     Raises
     ------
     MasterError
-        If it is not a results folder of ours.
+        If it is not a results folder of ours, or a file in it is damaged.
     """
-    if not is_ours(folder):
-        raise MasterError(f"{folder} is not a results folder: it has no {SUMMARY} written by this tool")
-    summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    geometry = {}
-    if (folder / GEOMETRY).is_file():
-        geometry = json.loads((folder / GEOMETRY).read_text(encoding="utf-8"))
+    summary = _summary(folder)
+    geometry = stored.read_geometry(folder / GEOMETRY) if (folder / GEOMETRY).is_file() else {}
     coarse = sorted(p for p in folder.glob("timeseries*.csv") if p.name != TIMESERIES)
     recordings = tuple(load(p) for p in (folder / TIMESERIES, *coarse))
     return Results(folder, summary, recordings, geometry)
 
 
+def _summary(folder: Path) -> dict[str, Any]:
+    if not is_ours(folder):
+        raise MasterError(f"{folder} is not a results folder: it has no {SUMMARY} written by this tool")
+    return stored.read_summary(folder / SUMMARY)
+
+
 def figures(
-    assessments: Sequence[Assessment], uplifts: Sequence[Uplift], following: Sequence[Following] = ()
+    assessments: Sequence[Assessment],
+    uplifts: Sequence[Uplift],
+    following: Sequence[Following] = (),
+    events: Sequence[Event] = (),
+    balances: Sequence[Balance] = (),
 ) -> dict[str, Any]:
-    """Return the figures and verdicts for summary.json."""
+    """Return the figures, verdicts, events and energy balances for summary.json."""
     return {
         "filter": FILTER_NOTE,
         "quality": [
@@ -236,6 +274,9 @@ def figures(
         ],
         "following": [asdict(f) for f in following],
         "uplift": [asdict(u) for u in uplifts],
+        "events": [asdict(e) for e in events[:MOST_EVENTS]],
+        "events_left_out": max(0, len(events) - MOST_EVENTS),
+        "energy": [{**asdict(b), "share": b.share, "text": b.text} for b in balances],
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -12,15 +13,28 @@ from typing import Any, Final
 
 from master import results
 from master.algorithm import make_algorithm
+from master.caution import CautionObserver
 from master.checkpoint import NAME as CHECKPOINT
-from master.checkpoint import CheckpointObserver, Continuation, index_at
-from master.contacts import Contact, find_contacts
-from master.errors import InterruptedRunError, MasterError, RunError
-from master.instance import Instance
+from master.checkpoint import (
+    Checkpoint,
+    CheckpointObserver,
+    Continuation,
+    Occasions,
+    Remembering,
+    index_at,
+    steps_between,
+    take,
+)
+from master.contacts import find_contacts
+from master.errors import InterruptedRunError, MasterError, RunError, UsageError
+from master.instance import Instance, Recordable
 from master.interface import PowerObserver
+from master.isolation import IsolatedInstance, Isolation
 from master.line import GeometryObserver
 from master.network import Network
-from master.recorder import Recorder, Source, matcher
+from master.pattern import matcher
+from master.realtime import Pacer
+from master.recorder import Recorder, Source
 from master.results import Results
 from master.simulation import Observer, Outcome, TimeGrid, interruptible, simulate
 from master.ssp.annotation import Record
@@ -54,13 +68,35 @@ class Timing:
     stepping: float
 
 
-def run(
-    system: System,
-    folder: Path,
-    observers: Sequence[Observer] = (),
-    checkpoint: float | None = None,
-    continuation: Continuation | None = None,
-) -> Results:
+@dataclass(frozen=True)
+class Manner:
+    """How a system is run, which changes none of its figures.
+
+    Attributes
+    ----------
+    checkpoint : float, optional
+        When the whole state is to be written to the folder [s].
+    checkpoint_every : float, optional
+        After how much simulated time again and again [s].
+    continuation : Continuation, optional
+        Where the run goes on from, instead of its beginning.
+    isolation : Isolation, optional
+        Given if every FMU is to have a process of its own.
+    real_time : float, optional
+        Simulated seconds per second of wall clock; as fast as it goes if not given.
+    """
+
+    checkpoint: float | None = None
+    checkpoint_every: float | None = None
+    continuation: Continuation | None = None
+    isolation: Isolation | None = None
+    real_time: float | None = None
+
+
+_PLAIN: Final = Manner()
+
+
+def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner: Manner = _PLAIN) -> Results:
     """Run a system and leave its results in ``folder``.
 
     Parameters
@@ -68,13 +104,10 @@ def run(
     system : System
         What to run.
     folder : Path
-        Results folder; made, or emptied if it is ours.
+        Results folder; made, or emptied if it is ours, or gone on with if the manner says so.
     observers : sequence of Observer
         Further observers (progress).
-    checkpoint : float, optional
-        When the whole state is to be written to the folder [s].
-    continuation : Continuation, optional
-        Where the run goes on from, instead of its beginning.
+    manner : Manner
 
     Raises
     ------
@@ -83,44 +116,75 @@ def run(
     UsageError
         If checkpoint or continuation do not fit the system.
     """
-    save_at = None if checkpoint is None else index_at(system, checkpoint)
-    if continuation is not None:
-        continuation.check(system)
-    results.prepare(folder)
-    results.write_json(folder / results.SUMMARY, {**_description(system, ()), "status": "running"})
-    with _failure_noted(system, folder), loaded(system) as network, interruptible() as stop_wanted:
-        session = _Session(system, network, folder, continuation)
-        algorithm = make_algorithm(system.settings.coupling)
-        watchers = [*session.observers, *observers]
-        if save_at is not None:
-            watchers.append(CheckpointObserver(system, algorithm, folder / CHECKPOINT, save_at))
+    occasions = _occasions(system, manner)
+    identity = _take_folder(system, folder, manner.continuation)
+    results.write_json(folder / results.SUMMARY, {**_description(system, identity), "status": "running"})
+    with (
+        _failure_noted(system, folder, identity),
+        loaded(system, manner.isolation) as network,
+        interruptible() as stop_wanted,
+    ):
+        session = _Session(system, network, folder, manner, identity)
+        watchers = [*session.observers, *observers, *session.last_observers(occasions)]
+        continuation = manner.continuation
         way_in = {} if continuation is None else {"prepare": continuation.prepare}
-        outcome = simulate(network, algorithm, session.grid, watchers, stop_wanted, **way_in)
-    done = session.conclude(outcome)
+        outcome = simulate(network, session.algorithm, session.grid, watchers, stop_wanted, **way_in)
+    return _concluded(session, outcome, folder)
+
+
+def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
+    try:
+        done = session.conclude(outcome)
+    except MasterError as error:  # no room for the summary, say
+        cause = outcome.error or error
+        raise RunError(f"{cause}. What was written before is in {folder}, marked running") from error
     if outcome.status != "complete":
         kind = InterruptedRunError if outcome.status == "interrupted" else RunError
         raise kind(_what_happened(outcome, folder)) from outcome.error
     return done
 
 
+def _occasions(system: System, manner: Manner) -> Occasions:
+    once, every = manner.checkpoint, manner.checkpoint_every
+    return Occasions(
+        None if once is None else index_at(system, once),
+        None if every is None else steps_between(system, every),
+    )
+
+
+def _take_folder(system: System, folder: Path, continuation: Continuation | None) -> str:
+    """Make the folder ready and return the identity of the run in it: a new one, or that of the run that goes on."""
+    if continuation is not None:
+        continuation.check(system)
+        if continuation.is_same_run:
+            known = results.identity(folder)
+            if not known or known != continuation.checkpoint.run:
+                raise UsageError(f"{continuation.file} comes from another run than the results beside it")
+            return known
+    results.prepare(folder)
+    return uuid.uuid4().hex
+
+
 @contextmanager
-def _failure_noted(system: System, folder: Path) -> Iterator[None]:
+def _failure_noted(system: System, folder: Path, identity: str) -> Iterator[None]:
     """Mark the folder's summary as failed if the run does not even begin."""
     try:
         yield
     except MasterError as error:
         ending = _ending(Outcome("failed", 0, system.start, error))
-        results.write_json(folder / results.SUMMARY, {**_description(system, ()), **ending})
+        results.write_json(folder / results.SUMMARY, {**_description(system, identity), **ending})
         raise
 
 
 @contextmanager
-def loaded(system: System) -> Iterator[Network]:
-    """Load the FMUs of a system and connect them; they are freed afterwards."""
-    instances: list[Instance] = []
+def loaded(system: System, isolation: Isolation | None = None) -> Iterator[Network]:
+    """Load the FMUs of a system, each into a process of its own if wanted, and connect them; they are freed at last."""
+    instances: list[Instance | IsolatedInstance] = []
     try:
         for component in system.components:
-            instances.append(Instance(component))  # noqa: PERF401 - those loaded so far must be freed on failure
+            # One by one: those loaded so far must be freed on failure.
+            instance = Instance(component) if isolation is None else IsolatedInstance(component, isolation)
+            instances.append(instance)
         yield Network(instances, system.connections)
     finally:
         for instance in reversed(instances):
@@ -187,48 +251,87 @@ class Stopwatch:
 class _Session:
     """The observers of a run and what is made of them in the end."""
 
-    def __init__(
-        self, system: System, network: Network, folder: Path, continuation: Continuation | None = None
-    ) -> None:
+    def __init__(self, system: System, network: Network, folder: Path, manner: Manner, identity: str) -> None:
         self._system = system
-        self._continuation = continuation
-        whole = TimeGrid(system.start, system.step, system.step_count)
-        self.grid = whole if continuation is None else continuation.grid(system)
+        self._manner = manner
+        self._identity = identity
         self._network = network
         self._folder = folder
         self._contacts = find_contacts(system.connections)
         self._plans = recording_plans(system)
-        self._recorders = [_recorder(system, network, plan, folder) for plan in self._plans]
-        self._geometry = GeometryObserver(system)
-        self._power = PowerObserver(self._contacts, network, system.step_count)
+        self.algorithm = make_algorithm(system.settings.coupling)
+        whole = TimeGrid(system.start, system.step, system.step_count)
+        self.grid = whole if manner.continuation is None else manner.continuation.grid(system)
+        self._geometry = GeometryObserver(system, lambda g: results.write_json(folder / results.GEOMETRY, g))
+        self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
+        self._cautions = CautionObserver()
+        self._remembering: tuple[Remembering, ...] = (self._power, self._contact_watch)
         self._stopwatch = Stopwatch()
+        self._pacer = None if manner.real_time is None else Pacer(self.grid, manner.real_time)
+        made = self._take_up(manner.continuation)
+        self._recorders = [
+            _recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
+        ]
+
+    def _take_up(self, continuation: Continuation | None) -> int | None:
+        """Go on with what the observers of the same run remembered; returns the steps that it had made, if any."""
+        if continuation is None or not continuation.is_same_run:
+            return None
+        checkpoint = continuation.checkpoint
+        for observer in self._remembering:
+            observer.recall(checkpoint.observers[observer.name])
+        return checkpoint.index
 
     @property
     def observers(self) -> list[Observer]:
-        """All of them."""
-        return [self._geometry, *self._recorders, self._power, self._stopwatch, self._contact_watch]
+        """Those that belong to every run."""
+        return [
+            self._geometry,
+            *self._recorders,
+            self._power,
+            self._stopwatch,
+            self._contact_watch,
+            self._cautions,
+        ]
+
+    def last_observers(self, occasions: Occasions) -> list[Observer]:
+        """Those that have to see a step after all others: checkpoints, and at the very last the clock."""
+        path = self._folder / CHECKPOINT
+        checkpoints = [CheckpointObserver(self._checkpoint, path, occasions)] if occasions else []
+        return [*checkpoints, *([self._pacer] if self._pacer else [])]
+
+    def _checkpoint(self, network: Network, index: int) -> Checkpoint:
+        for recorder in self._recorders:
+            recorder.sync()  # no checkpoint is ahead of the rows that it goes on from
+        return take(self._system, network, self.algorithm, index, self._remembering, self._identity)
 
     def conclude(self, outcome: Outcome) -> Results:
-        """Write geometry and summary and return the results."""
+        """Write the summary and return the results, of what is in the files."""
         recordings = tuple(r.recording for r in self._recorders)
-        description = _description(self._system, self._contacts)
+        description = _description(self._system, self._identity)
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
             **description,
             **_ending(outcome),
-            **_origin(self._continuation),
-            **results.figures(done.assessments(), done.uplifts, done.followings),
+            **_origin(self._manner.continuation),
+            **results.figures(done.assessments(), done.uplifts, done.followings, done.events, done.balances),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
-            "performance": {
-                **_performance(self._stopwatch.timing, outcome.time - self.grid.begin),
-                "component_time": {s.name: s.stepping_time for s in self._network.slaves if isinstance(s, Instance)},
-            },
+            "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
+            "warnings": [asdict(w) for w in self._cautions.warnings],
         }
-        results.write_json(self._folder / results.GEOMETRY, self._geometry.geometry)
         results.write_json(self._folder / results.SUMMARY, summary)
         return replace(done, summary=summary)
+
+    def _performance(self, outcome: Outcome) -> dict[str, Any]:
+        punctuality = self._pacer.punctuality if self._pacer else None
+        return {
+            **_performance(self._stopwatch.timing, outcome.time - self.grid.begin),
+            "isolated": self._manner.isolation is not None,
+            "component_time": {s.name: s.stepping_time for s in self._network.slaves if isinstance(s, Recordable)},
+            **({"real_time": asdict(punctuality)} if punctuality else {}),
+        }
 
 
 def _origin(continuation: Continuation | None) -> dict[str, Any]:
@@ -247,17 +350,20 @@ def _performance(timing: Timing, simulated: float) -> dict[str, float]:
     }
 
 
-def _recorder(system: System, network: Network, plan: Plan, folder: Path) -> Recorder:
+def _recorder(
+    system: System, network: Network, plan: Plan, folder: Path, made: int | None, is_steady: bool
+) -> Recorder:
+    """Return the recorder of a plan; ``made`` are the steps whose rows are in its file already."""
     sources = [Source(network.output_names, network.outputs)] if plan.every == 1 else []
     units: dict[str, str] = {}
     for component, slave in zip(system.components, network.slaves, strict=True):
         units |= {f"{component.name}.{v.name}": v.unit for v in component.fmu.variables.values()}
         names = plan.names.get(component.name, [])
-        if names and isinstance(slave, Instance):
+        if names and isinstance(slave, Recordable):
             group = slave.group(names)
             sources.append(Source([f"{component.name}.{n}" for n in names], group.values, group.read))
-    rows = system.step_count // plan.every + 1
-    return Recorder(folder / recording_name(plan, system.step), sources, units, rows, plan.every)
+    keep = 0 if made is None else made // plan.every + 1
+    return Recorder(folder / recording_name(plan, system.step), sources, units, plan.every, keep, is_steady)
 
 
 def _last_match(name: str, records: Sequence[Record]) -> Record | None:
@@ -265,9 +371,10 @@ def _last_match(name: str, records: Sequence[Record]) -> Record | None:
     return fits[-1] if fits else None
 
 
-def _description(system: System, contacts: Sequence[Contact]) -> dict[str, Any]:
+def _description(system: System, identity: str) -> dict[str, Any]:
     return {
         "generator": results.GENERATOR,
+        "run": identity,
         "scenario": system.name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": results.versions(),
@@ -278,7 +385,7 @@ def _description(system: System, contacts: Sequence[Contact]) -> dict[str, Any]:
             **system.settings.model_dump(mode="json"),
         },
         "components": [_component(c) for c in system.components],
-        "contacts": [asdict(c) for c in contacts],
+        "contacts": [asdict(c) for c in find_contacts(system.connections)],
     }
 
 

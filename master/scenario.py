@@ -9,10 +9,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from master import store
+from master import energy, store
 from master.errors import Problem, ScenarioError, UsageError
 from master.fmu_file import read_fmu
-from master.ssp.annotation import RunSettings, Scheme
+from master.pattern import matcher
+from master.ssp.annotation import DEFAULT_RECORDS, Record, RunSettings, Scheme
 from master.ssp.archive import SSD_NAME, Package, inside, open_package
 from master.ssp.elements import Component as SsdComponent
 from master.ssp.ssd import Structure, read_structure
@@ -21,6 +22,12 @@ from master.ssp.xml import Reader
 from master.system import Component, Fmu, System, Variable
 
 DEFAULT_STEP = 1e-3
+#: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
+MAX_STEPS = 10**7
+#: Smallest step beside the times it leads to: rounding then leaves nine digits of it.
+_RESOLUTION = 1e-7
+#: Causalities of what can be recorded.
+_MEASURED = ("output", "local")
 
 
 @dataclass(frozen=True)
@@ -35,12 +42,15 @@ class Overrides:
         Coupling scheme.
     parameters : dict
         Values as text by ``component.parameter``, in the FMU's own units.
+    energy : bool
+        Whether every FMU that can is to keep its energy balance, and that is to be recorded.
     """
 
     stop: float | None = None
     step: float | None = None
     scheme: Scheme | None = None
     parameters: Mapping[str, str] = field(default_factory=dict)
+    energy: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,6 +103,8 @@ def load_system(package: Package, overrides: Overrides, tell: Callable[[str], No
     if reader.problems:
         raise ScenarioError(_sorted(reader.problems))
     components = _override(components, overrides.parameters)
+    if overrides.energy:
+        components, settings = _with_energy(components, settings)
     return System(package.name, components, connections, *times, settings)
 
 
@@ -144,11 +156,20 @@ def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) 
         stop = start + step
     if not (math.isfinite(start) and start < stop < math.inf):
         problems.append(Problem(SSD_NAME, 0, "stop", f"stop time {stop:g} s must lie after start time {start:g} s"))
-    elif not 0 < step <= stop - start:
-        problems.append(
-            Problem(SSD_NAME, 0, "step", f"macro step {step:g} s must lie between 0 and {stop - start:g} s")
-        )
+    elif text := _step_problem(start, stop, step):
+        problems.append(Problem(SSD_NAME, 0, "step", f"macro step {step:g} s {text}"))
     return start, stop, step
+
+
+def _step_problem(start: float, stop: float, step: float) -> str:
+    """Return why a run cannot be made in these steps, empty if it can."""
+    if not 0 < step <= stop - start:
+        return f"must lie between 0 and {stop - start:g} s"
+    if (stop - start) / step > MAX_STEPS:
+        return f"makes {(stop - start) / step:.3g} steps, more than {MAX_STEPS:g}; take longer ones or stop earlier"
+    if step < _RESOLUTION * max(abs(start), abs(stop)):
+        return f"is lost beside times up to {max(abs(start), abs(stop)):g} s; begin nearer to 0"
+    return ""
 
 
 def _settings(
@@ -174,7 +195,22 @@ def _settings(
             for c in components
             if not c.fmu.can_restore
         )
+    if len(components) == len(structure.components):  # of an FMU that cannot be read nobody knows the variables
+        problems.extend(Problem(SSD_NAME, 0, "annotation", text) for text in _unknown(settings, components))
     return settings
+
+
+def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterator[str]:
+    """Yield what the settings name and no component has; a pattern that fits nothing is a typing error."""
+    variables = {f"{c.name}.{v.name}": v for c in components for v in c.fmu.variables.values()}
+    recordable = [n for n, v in variables.items() if v.type == "Real" and v.causality in _MEASURED]
+    for record in settings.records:
+        for pattern in record.variables if record not in DEFAULT_RECORDS else ():
+            if not any(map(matcher(pattern), recordable)):
+                yield f"Record variables: '{pattern}' fits no Real output or local variable of the components"
+    wanted = settings.calibration
+    if wanted is not None and (wanted.parameter not in variables or settable(variables[wanted.parameter], "Real")):
+        yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components"
 
 
 def _override(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
@@ -184,6 +220,21 @@ def _override(components: tuple[Component, ...], values: Mapping[str, str]) -> t
         changed = replace(components[index], parameters=parameters)
         components = (*components[:index], changed, *components[index + 1 :])
     return components
+
+
+def _with_energy(
+    components: tuple[Component, ...], settings: RunSettings
+) -> tuple[tuple[Component, ...], RunSettings]:
+    """Make the components that can keep their energy balance do so, and record it."""
+    able = [energy.MONITOR in c.fmu.variables for c in components]
+    if not any(able):
+        raise UsageError(f"--energy: no FMU of the scenario has the parameter '{energy.MONITOR}'; build them anew")
+    watched = tuple(
+        replace(c, parameters={**c.parameters, energy.MONITOR: 1}) if can else c
+        for c, can in zip(components, able, strict=True)
+    )
+    record = Record(variables=energy.VARIABLES, every=energy.INTERVAL)
+    return watched, settings.model_copy(update={"records": (*settings.records, record)})
 
 
 def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, Variable]:
@@ -220,7 +271,7 @@ def _typed(variable: Variable, full: str, text: str) -> float | int | bool | str
         number = float(text) if variable.type == "Real" else int(text)
     except ValueError:
         raise UsageError(f"parameter '{full}': '{text}' is not a number") from None
-    reason = "is not finite" if not math.isfinite(number) else out_of_range(variable, number)
+    reason = out_of_range(variable, number)
     if reason:
         raise UsageError(f"parameter '{full}' {reason}")
     return number

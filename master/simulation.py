@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -95,10 +96,28 @@ def simulate(
 
     A failure does not raise: it ends the run, and the outcome carries it, so that what was computed is kept.
     """
+    try:
+        outcome = _run(network, algorithm, grid, observers, stop_wanted, prepare)
+    finally:
+        failure = _finish(observers)
+    if failure is not None and outcome.error is None:
+        return Outcome("failed", outcome.steps, outcome.time, failure)
+    return outcome
+
+
+def _run(
+    network: Network,
+    algorithm: Algorithm,
+    grid: TimeGrid,
+    observers: Sequence[Observer],
+    stop_wanted: Callable[[], bool],
+    prepare: Callable[[Network, Algorithm, TimeGrid], None],
+) -> Outcome:
     index = grid.first
     try:
         prepare(network, algorithm, grid)
         check_finite(network, grid.begin, None)
+        check_inputs(network, grid.begin, None)
         for observer in observers:
             observer.begin(grid.begin, network)
         previous = network.outputs.copy()
@@ -108,10 +127,18 @@ def simulate(
             _advance(network, algorithm, grid, index, observers, previous)
     except MasterError as error:
         return Outcome("failed", index, grid.time(index), error)
-    finally:
-        for observer in observers:
-            observer.finish()
     return Outcome("complete", grid.count, grid.stop)
+
+
+def _finish(observers: Sequence[Observer]) -> MasterError | None:
+    """Finish every observer, also after one that cannot; returns the first failure."""
+    first = None
+    for observer in observers:
+        try:
+            observer.finish()
+        except MasterError as error:
+            first = first or error
+    return first
 
 
 def _advance(
@@ -124,8 +151,11 @@ def _advance(
 ) -> None:
     algorithm.step(network, grid.time(index), grid.step)
     end = grid.time(index + 1)
-    if not np.isfinite(network.outputs).all():
+    # Cheap, at every step: not finite if a value is not (or if they are too large to be added).
+    if not math.isfinite(sum(network.outputs.tolist())):
         check_finite(network, end, previous)
+    if not network.is_plain:
+        check_inputs(network, end, previous)
     previous[:] = network.outputs
     for observer in observers:
         observer.observe(index + 1, end, network)
@@ -139,16 +169,38 @@ def check_finite(network: Network, time: float, last_good: FloatArray | None) ->
     RunError
         Naming the variable, the time and its last good value.
     """
-    bad = np.flatnonzero(~np.isfinite(network.outputs))
+    found = _not_finite(network.output_names, network.outputs, last_good, time)
+    if found:
+        raise RunError(f"{found}. {_remarks(network) or 'Try a smaller --step, and check the parameters'}")
+
+
+def check_inputs(network: Network, time: float, last_good: FloatArray | None) -> None:
+    """Refuse outputs, finite themselves, that a connection's conversion turns into something that is not.
+
+    Parameters
+    ----------
+    last_good : ndarray, shape (n_outputs,), optional
+        The outputs of the step before.
+
+    Raises
+    ------
+    RunError
+        Naming the input, the time and its last good value.
+    """
+    before = None if last_good is None else network.converted(last_good)
+    found = _not_finite(network.input_names, network.converted(network.outputs), before, time)
+    if found:
+        raise RunError(f"{found}. Check the factor and the offset of its connection")
+
+
+def _not_finite(names: Sequence[str], values: FloatArray, last_good: FloatArray | None, time: float) -> str:
+    bad = np.flatnonzero(~np.isfinite(values))
     if bad.size == 0:
-        return
+        return ""
     first = int(bad[0])
     good = "" if last_good is None else f"; its last good value was {last_good[first]:.6g}"
     more = f" (and {bad.size - 1} more variables)" if bad.size > 1 else ""
-    raise RunError(
-        f"'{network.output_names[first]}' became {network.outputs[first]} at t = {time:.6g} s{more}{good}. "
-        f"{_remarks(network) or 'Try a smaller --step, and check the parameters'}"
-    )
+    return f"'{names[first]}' became {values[first]} at t = {time:.6g} s{more}{good}"
 
 
 def _remarks(network: Network) -> str:

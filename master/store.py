@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -21,6 +22,18 @@ _ASK_SECONDS: Final = 60
 _BUILD_SECONDS: Final = 600
 #: Exit code of ``python -m fmus`` for a name it does not know.
 _UNKNOWN: Final = 2
+#: What a damaged, encrypted or exotically compressed archive raises.
+_UNREADABLE: Final = (
+    OSError,
+    EOFError,
+    KeyError,
+    ValueError,
+    RuntimeError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+    ElementTree.ParseError,
+)
 
 
 def ensure(path: Path, tell: Callable[[str], None]) -> None:
@@ -56,7 +69,7 @@ def fingerprint(name: str) -> str | None:
         With the builder's own words, if it knows the name but cannot tell.
     """
     try:
-        answer = _fmus("fingerprint", name, seconds=_ASK_SECONDS)
+        answer = _fmus("fingerprint", "--", name, seconds=_ASK_SECONDS)
     except subprocess.TimeoutExpired:
         return None
     if answer.returncode == _UNKNOWN:
@@ -73,7 +86,7 @@ def stored_guid(path: Path) -> str:
         with zipfile.ZipFile(path) as file, file.open("modelDescription.xml") as xml:
             for _, node in ElementTree.iterparse(xml, events=("start",)):
                 return node.get("guid") or ""
-    except (OSError, KeyError, zipfile.BadZipFile, ElementTree.ParseError):
+    except _UNREADABLE:
         return ""
     return ""
 
@@ -81,7 +94,7 @@ def stored_guid(path: Path) -> str:
 def build(path: Path) -> None:
     """Build ``path`` from the definition of the same name."""
     try:
-        answer = _fmus("build", path.stem, "--out", str(path.parent), seconds=_BUILD_SECONDS)
+        answer = _fmus("build", "--out", str(path.parent), "--", path.stem, seconds=_BUILD_SECONDS)
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"could not be built: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0 or not path.is_file():
@@ -90,7 +103,7 @@ def build(path: Path) -> None:
 
 def _last_line(answer: subprocess.CompletedProcess[str]) -> str:
     said = (answer.stderr.strip() or answer.stdout.strip()).splitlines()
-    return said[-1] if said else "the builder gave no reason"
+    return said[-1].removeprefix("error: ") if said else "the builder gave no reason"
 
 
 def _matches(fingerprint: str, guid: str) -> bool:

@@ -26,6 +26,8 @@ class ContactWatch:
         Loss after which the run is stopped [s].
     """
 
+    name = "contact watch"
+
     def __init__(self, contacts: Sequence[Contact], network: Network, longest: float = LONGEST_LOSS) -> None:
         self._contacts = tuple(contacts)
         self._places = {name: i for i, name in enumerate(network.output_names)}
@@ -39,13 +41,21 @@ class ContactWatch:
     def observe(self, index: int, time: float, network: Network) -> None:
         """Look at the forces."""
         for i, place in enumerate(self._forces):
-            if network.outputs[place] > 0.0:
+            if network.outputs.item(place) > 0.0:
                 self._last[i] = time
             elif (last := self._last[i]) is not None and time - last > self._longest:
                 raise RunError(self._lost(self._contacts[i], last, network))
 
     def finish(self) -> None:
         """Nothing to close."""
+
+    def memory(self) -> list[float | None]:
+        """Return when each contact was last seen."""
+        return list(self._last)
+
+    def recall(self, memory: Sequence[float | None]) -> None:
+        """Go on from what another watch of the same contacts has seen."""
+        self._last = list(memory)
 
     def _lost(self, contact: Contact, last: float, network: Network) -> str:
         where = [

@@ -111,15 +111,15 @@ class ForceExtrapolation:
 
     def _polynomial(self, time: float) -> float:
         """Newton's divided differences through the last values."""
-        t, f = self.times, self.values
+        t, f = self.times.tolist(), self.values.tolist()  # plain floats: the same bits, several times as fast
         order = min(self.order, self.known - 1)
-        result = float(f[0])
+        result: float = f[0]
         if order >= 1:
             first = (f[0] - f[1]) / (t[0] - t[1])
-            result += float(first * (time - t[0]))
+            result += first * (time - t[0])
         if order >= 2:
             second = (first - (f[1] - f[2]) / (t[1] - t[2])) / (t[0] - t[2])
-            result += float(second * (time - t[0]) * (time - t[1]))
+            result += second * (time - t[0]) * (time - t[1])
         return result
 
 

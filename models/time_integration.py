@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -23,32 +24,32 @@ class Newmark:
     gamma: float = 0.5
     beta: float = 0.25
 
-    @property
+    @cached_property
     def a0(self) -> float:
         """Return 1 / (beta dt^2)."""
         return 1.0 / (self.beta * self.step**2)
 
-    @property
+    @cached_property
     def a1(self) -> float:
         """Return gamma / (beta dt)."""
         return self.gamma / (self.beta * self.step)
 
-    @property
+    @cached_property
     def a2(self) -> float:
         """Return 1 / (beta dt)."""
         return 1.0 / (self.beta * self.step)
 
-    @property
+    @cached_property
     def a3(self) -> float:
         """Return 1 / (2 beta) - 1."""
         return 0.5 / self.beta - 1.0
 
-    @property
+    @cached_property
     def a4(self) -> float:
         """Return gamma / beta - 1."""
         return self.gamma / self.beta - 1.0
 
-    @property
+    @cached_property
     def a5(self) -> float:
         """Return dt / 2 (gamma / beta - 2)."""
         return 0.5 * self.step * (self.gamma / self.beta - 2.0)

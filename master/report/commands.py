@@ -39,7 +39,8 @@ def add_report_arguments(parser: argparse.ArgumentParser) -> None:
 def run_report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is wanted."""
     done = results.read(options.run)
-    summary = {**done.summary, **results.figures(done.assessments(), done.uplifts, done.followings)}
+    figures = results.figures(done.assessments(), done.uplifts, done.followings, done.events, done.balances)
+    summary = {**done.summary, **figures}
     measured = _measured(done, options.measured, options.contact) if options.measured else None
     results.write_json(done.folder / results.SUMMARY, summary)
     print(report.write(replace(done, summary=summary), measured))

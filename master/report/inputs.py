@@ -111,6 +111,7 @@ def quality_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         share = 100.0 * p["energy"] / p["transferred"] if p["transferred"] else 0.0
         text = f"{p['energy']:.3g} J of {p['transferred']:.4g} J exchanged ({share:.2f} %), rms {p['rms']:.3g} W"
         rows.append((f"interface residual, contact {p['contact']}", text))
+    rows += [(f"energy, {b['what']}", b["text"]) for b in summary.get("energy", [])]
     if performance:
         rows += _performance_rows(performance)
     return rows
@@ -124,9 +125,14 @@ def _performance_rows(performance: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     steps = performance.get("component_time", {})
     rows += [(f"time in {name}", f"{t:.2f} s ({100.0 * t / wall if wall else 0.0:.0f} %)") for name, t in steps.items()]
-    if steps and wall:
+    paced = performance.get("real_time")
+    # Isolated components step at the same time, and a paced run waits: then the difference means nothing.
+    if steps and wall and not performance.get("isolated") and not paced:
         rest = wall - sum(steps.values())
         rows.append(("time in the master", f"{rest:.2f} s ({100.0 * rest / wall:.0f} %): exchange, recording"))
+    if paced:
+        late = f"{paced['missed']} of {paced['steps']} deadlines missed, by {1e3 * paced['lateness']['maximum']:.3g} ms"
+        rows.append((f"real time x {paced['factor']:g}", f"{late} at most"))
     if "peak_memory" in performance:
         rows.append(("peak memory", f"{performance['peak_memory']:.0f} MB"))
     return rows

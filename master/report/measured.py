@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -12,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
-from master.errors import MasterError
+from master.errors import MasterError, one_line
 from master.quality import low_pass
 from master.report.charts import Axes, Chart, Curve, curve_trace
 from master.report.signals import Signals
@@ -21,7 +22,13 @@ _TITLE: Final = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*
 _POSITIONS: Final = ("x", "position", "track position", "distance", "chainage", "km")
 _TIMES: Final = ("t", "time")
 _FORCES: Final = ("f", "fc", "force", "contact force")
-_FACTORS: Final = {"m": 1.0, "km": 1e3, "s": 1.0, "ms": 1e-3, "n": 1.0, "kn": 1e3, "": 1.0}
+#: Units of each kind of column and their factors.
+_LENGTHS: Final = {"m": 1.0, "km": 1e3, "": 1.0}
+_DURATIONS: Final = {"s": 1.0, "ms": 1e-3, "": 1.0}
+_NEWTONS: Final = {"n": 1.0, "kn": 1e3, "": 1.0}
+#: Magnitude beyond which no time, place or force lies; sums and squares stay finite.
+_LARGEST: Final = 1e12
+_SPELLED: Final = {"m": "m", "km": "km", "s": "s", "ms": "ms", "n": "N", "kn": "kN"}
 
 
 @dataclass(frozen=True)
@@ -96,21 +103,43 @@ def read_measured(path: Path) -> Measurement:
     Raises
     ------
     MasterError
-        If it cannot be read, a column is missing, or the abscissa does not increase.
+        If it cannot be read, a column is missing, there twice or in another unit, a cell is no finite number, or
+        the abscissa does not increase.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise MasterError(f"{path} cannot be read ({error})") from error
-    separator = ";" if lines and ";" in lines[0] else ","
-    rows = [row for row in csv.reader(lines, delimiter=separator) if any(cell.strip() for cell in row)]
-    titles = [_title(t) for t in rows[0]] if rows else []
+    rows = _rows(path)
+    titles = [_title(t) for t in rows[0].cells] if rows else []
     place, over_time = _abscissa(path, titles)
-    force = _find(titles, _FORCES)
+    force = _find(path, titles, _FORCES)
     if force is None:
         raise MasterError(f"{path} has no column named force (e.g. 'force [N]')")
-    values = [_column(path, rows[1:], i, _factor(path, titles[i])) for i in (place, force)]
-    return _checked(path, over_time, *values)
+    for row in rows[1:]:
+        if len(row.cells) != len(titles):
+            raise MasterError(f"{path}:{row.line}: has {len(row.cells)} cells, the head has {len(titles)}")
+    known = _DURATIONS if over_time else _LENGTHS
+    factors = (_factor(path, titles[place], known), _factor(path, titles[force], _NEWTONS))
+    values = [_column(path, rows[1:], i, f) for i, f in zip((place, force), factors, strict=True)]
+    return _checked(path, over_time, rows[1:], *values)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A row that is not empty, with the line of the file that it ends in."""
+
+    line: int
+    cells: list[str]
+
+
+def _rows(path: Path) -> list[_Row]:
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        reader = csv.reader(lines, delimiter=";" if lines and ";" in lines[0] else ",")
+        return [_Row(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
+    except UnicodeDecodeError as error:
+        raise MasterError(f"{path} is not UTF-8 text (byte {error.start})") from error
+    except csv.Error as error:
+        raise MasterError(f"{path} is not a table of separated values ({error})") from error
 
 
 def _title(title: str) -> tuple[str, str]:
@@ -120,37 +149,57 @@ def _title(title: str) -> tuple[str, str]:
 
 def _abscissa(path: Path, titles: Sequence[tuple[str, str]]) -> tuple[int, bool]:
     for names, over_time in ((_POSITIONS, False), (_TIMES, True)):
-        found = _find(titles, names)
+        found = _find(path, titles, names)
         if found is not None:
             return found, over_time
     raise MasterError(f"{path} has no column named position or time (e.g. 'position [m]', 'time [s]')")
 
 
-def _find(titles: Sequence[tuple[str, str]], names: Sequence[str]) -> int | None:
-    return next((i for i, (name, _) in enumerate(titles) if name in names), None)
+def _find(path: Path, titles: Sequence[tuple[str, str]], names: Sequence[str]) -> int | None:
+    found = [i for i, (name, _) in enumerate(titles) if name in names]
+    if len(found) > 1:
+        columns = " and ".join(f"'{titles[i][0]}' (column {i + 1})" for i in found)
+        raise MasterError(f"{path} has several columns of the same meaning: {one_line(columns)}; remove all but one")
+    return found[0] if found else None
 
 
-def _factor(path: Path, title: tuple[str, str]) -> float:
+def _factor(path: Path, title: tuple[str, str], known: Mapping[str, float]) -> float:
     name, unit = title
-    if name == "km":
+    if name == "km" and unit == "":
         return 1e3
-    if unit not in _FACTORS:
-        raise MasterError(f"{path}: column '{name}' has the unit '{unit}'; m, km, s, ms, N or kN are known")
-    return _FACTORS[unit]
+    if unit not in known:
+        units = " or ".join(_SPELLED[u] for u in known if u)
+        raise MasterError(f"{path}: column '{name}' has the unit '{one_line(unit)}'; {units} is needed")
+    return known[unit]
 
 
-def _column(path: Path, rows: Sequence[Sequence[str]], index: int, factor: float) -> FloatArray:
+def _column(path: Path, rows: Sequence[_Row], index: int, factor: float) -> FloatArray:
+    return factor * np.array([_number(path, row, index) for row in rows])
+
+
+def _number(path: Path, row: _Row, index: int) -> float:
+    text = row.cells[index].strip()
     try:
-        return factor * np.array([float(row[index]) for row in rows])
-    except (ValueError, IndexError) as error:
-        raise MasterError(f"{path}: column {index + 1} is not a column of numbers ({error})") from error
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    # Python reads 1_000, and the digits of every script; in a table they are slips of the pen.
+    if not abs(value) <= _LARGEST or "_" in text or not text.isascii():
+        raise MasterError(f"{path}:{row.line}: '{one_line(text)}' in column {index + 1} is not a finite number")
+    return value
 
 
-def _checked(path: Path, over_time: bool, abscissa: FloatArray, force: FloatArray) -> Measurement:
-    if len(abscissa) < 3 or not (np.isfinite(abscissa).all() and np.isfinite(force).all()):
-        raise MasterError(f"{path} must hold at least three rows of finite numbers")
-    if np.any(np.diff(abscissa) <= 0.0):
-        raise MasterError(f"{path}: the {'times' if over_time else 'positions'} do not increase from row to row")
+def _checked(
+    path: Path, over_time: bool, rows: Sequence[_Row], abscissa: FloatArray, force: FloatArray
+) -> Measurement:
+    if len(abscissa) < 3:
+        raise MasterError(f"{path} must hold at least three rows of numbers; it holds {len(abscissa)}")
+    back = np.flatnonzero(np.diff(abscissa) <= 0.0)
+    if back.size:
+        line, what = rows[int(back[0]) + 1].line, "time" if over_time else "position"
+        value = rows[int(back[0]) + 1].cells
+        text = f"the {what} does not increase from the row before ({one_line(', '.join(value))})"
+        raise MasterError(f"{path}:{line}: {text}")
     return Measurement(path.name, over_time, abscissa, force)
 
 

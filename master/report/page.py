@@ -63,10 +63,17 @@ def _head(summary: dict[str, Any], assessments: tuple[Assessment, ...]) -> str:
     complete = summary.get("status") == "complete"
     name = markup.text(summary.get("scenario", ""))
     parts = [f"<section id='verdict'><h1>{name}: pantograph-catenary interaction</h1>", status_note(summary)]
+    parts.append(_cautions(summary))
     parts += [markup.verdict(a, a.contact.pantograph, complete) for a in assessments]
     if not assessments:
         parts.append("<p class='warning'>No contact-quality figures: no contact force in the interval of interest.</p>")
     return "".join([*parts, "</section>"])
+
+
+def _cautions(summary: dict[str, Any]) -> str:
+    """Return what FMUs have warned of."""
+    said = ((markup.text(w["component"]), markup.text(w["text"])) for w in summary.get("warnings", []))
+    return "".join(f"<p class='warning'>{component} warns: {text}</p>" for component, text in said)
 
 
 def status_note(summary: dict[str, Any]) -> str:

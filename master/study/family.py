@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -91,7 +92,7 @@ class Variant(_Model):
         Of the run [s].
     """
 
-    name: str
+    name: str = Field(min_length=1)
     values: dict[str, str]
     absent: tuple[str, ...] = ()
     stop: float | None = Field(None, gt=0)
@@ -155,7 +156,7 @@ def store_values(family: Family, variant: str, values: dict[str, float]) -> None
         If the table has no such row or columns.
     """
     path = family.folder / VARIANTS
-    rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
+    rows = _table(path)
     wanted = [row for row in rows[1:] if row and row[0] == variant]
     if len(wanted) != 1 or not set(values) <= set(rows[0]):
         raise MasterError(f"{path}: row '{variant}' with columns {', '.join(values)} is needed once")
@@ -169,17 +170,23 @@ def store_values(family: Family, variant: str, values: dict[str, float]) -> None
 def _read_settings(path: Path) -> Settings:
     try:
         return Settings.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ScenarioError([Problem(str(path), 0, "study", f"cannot be read: {error}")]) from error
     except ValidationError as error:
         raise ScenarioError(_problems(path, 0, error)) from error
+    except RecursionError as error:
+        raise ScenarioError([Problem(str(path), 0, "study", "cannot be read: it is nested too deeply")]) from error
+    except (OSError, ValueError) as error:  # no UTF-8, no TOML, whole numbers of thousands of digits
+        raise ScenarioError([Problem(str(path), 0, "study", f"cannot be read: {error}")]) from error
+
+
+def _table(path: Path) -> list[list[str]]:
+    try:
+        return list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ScenarioError([Problem(str(path), 0, "variants", f"cannot be read: {error}")]) from error
 
 
 def _read_variants(path: Path) -> tuple[Variant, ...]:
-    try:
-        rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ScenarioError([Problem(str(path), 0, "variants", f"cannot be read: {error}")]) from error
+    rows = _table(path)
     heads = rows[0] if rows else []
     problems = _head_problems(path, heads)
     found = []
@@ -187,9 +194,7 @@ def _read_variants(path: Path) -> tuple[Variant, ...]:
         if not problems and any(row):
             found += _read_row(path, line, heads, row, problems)
     names = [v.name for v in found]
-    problems += [
-        Problem(str(path), 0, "variants", f"'{n}' stands there twice") for n in set(names) if names.count(n) > 1
-    ]
+    problems += [Problem(str(path), 0, "variants", text) for text in _name_texts(names)]
     if not problems and not found:
         problems.append(Problem(str(path), 0, "variants", "has no variant"))
     if problems:
@@ -197,12 +202,37 @@ def _read_variants(path: Path) -> tuple[Variant, ...]:
     return tuple(found)
 
 
+def _name_texts(names: Sequence[str]) -> list[str]:
+    """Return what is wrong with the variants' names: each names a folder of its own."""
+    folders = [folder_name(n).casefold() for n in names]
+    texts = [f"'{n}' stands there twice" for n in dict.fromkeys(names) if names.count(n) > 1]
+    taken = dict(zip(reversed(folders), reversed(names), strict=True))
+    texts += [
+        f"'{name}' and '{taken[folder]}' would have the same folder of results, '{folder}'; rename one"
+        for name, folder in zip(names, folders, strict=True)
+        if taken[folder] != name
+    ]
+    return texts
+
+
+def folder_name(variant: str) -> str:
+    """Return a variant's name as that of a folder.
+
+    Examples
+    --------
+    >>> folder_name("31 m, low damping")
+    '31_m_low_damping'
+    """
+    return re.sub(r"[^A-Za-z0-9.+-]+", "_", variant).strip("_.") or "variant"
+
+
 def _head_problems(path: Path, heads: Sequence[str]) -> list[Problem]:
     if not heads or heads[0] != _NAME:
         return [Problem(str(path), 1, "variants", f"the first column must be '{_NAME}'")]
-    wrong = [h for h in heads[1:] if h not in _RUN and not all(h.partition("."))]
-    text = "is neither 'component.parameter' nor one of"
-    return [Problem(str(path), 1, "variants", f"column '{h}' {text} {', '.join(_RUN)}") for h in wrong]
+    text = f"is neither 'component.parameter' nor one of {', '.join(_RUN)}"
+    wrong = [f"column '{h}' {text}" for h in heads[1:] if h not in _RUN and not all(h.partition("."))]
+    wrong += [f"column '{h}' is there {heads.count(h)} times" for h in dict.fromkeys(heads) if heads.count(h) > 1]
+    return [Problem(str(path), 1, "variants", text) for text in wrong]
 
 
 def _read_row(

@@ -10,10 +10,10 @@ from typing import Final
 
 from master import results
 from master.errors import InterruptedRunError, MasterError
-from master.study.family import Family, Variant
+from master.study.family import Family, Variant, folder_name
 from master.study.outcome import GENERATOR, Done, Outcome, as_csv, as_data
 from master.study.page import page
-from master.study.variants import Runner, finished, folder_name
+from master.study.variants import Runner, finished
 
 JSON: Final = "study.json"
 CSV: Final = "study.csv"

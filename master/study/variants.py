@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -13,6 +12,7 @@ from typing import Any
 
 from master import results
 from master.calibrate import Found, find_values
+from master.caution import CautionObserver
 from master.errors import MasterError, UsageError
 from master.results import Results, assess_contacts
 from master.run import run
@@ -40,7 +40,7 @@ class Runner:
     watching : callable
         System -> context manager that gives its observers (progress).
     tell : callable
-        Is told what takes time.
+        Is told what takes time, and what FMUs warn of.
     build : bool
         Whether missing or stale FMUs are built.
     """
@@ -51,8 +51,9 @@ class Runner:
 
     def run(self, system: System, folder: Path) -> Results:
         """Run one system."""
+        cautions = CautionObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
         with self.watching(system) as observers:
-            return run(system, folder, observers)
+            return run(system, folder, [cautions, *observers])
 
     @contextmanager
     def opened(self, family: Family, variant: Variant) -> Iterator[System]:
@@ -95,17 +96,6 @@ def _trimmed(component: Component, exchanged: set[tuple[str, str]]) -> Component
         tuple(v for v in names if (component.name, v) in exchanged) for names in (component.inputs, component.outputs)
     )
     return replace(component, inputs=inputs, outputs=outputs)
-
-
-def folder_name(variant: str) -> str:
-    """Return a variant's name as that of a folder.
-
-    Examples
-    --------
-    >>> folder_name("31 m, low damping")
-    '31_m_low_damping'
-    """
-    return re.sub(r"[^A-Za-z0-9.+-]+", "_", variant).strip("_") or "variant"
 
 
 def finished(folder: Path, system: System) -> Results | None:

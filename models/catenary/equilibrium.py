@@ -34,6 +34,8 @@ _TOLERANCE = 1e-9
 _MAX_ITERATIONS = 30
 #: Given lengths: droppers are let slack only once the first guess of the shape, far from equilibrium, is left behind.
 _TAUT_ITERATIONS = 3
+#: A point that moves by more than this has no shape to settle to [m]; numbers would overflow soon.
+_LOST = 1e5
 #: First guess of the droppers' forces [N]; only the path to the solution depends on it.
 _FIRST_FORCE = 80.0
 
@@ -87,7 +89,8 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
     Raises
     ------
     EquilibriumError
-        If a dropper would have to push to give the wanted profile, or the iteration does not settle.
+        If a dropper would have to push to give the wanted profile, if the equations are singular, or if the iteration
+        does not settle.
     """
     points = mesh.points.copy()
     movable = _movable(mesh)
@@ -101,12 +104,13 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
         stretch = axial_stiffness(definition, mesh, points) @ sp.diags(unstretched.ravel())
         K = matrices.K - stretch + _swing(mesh, points, force)
         conditions = _conditions(definition, mesh, points, slack)
-        displacement, force = _solve(mesh, points, K, matrices.load, conditions)
+        displacement, force = _solve(definition, mesh, points, K, matrices.load, conditions)
         move = np.where(movable, displacement.reshape(-1, NODE_DOFS)[:, :3], 0.0)
+        _check_move(definition, points, move)
         now_slack = _slack(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
         if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
             # Without the guides of the iteration: what is left of them is below its tolerance, now it is gone.
-            displacement, force = _solve(mesh, points, matrices.K, matrices.load, conditions)
+            displacement, force = _solve(definition, mesh, points, matrices.K, matrices.load, conditions)
             return _static_state(definition, mesh, points, matrices, displacement, force, slack)
         _straighten(mesh, points, move)
         points = points + move
@@ -117,6 +121,17 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
         f"form finding of line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
         f"a point still moves by {np.abs(move).max():.2g} m"
     )
+
+
+def _check_move(definition: CatenaryDefinition, points: FloatArray, move: FloatArray) -> None:
+    """Stop where form finding leads nowhere."""
+    size = np.abs(move).max(axis=1)
+    worst = int(size.argmax())  # the first that is not a number, if there is one
+    if not size[worst] <= _LOST:
+        raise EquilibriumError(
+            f"line '{definition.name}' has no static equilibrium of the wanted shape: form finding moves the point at "
+            f"x = {points[worst, 0]:.2f} m by {size[worst]:.2g} m; check tensions, masses, pre-sag and dropper lengths"
+        )
 
 
 def _movable(mesh: CatenaryMesh) -> np.ndarray:
@@ -191,7 +206,12 @@ def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
 
 
 def _solve(
-    mesh: CatenaryMesh, points: FloatArray, K: sp.csc_matrix, load: FloatArray, conditions: _Conditions
+    definition: CatenaryDefinition,
+    mesh: CatenaryMesh,
+    points: FloatArray,
+    K: sp.csc_matrix,
+    load: FloatArray,
+    conditions: _Conditions,
 ) -> tuple[FloatArray, FloatArray]:
     """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], R, D and right of the droppers' conditions."""
     free = np.flatnonzero(~mesh.fixed.ravel())
@@ -200,7 +220,13 @@ def _solve(
     scale = 1e4
     D = sp.diags(-(scale**2) * conditions.flexibility)
     system = sp.bmat([[K[free][:, free], scale * B.T], [scale * conditions.rows[:, free], D]], format="csc")
-    solution = splu(system).solve(np.concatenate([load[free], scale * conditions.right]))
+    try:
+        solution = splu(system).solve(np.concatenate([load[free], scale * conditions.right]))
+    except RuntimeError as error:  # SuperLU's "Factor is exactly singular"
+        raise EquilibriumError(
+            f"line '{definition.name}' has no static equilibrium of the wanted shape: its equations are singular, as "
+            "they are where nothing holds a wire; check tensions, masses and droppers"
+        ) from error
     displacement = np.zeros(load.size)
     displacement[free] = solution[: len(free)]
     return displacement, solution[len(free) :] * scale

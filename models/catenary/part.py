@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.catenary.energy import LineBalance
 from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.parameters import CatenaryDefinition
 from models.catenary.statics import wave_speed
 from models.contact import application_point
+from models.energy import NO_BALANCE
 from models.extrapolation import StripExtrapolation
 from models.part import FloatArray, IntArray, Snapshot
 from models.time_integration import steps_within
@@ -93,6 +95,7 @@ class CatenaryPart:
         self._motion = StripMotion(np.zeros((pantographs, 2, 2, 3)), np.zeros(pantographs))
         self._model: CatenaryModel | None = None
         self._state: CatenaryState | None = None
+        self._balance: LineBalance | None = None
 
     @property
     def model(self) -> CatenaryModel:
@@ -118,6 +121,16 @@ class CatenaryPart:
     def dropper_force(self) -> FloatArray:
         """Return the tension of every dropper [N], shape (n_droppers,); 0 where slack."""
         return self.model.dropper_force(self.state)
+
+    @property
+    def energy(self) -> FloatArray:
+        """Return the values of `models.energy.BALANCE` [J], shape (4,); 0 if the balance is not kept."""
+        return NO_BALANCE if self._balance is None else self._balance.balance(self.state)
+
+    @property
+    def contact_work(self) -> FloatArray:
+        """Return the work of the strips against the contacts [J], shape (P,); 0 if the balance is not kept."""
+        return np.zeros(len(self._strips)) if self._balance is None else self._balance.contact_work
 
     @property
     def geometry(self) -> LineGeometry:
@@ -157,7 +170,9 @@ class CatenaryPart:
         self._state = self.model.initial_state(len(self._strips))
         for extrapolation, strip in zip(self._strips, strips, strict=True):
             extrapolation.start(time, strip)
-        self._publish(strips, self.model.contact_at_rest(self._state, strips))
+        contacts = self.model.contact_at_rest(self._state, strips)
+        self._balance = LineBalance(self.model, strips, contacts) if self.definition.monitor_energy else None
+        self._publish(strips, contacts)
 
     def step(self, strips: FloatArray, step: float) -> None:
         """Advance by ``step`` [s] under strips received for its beginning (or its end, if they have stepped already).
@@ -170,11 +185,11 @@ class CatenaryPart:
             extrapolation.receive(self.time, strip, step)
         count = steps_within(step, self.definition.time_step)
         start, h = self.time, step / count
-        motion = self._motion
+        motion, advance = self._motion, (self._balance or self.model).step
         for k in range(1, count + 1):
             for extrapolation, strip in zip(self._strips, motion.strip, strict=True):
                 extrapolation.at(start + k * h, strip)
-            result = self.model.step(self.state, h, motion)
+            result = advance(self.state, h, motion)
         self.time = start + step
         self._publish(motion.strip, result)
 
@@ -184,6 +199,8 @@ class CatenaryPart:
         result |= {f"line.{name}": value for name, value in self.state.snapshot().items()}
         for p, extrapolation in enumerate(self._strips):
             result |= {f"{p}.{name}": value for name, value in extrapolation.snapshot().items()}
+        if self._balance is not None:
+            result |= self._balance.snapshot()
         outputs = ("contact_force", "contact_point", "section_force", "support_uplift")
         return result | {name: getattr(self, name).copy() for name in outputs}
 
@@ -193,6 +210,8 @@ class CatenaryPart:
         self.state.restore({n.removeprefix("line."): v for n, v in snapshot.items() if n.startswith("line.")})
         for p, extrapolation in enumerate(self._strips):
             extrapolation.restore({n.removeprefix(f"{p}."): v for n, v in snapshot.items() if n.startswith(f"{p}.")})
+        if self._balance is not None:
+            self._balance.restore(snapshot)
         for name in ("contact_force", "contact_point", "section_force", "support_uplift"):
             getattr(self, name)[...] = snapshot[name]
 

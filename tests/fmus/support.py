@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from fmpy.fmi2 import (
 )
 
 from fmus.build import ROOTS, Recipe
+from models.library import line_path
 
 TOY = Path(__file__).parent / "toy"
 
@@ -82,6 +84,10 @@ class Instance:
     def errors(self) -> list[str]:
         return [text for status, text in self.messages if status >= 3]
 
+    @property
+    def warnings(self) -> list[str]:
+        return [text for status, text in self.messages if status == 1]
+
     def free(self) -> None:
         self.slave.freeInstance()
         shutil.rmtree(self.folder, ignore_errors=True)
@@ -133,3 +139,15 @@ def push(instance: Instance, n: int) -> tuple[list[str], list[float]]:
         names += [f"pantograph[1].{end}.{axis}" for axis in ("x", "y", "z", "vx", "vz")]
         values += [instance["support[3].x"] + 30.0 + 0.08 * n, y, height, 80.0, 2.0]
     return names, values
+
+
+def short_line_recipe(folder: Path, lengths: str = "", pantographs: int = 1) -> Recipe:
+    """Return the recipe of LN2 with five spans of 50 m, on droppers of given lengths if wanted."""
+    text = line_path("LN2").read_text(encoding="utf-8")
+    spans = '[spans]\nstart = [0, "m", "test"]\ncount = 5\nlength = [50, "m", "test"]\n'
+    text = re.sub(r"\[spans\]\n.*?(?=\n\[)", spans, text, count=1, flags=re.DOTALL)
+    if lengths:
+        text = text.replace("[spans.droppers]\n", f'[spans.droppers]\nlengths = [{lengths}, "m", "test"]\n')
+    (folder / "Short.toml").write_text(text, encoding="utf-8")
+    settings = {"pantographs": pantographs}
+    return Recipe("Catenary_Short", "short", "fmus.catenary", "CatenarySlave", folder / "Short.toml", settings)

@@ -10,8 +10,9 @@ import pytest
 
 from master import checkpoint
 from master.checkpoint import Continuation
+from master.energy import DRIFT
 from master.recorder import load
-from master.run import run
+from master.run import Manner, run
 from master.scenario import Overrides, open_scenario
 from master.ssp.archive import extract
 from master.ssp.units import Conversion
@@ -48,7 +49,7 @@ def change(scenario, *pairs, file="SystemStructure.ssd"):
 def go(scenario, folder, stop=STOP, step=None, scheme=None, parameters=(), **way):
     overrides = Overrides(stop, step, scheme, dict(parameters))
     with open_scenario(scenario, overrides, build=False) as opened:
-        return run(opened.system, folder, **way)
+        return run(opened.system, folder, manner=Manner(**way))
 
 
 def force(done):
@@ -161,3 +162,25 @@ def test_energy_added_by_the_coupling_is_reported_and_falls_with_the_step(origin
     for coarse, fine in pairwise(added):
         assert fine[0] < 0.75 * coarse[0]
         assert fine[1] < 0.75 * coarse[1]
+
+
+@pytest.mark.parametrize("scheme", ["jacobi", "gauss-seidel", "iterative"])
+def test_energy_is_kept_by_the_parts_and_nearly_by_their_coupling(original, tmp_path, expected, scheme):
+    """Also where steps are repeated from saved states; and watching changes no figure."""
+    with open_scenario(original, Overrides(STOP, scheme=scheme, energy=True), build=False) as opened:
+        done = run(opened.system, tmp_path / "watched")
+    parts = {b["what"]: b for b in done.summary["energy"]}
+    assert set(parts) == {"catenary", "pantograph", "pantograph - catenary"}
+    assert max(parts[name]["share"] for name in ("catenary", "pantograph")) < 1e-10
+    assert parts["pantograph - catenary"]["share"] < 1e-3
+    assert not any(e["kind"] == DRIFT for e in done.summary["events"])
+    assert np.array_equal(force(done), expected(scheme))
+
+
+def test_inputs_that_are_held_are_found_to_add_energy(original, tmp_path):
+    held = {f"{part}.extrapolation_order": "0" for part in ("catenary", "pantograph")}
+    with open_scenario(original, Overrides(1.0, parameters=held, energy=True), build=False) as opened:
+        done = run(opened.system, tmp_path / "held")
+    (event,) = (e for e in done.events if e.kind == DRIFT)
+    assert event.what == "pantograph - catenary"
+    assert done.balances[-1].drift > 0.0

@@ -14,6 +14,7 @@ from pythonfmu.builder import FmuBuilder
 
 CATENARY = '''
 from pythonfmu import Fmi2Causality as C, Fmi2Slave, Fmi2Variability as V, Real
+from pythonfmu.enums import Fmi2Status
 
 AXES = ("x", "y", "z")
 
@@ -26,9 +27,10 @@ class ToyCatenary(Fmi2Slave):
         self.height = 5.0
         self.fail_at = 1e9
         self.nan_at = 1e9
+        self.warn = 0.0
         self.values = {}
         self.time = 0.0
-        for name in ("stiffness", "height", "fail_at", "nan_at"):
+        for name in ("stiffness", "height", "fail_at", "nan_at", "warn"):
             self.register_variable(Real(name, causality=C.parameter, variability=V.tunable))
         for end in "AB":
             for kind in ("", "v"):
@@ -66,6 +68,8 @@ class ToyCatenary(Fmi2Slave):
 
     def exit_initialization_mode(self):
         self._contact()
+        if self.warn:
+            self.log("the wire [sags] :100:", Fmi2Status.warning)
 
     def do_step(self, time, step):
         if time >= self.fail_at:

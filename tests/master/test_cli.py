@@ -257,3 +257,22 @@ def test_no_traceback_from_the_module(tmp_path):
     assert done.returncode == 1
     assert done.stderr.startswith("error: ")
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [("geometry.json", '{"catenary": 1}'), ("geometry.json", "["), ("summary.json", '{"generator": "openpanto master", '
+      '"contacts": 1}'), ("timeseries.csv", "time [s],a\n1,0\n0,0\n")],
+)  # fmt: skip
+def test_damaged_results_are_told_in_a_sentence(toy, in_folder, capfd, file, text):
+    run = ["run", str(toy), "--no-build", "--no-report", "--quiet"]
+    for name in "ab":
+        assert main([*run, "--out", name]) == 0
+    assert main(["compare", "a", "b"]) == 0
+    (in_folder / "b" / file).write_text(text)
+    capfd.readouterr()
+    assert main(["compare", "a", "b"]) == 1
+    said = capfd.readouterr().err
+    assert said.startswith("error: ")
+    assert file in said
+    assert said.count("\n") == 1

@@ -1,11 +1,14 @@
 """Finding contacts, interface power, line geometry."""
 
+import json
+
 import numpy as np
 import pytest
 
 from master.contacts import Contact, find_contacts, lateral_position
-from master.interface import power_residual
+from master.interface import PowerObserver, power_residual
 from master.line import indexed, support_uplifts
+from master.network import Network
 from master.recorder import Recording
 from master.system import Connection
 
@@ -58,3 +61,40 @@ def test_uplifts_are_sorted_by_support():
     recording = Recording(np.array([0.0, 1.0]), names, ("m", "m"), np.array([[0.0, 0.3], [0.1, 0.2]]))
     found = support_uplifts((recording,), {"c": {"support[2].x": 90.0}})
     assert [(u.support, u.x, u.maximum, u.time) for u in found] == [(2, 90.0, 0.3, 0.0), (10, None, 0.1, 1.0)]
+
+
+def coupled_network(fake_slave):
+    ends = ("A.vz", "B.vz")
+    told = tuple(f"pantograph[1].{e}" for e in ends)
+    line = fake_slave("line", told, ("pantograph[1].contact.force",), np.zeros(1), None)
+    pan = fake_slave("pan", ("contact.force",), ends, np.zeros(2), None)
+    wires = [Connection("pan", e, "line", f"pantograph[1].{e}") for e in ends]
+    wires.append(Connection("line", "pantograph[1].contact.force", "pan", "contact.force"))
+    return Network([line, pan], wires)
+
+
+def observed(observer, network, rows):
+    for n, (given, told) in enumerate(rows):
+        network.outputs[:], network.inputs[:] = given, told
+        observer.observe(n, 1e-3 * n, network)
+
+
+def test_interface_power_is_summed_over_the_steps(fake_slave):
+    """Against the sums of whole arrays; and a run in two parts has the sums of the whole one, bit for bit."""
+    network = coupled_network(fake_slave)
+    contacts = [Contact(1, "line", "pan", "line.pantograph[1].contact")]
+    random = np.random.default_rng(1)
+    given, told = random.normal(size=(2, 50, 3))
+    rows = list(zip(given, told, strict=True))
+    whole, first, second = (PowerObserver(contacts, network) for _ in range(3))
+    observed(whole, network, rows)
+    observed(first, network, rows[:20])
+    second.recall(json.loads(json.dumps(first.memory())))
+    observed(second, network, rows[20:])
+    assert second.summary(0.01) == whole.summary(0.01)
+    (found,) = whole.summary(0.01)
+    velocity, velocity_told = given[:, 1:].mean(axis=1), told[:, :2].mean(axis=1)
+    residual = power_residual(given[:, 0], told[:, 2], velocity, velocity_told)
+    assert found.energy == pytest.approx(0.01 * residual.sum())
+    assert found.transferred == pytest.approx(0.01 * np.abs(given[:, 0] * velocity).sum())
+    assert found.rms == pytest.approx(np.sqrt(np.mean(residual**2)))

@@ -123,11 +123,21 @@ def test_losses_outside_the_interval_do_not_count():
     assert found.losses.count == 0
 
 
-def test_interval_includes_its_ends_and_knows_open_ones():
+def test_interval_includes_its_end_only_and_knows_open_ones():
     x = np.arange(6.0)
-    assert interval_mask(x, 1.0, 4.0).tolist() == [False, True, True, True, True, False]
+    assert interval_mask(x, 1.0, 4.0).tolist() == [False, False, True, True, True, False]
     assert interval_mask(x, None, 2.0).sum() == 3
     assert interval_mask(x, None, None).all()
+
+
+@pytest.mark.parametrize("noise", [-1e-9, 0.0, 1e-9])
+def test_samples_on_a_bound_do_not_depend_on_rounding(noise):
+    """A position read back from a file is rounded; intervals side by side share no sample and miss none."""
+    x = 0.0833333 * np.arange(100.0)
+    a, b, c = x[10], x[40], x[70]
+    first, second = interval_mask(x + noise, a, b), interval_mask(x + noise, b, c)
+    assert (first.sum(), second.sum()) == (30, 30)
+    assert not (first & second).any()
 
 
 def test_an_interval_without_samples_gives_no_figures():
@@ -140,7 +150,7 @@ def test_height_and_lateral_ranges_leave_out_times_without_contact():
     height[100:200] = 5.03
     height[500] = np.nan
     lateral = np.linspace(-0.2, 0.2, n)
-    found = assess(np.full(n, 100.0), np.arange(n) * 0.1, STEP, (0.0, 99.9), height, lateral)
+    found = assess(np.full(n, 100.0), np.arange(n) * 0.1, STEP, (-0.1, 99.9), height, lateral)
     assert found.contact_height_range == pytest.approx(0.03)
     assert (found.lateral_minimum, found.lateral_maximum) == pytest.approx((-0.2, 0.2))
 

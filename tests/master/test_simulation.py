@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from master.algorithm import Jacobi
-from master.errors import SlaveError
+from master.errors import MasterError, SlaveError
 from master.network import Network
 from master.simulation import TimeGrid, interruptible, simulate
+from master.ssp.units import Conversion
 from master.system import Connection
 
 
@@ -63,6 +64,37 @@ def test_values_that_are_not_finite_stop_the_run(fake_slave, bad):
     assert "last good value was 3" in text
     assert len(watcher.rows) == 4  # the bad row is not among them
     assert watcher.finished == 1
+
+
+def test_a_conversion_that_overflows_stops_the_run_with_the_inputs_name(fake_slave):
+    """The output itself is finite: it is the connection's factor that makes too much of it."""
+    slave = fake_slave("clock", ("u",), ("n",), np.ones(1), lambda s, u, t, h: s * 10.0)
+    network = Network([slave], [Connection("clock", "n", "clock", "u", Conversion(1e305, 0.0))])
+    watcher = Watcher()
+    outcome = simulate(network, Jacobi(), TimeGrid(0.0, 0.1, 10), [watcher])
+    assert outcome.status == "failed"
+    text = str(outcome.error)
+    assert "'clock.u' became inf at t = 0.4 s; its last good value was 1e+308" in text
+    assert "Check the factor" in text
+    assert len(watcher.rows) == 4
+
+
+def test_values_too_large_to_be_added_are_still_finite(fake_slave):
+    slave = fake_slave("a", (), ("x", "y"), np.zeros(2), lambda s, u, t, h: np.array([1.5e308, 1.5e308]))
+    network = Network([slave], [])
+    assert simulate(network, Jacobi(), TimeGrid(0.0, 0.1, 3)).status == "complete"
+
+
+def test_an_observer_that_cannot_finish_fails_the_run_and_the_others_finish(fake_slave):
+    class Broken(Watcher):
+        def finish(self):
+            raise MasterError("no room")
+
+    _, network = counter(fake_slave)
+    last = Watcher()
+    outcome = simulate(network, Jacobi(), TimeGrid(0.0, 0.1, 3), [Broken(), last])
+    assert (outcome.status, str(outcome.error)) == ("failed", "no room")
+    assert last.finished == 1
 
 
 def test_the_slaves_own_words_are_quoted(fake_slave):

@@ -1,5 +1,6 @@
 """Asking for FMUs: missing, stale, foreign."""
 
+import struct
 import subprocess
 import zipfile
 
@@ -20,7 +21,7 @@ class Builder:
         if arguments[0] == "fingerprint":
             return subprocess.CompletedProcess(arguments, self.code, self.fingerprint + "\n", self.said)
         if not self.said:
-            name, folder = arguments[1], arguments[3]
+            name, folder = arguments[4], arguments[2]
             with zipfile.ZipFile(f"{folder}/{name}.fmu", "w") as file:
                 file.writestr("modelDescription.xml", f'<fmiModelDescription guid="{{{self.fingerprint.lower()}}}"/>')
         return subprocess.CompletedProcess(arguments, 1 if self.said else 0, "", self.said)
@@ -56,7 +57,7 @@ def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
 
 
 def test_the_builders_words_are_passed_on(builder, tmp_path):
-    builder.code, builder.said = 1, "warning\nX: tension is negative"
+    builder.code, builder.said = 1, "warning\nerror: X: tension is negative"
     with pytest.raises(ValueError, match="cannot be built: X: tension is negative"):
         store.ensure(tmp_path / "X.fmu", print)
     builder.code = 0
@@ -71,7 +72,37 @@ def test_without_fmus_nothing_is_asked(monkeypatch, tmp_path):
     store.ensure(tmp_path / "X.fmu", print)
 
 
+def test_a_name_that_looks_like_an_option_is_a_name():
+    assert store.fingerprint("--help") is None
+
+
 @pytest.mark.parametrize("data", [b"", b"not a zip"])
 def test_a_broken_fmu_has_no_guid(tmp_path, data):
     (tmp_path / "X.fmu").write_bytes(data)
+    assert store.stored_guid(tmp_path / "X.fmu") == ""
+
+
+def stored(path, **changes):
+    """Write an archive with a model description whose entries in both headers are changed."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("modelDescription.xml", '<fmiModelDescription guid="ab"/>')
+    data = bytearray(path.read_bytes())
+    local, central = 0, data.index(b"PK\x01\x02")
+    for offset, value in changes.get("headers", ()):
+        struct.pack_into("<H", data, local + offset, value)
+        struct.pack_into("<H", data, central + offset + 2, value)
+    for place in range(*changes.get("body", (0, 0))):
+        data[place] ^= 0xFF
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"headers": [(6, 1)]}, {"headers": [(8, 99)]}, {"body": (50, 60)}],
+    ids=["encrypted", "method 99", "damaged"],
+)
+def test_an_fmu_whose_archive_cannot_be_unpacked_has_no_guid(tmp_path, changes):
+    stored(tmp_path / "X.fmu")
+    assert store.stored_guid(tmp_path / "X.fmu") == "ab"
+    stored(tmp_path / "X.fmu", **changes)
     assert store.stored_guid(tmp_path / "X.fmu") == ""

@@ -18,6 +18,7 @@ from models.catenary.equilibrium import EquilibriumError, find_form, weight
 from models.catenary.mesh import build_mesh
 from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.parameters import COMPONENTS, GRAVITY
+from models.commands import main
 from models.library import line_names, load_line
 
 
@@ -226,3 +227,59 @@ def test_too_much_pre_sag_makes_droppers_push(short_line):
     mesh = build_mesh(line)
     with pytest.raises(EquilibriumError, match="would have to push"):
         find_form(line, mesh)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("contact_wire.tension", 1.0), ("messenger_wire.tension", 1.0), ("contact_wire.mass", 900.0),
+     ("profile.pre_sag", -0.01), ("profile.encumbrance", 0.05)],
+)  # fmt: skip
+def test_a_shape_that_runs_away_is_one_sentence(line_maker, name, value):
+    """No number overflows on the way: a RuntimeWarning would fail the test."""
+    line = line_maker(spans=3).with_values({name: value})
+    with pytest.raises(EquilibriumError, match="line 'short' has no static equilibrium of the wanted shape") as caught:
+        find_form(line, build_mesh(line))
+    assert "\n" not in str(caught.value)
+
+
+def test_what_nothing_holds_is_one_sentence(line_maker, monkeypatch):
+    line = line_maker(spans=3)
+    mesh = build_mesh(line)
+    inner = mesh.chains[0].nodes[5]
+
+    def loose(*given):
+        matrices = assemble(*given)
+        kept = np.ones(matrices.load.size)
+        kept[inner * NODE_DOFS + 3] = 0.0  # nothing keeps it from twisting
+        return dataclasses.replace(matrices, K=(sp.diags(kept) @ matrices.K @ sp.diags(kept)).tocsc())
+
+    monkeypatch.setattr("models.catenary.equilibrium.assemble", loose)
+    with pytest.raises(EquilibriumError, match="equations are singular, as they are where nothing holds a wire"):
+        find_form(line, mesh)
+
+
+def test_a_command_tells_it_without_a_traceback(capfd):
+    assert main(["statics", "LN2", "--set", "line.contact_wire.tension=1"]) == 1
+    shown = capfd.readouterr().err
+    assert shown.startswith("error: ")
+    assert shown.count("\n") == 1
+
+
+def test_a_line_without_mass_is_one_sentence(line_maker, monkeypatch):
+    def weightless(*given):
+        state = find_form(*given)
+        matrices = dataclasses.replace(state.matrices, M=0.0 * state.matrices.M)
+        return dataclasses.replace(state, matrices=matrices)
+
+    monkeypatch.setattr("models.catenary.model.find_form", weightless)
+    with pytest.raises(EquilibriumError, match=r"line 'short' cannot move in modes .*not positive"):
+        CatenaryModel(line_maker(spans=3))
+
+
+def test_a_line_that_buckles_is_one_sentence(line_maker):
+    line = line_maker(spans=3)
+    model = CatenaryModel(line)
+    model.modes = dataclasses.replace(model.modes, K=-1e9 * model.modes.K)
+    strips = StripMotion(np.full((1, 2, 2, 3), -100.0), np.zeros(1))
+    with pytest.raises(EquilibriumError, match=r"line 'short' cannot make steps of 0.001 s: .*not positive"):
+        model.step(model.initial_state(), 1e-3, strips)

@@ -183,7 +183,6 @@ def test_command_writes_tables_and_plots_of_every_line(name, tmp_path, capsys):
     [
         (["LN2", "--span", "25"], "spans 1 to 24"),
         (["LN2", "--section", "2"], "sections 1 to 1"),
-        (["LN2", "--force", "-1"], "--force"),
         (["LN2", "--set", "line.contact_wire.tension=-1"], "contact_wire.tension"),
         (["LN9"], "LN9"),
     ],

@@ -1,0 +1,106 @@
+"""The process of an isolated FMU: started, listened to, ended."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections import deque
+from pathlib import Path
+from threading import Thread
+from typing import IO, Final
+
+from master.errors import one_line
+from master.isolation.wire import Channel
+
+#: Seconds that a process has to be gone after its connection has ended.
+_ENDING_SECONDS: Final = 5.0
+#: Seconds that a process has to end by itself once it was told to, or its connection was closed.
+_GRACE_SECONDS: Final = 2.0
+#: What is kept of what an FMU prints: this many pieces of at most so many bytes.
+_PIECES: Final = 4
+_PIECE: Final = 4096
+
+
+class Process:
+    """A child process with a connection to it, its own folder for temporary files, and an ear for what it prints.
+
+    Attributes
+    ----------
+    channel : Channel
+        The master's end of the connection.
+    """
+
+    def __init__(self) -> None:
+        self._folder = tempfile.mkdtemp(prefix="isolated-")
+        ours, theirs = socket.socketpair()
+        with theirs:
+            self._process = subprocess.Popen(
+                # -P: the working folder is no place to import from.
+                [sys.executable, "-P", "-m", "master.isolation", str(theirs.fileno()), str(os.getpid())],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                pass_fds=[theirs.fileno()],
+                env=self._environment(),
+                start_new_session=True,  # the terminal's Ctrl-C is not for it
+            )
+        self.channel = Channel(ours)
+        self._said: deque[bytes] = deque(maxlen=_PIECES)
+        # Someone has to read what an FMU prints, or it would stop when the pipe is full.
+        self._listener = Thread(target=self._listen, args=(self._process.stdout,), daemon=True)
+        self._listener.start()
+
+    def how_it_ended(self) -> str:
+        """Wait for the process and return how it ended, in words, with the last line that it printed."""
+        try:
+            code = self._process.wait(_ENDING_SECONDS)
+        except subprocess.TimeoutExpired:
+            self.end(grace=0.0)
+            return "closed its connection" + self._last_words()
+        self._listener.join(_ENDING_SECONDS)
+        if code < 0:
+            return f"was ended by signal {_signal_text(-code)}" + self._last_words()
+        return f"ended itself with exit code {code}" + self._last_words()
+
+    def end(self, grace: float = _GRACE_SECONDS) -> None:
+        """End the process, if it does not end by itself within ``grace`` seconds, and remove its files."""
+        self.channel.close()
+        try:
+            self._process.wait(grace)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _environment(self) -> dict[str, str]:
+        paths = [path or str(Path.cwd()) for path in sys.path]
+        return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "TMPDIR": self._folder}
+
+    def _listen(self, pipe: IO[bytes]) -> None:
+        with pipe:
+            while piece := os.read(pipe.fileno(), _PIECE):
+                self._said.append(piece)
+
+    def _last_words(self) -> str:
+        lines = b"".join(self._said).decode("utf-8", "replace").split("\n")
+        spoken = [line.strip() for line in lines if line.strip()]
+        return f"; the last that it printed was: {one_line(spoken[-1])}" if spoken else ""
+
+
+def _signal_text(number: int) -> str:
+    """Return a signal's name and what it means.
+
+    Examples
+    --------
+    >>> _signal_text(11)
+    'SIGSEGV (Segmentation fault)'
+    """
+    try:
+        return f"{signal.Signals(number).name} ({signal.strsignal(number)})"
+    except ValueError:
+        return str(number)

@@ -1,0 +1,104 @@
+"""What a line's FMU warns of in the FMI log: once, at the right time, and nothing where all is well."""
+
+from __future__ import annotations
+
+import pytest
+
+from fmus.build import build
+from models.catenary.limits import slack_warning
+from models.catenary.part import CatenaryPart
+from models.library import line_names, load_line
+from tests.fmus.support import Instance, short_line_recipe
+
+SPEEDS = [f"pantograph[1].{end}.vx" for end in "AB"]
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sound")
+    return build(short_line_recipe(folder), folder)
+
+
+@pytest.fixture(scope="module")
+def slack(tmp_path_factory):
+    """A line whose fourth dropper of every span is far too long."""
+    folder = tmp_path_factory.mktemp("slack")
+    return build(short_line_recipe(folder, "[1.25, 1.15, 1.1, 2.5, 1.1, 1.15, 1.25]"), folder)
+
+
+@pytest.fixture
+def instantiate():
+    made = []
+
+    def make(path):
+        made.append(Instance(path))
+        return made[-1]
+
+    yield make
+    for instance in made:
+        instance.free()
+
+
+def wave_speed(instance):
+    instance.slave.setupExperiment(startTime=0.0)
+    instance.slave.enterInitializationMode()
+    return instance["contact_wire.wave_speed"]
+
+
+def test_slack_droppers_are_named_once_whatever_is_asked_before(instantiate, slack):
+    line = instantiate(slack)
+    line.slave.setupExperiment(startTime=0.0)
+    line.slave.enterInitializationMode()
+    for force in (1.0, 2.0):  # builds and initialises more than once
+        line["pantograph[1].A.vx"] = force
+        assert line["dropper[4].force"] == 0.0
+    assert line.warnings == []
+    line.slave.exitInitializationMode()
+    places = ", ".join(f"{4 + 7 * i} at {50 * i + 25:.2f} m" for i in range(5))
+    assert line.warnings == [f"droppers {places} are slack at rest"]
+    for n in range(3):
+        line.step(n * 1e-3)
+    assert len(line.messages) == 1
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.69, 0), (0.71, 1), (-0.71, 1), (1.2, 1)])
+def test_a_train_too_fast_for_the_waves(instantiate, sound, share, expected):
+    line = instantiate(sound)
+    C = wave_speed(line)
+    for name in SPEEDS:
+        line[name] = share * C
+    line.slave.exitInitializationMode()
+    line.step(0.0)
+    assert len(line.warnings) == len(line.messages) == expected
+    assert all(f"are {abs(share):.2f} of the contact wire's wave speed" in text for text in line.warnings)
+
+
+def test_steps_too_long_are_told_once(instantiate, sound):
+    line = instantiate(sound)
+    line.initialise()
+    time = 0.0
+    for step in (1e-3, 2e-3, 8e-3, 1e-3, 9e-3):
+        line.step(time, step)
+        time += step
+    assert len(line.messages) == 1
+    assert line.warnings[0].startswith("a step of 8 ms is long for a contact stiffness of")
+
+
+def test_the_first_step_can_be_too_long(instantiate, sound):
+    line = instantiate(sound)
+    line.initialise()
+    line.step(0.0, 8e-3)
+    assert len(line.warnings) == 1
+
+
+def test_a_line_that_cannot_be_built_tells_errors_alone(instantiate, sound):
+    line = instantiate(sound)
+    line.initialise(**{"contact_wire.tension": 1.0})
+    assert line.warnings == []
+    assert "no static equilibrium of the wanted shape" in line.errors[0]
+
+
+@pytest.mark.parametrize("name", line_names())
+def test_no_dropper_of_the_library_is_slack_at_rest(name):
+    part = CatenaryPart(load_line(name))
+    assert slack_warning(part.droppers, part.model.static.dropper_force) == ""

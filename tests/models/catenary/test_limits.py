@@ -1,0 +1,75 @@
+"""Warnings of physical limits: when they come, and what their numbers are."""
+
+import math
+
+import numpy as np
+import pytest
+
+from models.catenary.limits import longest_step, slack_warning, speed_warning, step_warning, tangent_stiffness
+from models.catenary.parameters import Contact
+from models.catenary.part import CatenaryPart
+from models.catenary.statics import wave_speed
+from models.commands import main
+
+
+def test_the_speed_is_compared_with_the_waves_of_the_longest_span(ln2):
+    C = wave_speed(ln2.contact_wire, 50.0)
+    assert speed_warning(ln2, 0.699 * C) == ""
+    assert "0.71 of the contact wire's wave speed" in speed_warning(ln2, 0.71 * C)
+    assert "operated up to 0.7" in speed_warning(ln2, -0.99 * C)
+    assert "no wave runs ahead" in speed_warning(ln2, 1.01 * C)
+
+
+def test_usual_steps_are_short_enough(ln2):
+    assert step_warning(ln2, 1e-3, head_mass=7.75) == ""
+    assert "take" in step_warning(ln2, 5e-3)
+
+
+def test_a_light_head_needs_shorter_steps(ln2):
+    """A mass on the contact spring is resolved by twenty steps per period."""
+    K = ln2.contact.stiffness
+    assert longest_step(ln2, head_mass=0.1) == pytest.approx(2.0 * math.pi * math.sqrt(0.1 / K) / 20.0)
+    assert longest_step(ln2, head_mass=100.0) == longest_step(ln2)
+
+
+def test_the_longest_step_falls_with_the_contact_stiffness(ln2):
+    stiff = ln2.with_values({"contact.stiffness": 10.0 * ln2.contact.stiffness})
+    assert longest_step(stiff) == pytest.approx(0.1 * longest_step(ln2))
+
+
+def test_a_wire_takes_up_waves_like_the_damper_of_the_criterion(ln2):
+    """The relaxation time is that of the wave equation: energy per time fed into both sides of a string is F v."""
+    wire = ln2.contact_wire
+    C, v = math.sqrt(wire.tension / wire.mass), 0.3
+    # Behind the front the string moves with v and is inclined by v / C: kinetic and elastic energy per length.
+    power = 2.0 * C * (0.5 * wire.mass * v**2 + 0.5 * wire.tension * (v / C) ** 2)
+    assert power == pytest.approx(2.0 * math.sqrt(wire.tension * wire.mass) * v**2)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
+def test_the_stiffness_is_the_slope_of_the_law(exponent):
+    contact = Contact(stiffness=30000.0, exponent=exponent)
+    depth = (200.0 / contact.stiffness) ** (1.0 / exponent)
+    above, below = (contact.stiffness * (share * depth) ** exponent for share in (1.0001, 0.9999))
+    slope = (above - below) / (0.0002 * depth)
+    assert tangent_stiffness(contact) == pytest.approx(slope, rel=1e-6)
+
+
+def test_slack_droppers_are_named(line_maker):
+    part = CatenaryPart(line_maker())
+    force = part.model.static.dropper_force
+    assert slack_warning(part.droppers, force) == ""
+    loose = force.copy()
+    loose[[3, 11]] = 0.0
+    told = slack_warning(part.droppers, loose)
+    assert told == (
+        f"droppers {part.droppers[3].name} at {part.droppers[3].x:.2f} m, "
+        f"{part.droppers[11].name} at {part.droppers[11].x:.2f} m are slack at rest"
+    )
+    assert slack_warning(part.droppers, np.zeros(len(force))).endswith(f"and {len(force) - 8} more are slack at rest")
+
+
+@pytest.mark.parametrize(("speed", "expected"), [("200", False), ("350", True)])
+def test_statics_warns_of_the_speed(speed, expected, capsys):
+    assert main(["statics", "EN50318_2018_AC_simple", "--speed", speed]) == 0
+    assert ("warning: the train's 350 km/h" in capsys.readouterr().err) == expected

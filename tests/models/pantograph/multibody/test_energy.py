@@ -1,0 +1,49 @@
+"""The energy balance of a multibody pantograph: the error of its integration, and no more."""
+
+import numpy as np
+import pytest
+
+from models.library import load_pantograph
+from models.pantograph.multibody.part import MultibodyPantographPart
+
+
+def run(name, step, roof=0.0, stop=0.5):
+    """Run under a force that swings, on a roof that may move."""
+    part = MultibodyPantographPart(load_pantograph(name).with_values({"monitor_energy": 1}))
+    speed = part.definition.operation.speed
+    part.initialise(0.0, 150.0, np.zeros(3), np.zeros(2))
+    for n in range(round(stop / step)):
+        t = n * step
+        base = roof * np.array([1.0 - np.cos(6.0 * t), 6.0 * np.sin(6.0 * t)])
+        part.step(150.0 + 40.0 * np.sin(8.0 * t), np.array([speed * t, 0.2 * np.sin(t), 5.0]), base, step)
+    return part
+
+
+@pytest.mark.parametrize("name", ["CX_multibody", "generic_multibody"])
+@pytest.mark.parametrize("roof", [0.0, 0.005])
+def test_drift_is_the_error_of_the_integration(name, roof):
+    """It is small, and falls with the third power of the step or faster."""
+    coarse, fine = (run(name, step, roof).energy for step in (1e-3, 5e-4))
+    assert coarse[1] > 0.1
+    assert coarse[:3] == pytest.approx(fine[:3], abs=1e-3 * np.abs(fine).max())
+    assert abs(coarse[3]) < 1e-7 * np.abs(coarse).max()
+    assert abs(fine[3]) < abs(coarse[3]) / 6.0
+
+
+def test_velocities_that_no_force_has_changed_are_found_out():
+    part = run("CX_multibody", 1e-3, stop=0.1)
+    before = part.energy
+    n = part._built.mechanism.count
+    part._y[7 * n :] *= 1.001
+    assert part.energy[3] - before[3] == pytest.approx(part.energy[0] - before[0])
+    assert part.energy[3] > 1e-6 * np.abs(part.energy).max()
+
+
+def test_a_balance_goes_on_from_a_snapshot():
+    first, second = run("CX_multibody", 1e-3, stop=0.05), run("CX_multibody", 1e-3, stop=0.01)
+    second.restore(first.snapshot())
+    for part in (first, second):
+        for _ in range(10):
+            part.step(120.0, np.zeros(3), np.zeros(2), 1e-3)
+    assert np.array_equal(first.energy, second.energy)
+    assert np.array_equal(first.contact_work, second.contact_work)

@@ -48,7 +48,7 @@ def test_a_thousand_pantographs(tmp_path):
 @only_linux
 @pytest.mark.slow
 def test_sixty_lines(tmp_path):
-    """Each holds some 20 MB while it is there."""
+    """Each holds some 5 MB while it is there."""
     found = many(build(short_line_recipe(tmp_path), tmp_path), 60, 15, tmp_path)
     assert found["after"] == found["before"]
     assert found["left"] < 200.0

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from models.catenary.compiled import KernelError
 from models.catenary.equilibrium import EquilibriumError
 from models.catenary.local_response import LocalSolutionError
 from models.commands import couple, identify, pantograph, statics
@@ -19,6 +20,7 @@ _VERBS = (couple, statics, pantograph, identify)
 _USER_ERRORS = (
     DefinitionError,
     EquilibriumError,
+    KernelError,
     LocalSolutionError,
     MechanismError,
     ParameterError,

@@ -7,6 +7,7 @@ from scipy.sparse.linalg import spsolve
 
 from models.catenary.model import CatenaryModel
 from models.catenary.part import CatenaryPart
+from models.commands import main
 from models.coupled import CoupledModel
 from models.pantograph.lumped import LumpedModel, LumpedPantographPart
 from models.time_integration import Newmark
@@ -156,3 +157,9 @@ def test_parts_continue_identically_from_a_snapshot(line, pantograph):
     assert parts[0][0].contact_force[0] > 0.0
     for first, second in zip(parts[0][0].snapshot().items(), parts[1][0].snapshot().items(), strict=True):
         assert np.array_equal(first[1], second[1], equal_nan=True), first[0]
+
+
+def test_a_kernel_that_does_not_exist_is_told_on_one_line(monkeypatch, capsys):
+    monkeypatch.setenv("OPENPANTO_KERNEL", "cuda")
+    assert main(["couple", "generic_simple", "CX", "--speed", "200"]) != 0
+    assert "OPENPANTO_KERNEL is 'cuda'" in capsys.readouterr().err

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -25,7 +25,7 @@ from models.catenary.intervals import (
     plan_rotation,
     without_rounding,
 )
-from models.catenary.local_response import LocalForces, LocalProblem, OpenContact
+from models.catenary.local_response import LocalForces, LocalProblem, LocalSolutionError, OpenContact
 from models.catenary.meeting import FreeMotion, Meeting, Reaction, local_motion
 from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.parameters import CatenaryDefinition
@@ -175,6 +175,20 @@ class CatenaryModel:
             loaded=_NOWHERE,
             load=_NOTHING,
         )
+
+    def rehearse(self, step: float, strips: FloatArray) -> None:
+        """Take a step with a line at rest that is thrown away, so that the first real one need not lay anything out.
+
+        Factorisation, compiled code and the responses about the strips are there afterwards: a paced run must not wait.
+
+        Parameters
+        ----------
+        step : float
+            Time step [s].
+        strips : ndarray, shape (n_pantographs, 2, 2, 3)
+        """
+        with suppress(LocalSolutionError):  # the real step will tell, if it finds the same
+            self.step(self.initial_state(len(strips)), step, StripMotion(strips, np.zeros(len(strips))))
 
     def step(self, state: CatenaryState, step: float, motion: StripMotion) -> ContactResult:
         """Advance the line by one time step under moving strips.

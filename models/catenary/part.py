@@ -168,6 +168,7 @@ class CatenaryPart:
         """
         self.time = time
         self._state = self.model.initial_state(len(self._strips))
+        self.model.rehearse(self.definition.time_step, strips)
         for extrapolation, strip in zip(self._strips, strips, strict=True):
             extrapolation.start(time, strip)
         contacts = self.model.contact_at_rest(self._state, strips)

@@ -324,7 +324,7 @@ def meet(
     strip_x, strip_y = strip[1, 0, 0] - ax, strip[1, 0, 1] - ay
     direction = 0
     while True:
-        x, y, x2, y2 = plan_static[2 * element], plan_static[2 * element + 1], 0.0, 0.0
+        x, y = plan_static[2 * element], plan_static[2 * element + 1]
         x2, y2 = plan_static[2 * element + 2], plan_static[2 * element + 3]
         for m in range(row.size):
             x += plan[2 * element, m] * local[0, m]

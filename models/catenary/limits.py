@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from models.catenary.parameters import CatenaryDefinition, Contact
-from models.catenary.statics import OPERATION_LIMIT, wave_speed
+from models.catenary.statics import OPERATION_LIMIT, contact_wire_wave_speed
 from models.part import FloatArray
 
 #: Contact force at which the stiffness of a law with an exponent is taken [N].
@@ -47,8 +47,7 @@ def speed_warning(definition: CatenaryDefinition, speed: float) -> str:
     speed : float
         Of the train, either way [m/s].
     """
-    longest = max(span.length for section in definition.sections for span in section.spans)
-    C = wave_speed(definition.contact_wire, longest)
+    C = contact_wire_wave_speed(definition)
     ratio = abs(speed) / C
     if ratio <= OPERATION_LIMIT:
         return ""

@@ -20,20 +20,21 @@ class Reaction:
 
     Attributes
     ----------
-    coupling : ndarray, shape (n_span, e)
-        mu G of the interval's modes with its attachments.
     yielding : ndarray, shape (n_span, e)
-        How its modes follow the attachments within a step, mu G / K_hat.
+        How the interval's modes follow the attachments within a step, mu G / K_hat.
     columns : Columns
         Response to unit loads at its attachments.
     at_ends : ndarray, shape (e, e)
         The same at the attachments themselves.
     """
 
-    coupling: FloatArray
     yielding: FloatArray
     columns: Columns
     at_ends: FloatArray
+
+    def on_attachments(self, touch: Touch) -> FloatArray:
+        """Return what a unit force on the wire does to its attachments, directly and through the modes, shape (e,)."""
+        return touch.ends - touch.modal.dot(self.yielding)
 
 
 class Meeting(NamedTuple):

@@ -246,9 +246,8 @@ class CatenaryModel:
         for s, element, xi, force in placed:
             touch = self.wires[s].touch(element, xi)
             reaction = self._reaction(now, s, touch.interval)
-            columns, span = reaction.columns, touch.interval.modes
-            load = force * (touch.ends - (touch.modal * now.stepper.inverse[span]) @ reaction.coupling)
-            now.stepper.press(span, force * touch.modal)
+            columns, load = reaction.columns, force * reaction.on_attachments(touch)
+            now.stepper.press(touch.interval.modes, force * touch.modal)
             now.stepper.attached[columns.rows] += columns.values @ load
             near = columns.dropper_index
             elastic[near] += self.dropper_stiffness[near] * (columns.dropper_stretch @ load)
@@ -392,7 +391,7 @@ class CatenaryModel:
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
             touch = self.wires[s].touch(element, xi)
             interval, reaction = touch.interval, self._reaction(now, s, touch.interval)
-            pressed[interval.ends] += force * (touch.ends - touch.modal.dot(reaction.yielding))
+            pressed[interval.ends] += force * reaction.on_attachments(touch)
             known.append((interval.modes, force * touch.modal))
         now.stepper.begin(state.motion, pressed)
         for span, modal in known:
@@ -456,7 +455,7 @@ class CatenaryModel:
             modal=touch.modal,
             yielding=touch.modal * now.stepper.inverse[interval.modes],
             places=interval.ends,
-            load=touch.ends - touch.modal.dot(reaction.yielding),
+            load=reaction.on_attachments(touch),
             columns=reaction.columns,
             at_ends=reaction.at_ends,
         )
@@ -469,7 +468,7 @@ class CatenaryModel:
             columns = now.compliance.units(interval.ends)
             coupling = now.stepper.coupling(interval.modes, interval.ends)
             yielding = now.stepper.inverse[interval.modes, None] * coupling
-            found = Reaction(coupling, yielding, columns, columns.at(interval.ends))
+            found = Reaction(yielding, columns, columns.at(interval.ends))
             while len(kept) >= _KEPT_INTERVALS * len(self.wires):
                 del kept[next(iter(kept))]
             kept[(section, interval.first)] = found

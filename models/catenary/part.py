@@ -10,7 +10,7 @@ from models.catenary.energy import LineBalance
 from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.parameters import CatenaryDefinition
-from models.catenary.statics import wave_speed
+from models.catenary.statics import contact_wire_wave_speed
 from models.contact import application_point
 from models.energy import NO_BALANCE
 from models.extrapolation import StripExtrapolation
@@ -155,8 +155,7 @@ class CatenaryPart:
     @property
     def contact_wire_wave_speed(self) -> FloatArray:
         """Return the speed of waves in the contact wire, taken for the longest span [m/s], shape (1,)."""
-        longest = max(span.length for section in self.definition.sections for span in section.spans)
-        return np.array([wave_speed(self.definition.contact_wire, longest)])
+        return np.array([contact_wire_wave_speed(self.definition)])
 
     def initialise(self, time: float, strips: FloatArray) -> None:
         """Put the line to rest at ``time`` and find the contacts of the strips with it.

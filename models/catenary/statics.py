@@ -158,6 +158,12 @@ def wave_speed(wire: Wire, length: float) -> float:
     return math.sqrt((wire.tension + wire.EI * (math.pi / length) ** 2) / wire.mass)
 
 
+def contact_wire_wave_speed(definition: CatenaryDefinition) -> float:
+    """Return the wave speed of a line's contact wire, taken for its longest span, where it is lowest [m/s]."""
+    longest = max(span.length for section in definition.sections for span in section.spans)
+    return wave_speed(definition.contact_wire, longest)
+
+
 def reflection_factor(upper: Wire, contact: Wire) -> float:
     """Return r = sqrt(F_u rho_u) / (sqrt(F_u rho_u) + sqrt(F_c rho_c)) of a dropper between two wires."""
     above, below = (math.sqrt(w.tension * w.mass) for w in (upper, contact))

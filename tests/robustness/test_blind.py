@@ -11,22 +11,16 @@ from hypothesis import given, settings
 from master.cli import main
 from master.scenario import open_scenario
 from tests.master.conftest import SSV, ssd_text
+from tests.master.ssp.test_nested import BINDING
+from tests.master.ssp.test_nested import MAPPED as MAPPED_BINDING
+from tests.master.ssp.test_nested import MAPPING as NESTED_MAPPING
 from tests.robustness.mutation import changes
 from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_refused
 
 SSD = "SystemStructure.ssd"
 TEXTS = {SSD: ssd_text(), "parameters.ssv": SSV}
-MAPPING = """<?xml version="1.0" encoding="UTF-8"?>
-<ssm:ParameterMapping xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
-    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0">
-  <ssm:MappingEntry source="static_force" target="static_force">
-    <ssc:LinearTransformation factor="0.5" offset="10"/>
-  </ssm:MappingEntry>
-  <ssm:MappingEntry source="ripple" target="speed"/>
-</ssm:ParameterMapping>
-"""
-BINDING = '<ssd:ParameterBinding source="parameters.ssv"/>'
-MAPPED = ssd_text().replace(BINDING, f'{BINDING[:-2]}><ssd:ParameterMapping source="m.ssm"/></ssd:ParameterBinding>')
+MAPPING = NESTED_MAPPING.format("ripple")
+MAPPED = ssd_text().replace(BINDING, MAPPED_BINDING)
 
 
 def rewrite(scenario, **changed):

@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -21,18 +22,18 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.catenary.band import Banded
-from models.catenary.contact_wire import ContactWire, Crossing, Touch
+from models.catenary.contact_wire import ContactWire, Crossing, Touch, WireInterval
 from models.catenary.interval_modes import IntervalModes
-from models.catenary.stepping import LineMotion, Stepper
-from models.part import FloatArray
+from models.catenary.motion import LineMotion
+from models.catenary.reaction import Meeting, Point, Reaction
+from models.catenary.stepping import Known, Stepper
+from models.part import FloatArray, IntArray
 from models.time_integration import Newmark
 
 if TYPE_CHECKING:  # an FMU carries what is imported, and this is never imported by its name
     from models.catenary import kernels as _  # noqa: F401
 
 _SWITCH = "OPENPANTO_KERNEL"
-#: Chunks of a group, 15 modes each as a rule.
-_GROUP = 24
 #: Read now: an FMU's folder may be gone when a second instance asks for the kernels.
 _SOURCE = Path(__file__).with_name("kernels.py").read_bytes()
 
@@ -135,57 +136,198 @@ class CompiledStepper(Stepper):
         super().__init__(modes, newmark)
 
     def _set_up(self, coupling: sp.csr_matrix) -> None:
-        if not isinstance(self.factor, Banded) or coupling.shape[1] < self.kernels.WIDTH:
+        if not isinstance(self.factor, Banded) or coupling.shape[1] < self.kernels.ENDS:
             raise _UnsuitedError("the line's attachments are not a band, or too few")
         modes, newmark = self.modes, self.newmark
-        chunks, values = _chunks(modes, coupling, self.kernels.WIDTH)
         band = _Twisted(self.factor)
-        mu = self._mu[chunks[:, 0].astype(np.int64)]
-        rates = np.stack([newmark.a1 / mu, np.full(len(mu), newmark.a2), newmark.a2 / mu], axis=1)
-        self._modes = (
-            _groups(chunks, rates), chunks, rates, values, self._from_modal, self.inverse, np.zeros(len(self.modal)),
-        )  # fmt: skip
+        units = self.units = _Units(self, coupling)
         own = sp.triu(-2.0 * modes.K + 1j * newmark.a2 * modes.M)  # both on one pattern
         rows, columns, entries = _pattern(own)
         self._first = (
             *_pattern(modes.turn.T), rows, columns, np.stack([entries.real, entries.imag], axis=1),
             band.top, band.bottom, band.middle, band.size,
         )  # fmt: skip
-        self._last = *_pattern(modes.turn), *self._modes, newmark.a1
+        self._last = *_pattern(modes.turn), *units.layout, newmark.a1
         self._band_work = np.zeros((2, int(band.size[0] + band.size[2])))
+        self._table = np.zeros(0)
 
-    def begin(self, motion: LineMotion, pressed: FloatArray) -> None:
-        """Find the changes of this step without forces on intervals; see `Stepper.begin`."""
-        if not motion.prepared.size or motion.prepared[0] != self.newmark.step:
-            motion.prepared = np.empty(1 + len(self.inverse) + len(self._ends))
-            motion.prepared[0] = self.newmark.step
-            self.kernels.prepare(*self._modes, motion.modal, motion.momentum, *self._parts(motion))
-        self.modal, pull = self._parts(motion)
+    def begin(self, motion: LineMotion, pressed: FloatArray, known: Sequence[Known] = ()) -> None:
+        """Find the changes of this step without what is found inside it; see `Stepper.begin`."""
+        packed = self._packed(motion)
+        self._table = table = packed.table
+        for reaction, element, xi, force in known:
+            interval = reaction.interval
+            row, load = np.empty(interval.size), np.empty(len(interval.ends))
+            self.kernels.push(
+                interval.height, interval.height_static, reaction.slots, interval.ends, reaction.yielding,
+                reaction.at_ends, element, xi, force, row, load, table, pressed,
+            )  # fmt: skip
         self.kernels.attachments(
-            *self._first, motion.attached, pressed, pull, self._right, self._band_work, self.attached
+            *self._first, motion.attached, pressed, packed.pull, self._right, self._band_work, self.attached
         )
+
+    def press(self, span: slice, force: FloatArray) -> None:
+        """Add a force on the modes of an interval, its attachments held."""
+        self._table[self.units.held[span]] += force * self.inverse[span]
+
+    def apply(self, point: Point, force: float) -> None:
+        """Add what a force on a point of a wire changes in this step; see `Stepper.apply`."""
+        reaction, touch, load, _ = point
+        columns = reaction.columns
+        self.kernels.apply(
+            reaction.slots, touch.row, load, force, columns.rows.start, columns.values, self._table, self.attached
+        )
+
+    def slots(self, span: slice) -> IntArray:
+        """Return where the modes of an interval are kept while they are packed, shape (n_span,)."""
+        return self.units.slots[span].astype(np.uint64)
+
+    def local(self, interval: WireInterval, motion: LineMotion) -> tuple[FloatArray, FloatArray]:
+        """Return an interval's local coordinates and rates, and their changes; see `Stepper.local`."""
+        table, units, attached = self._table, self.units, motion.attached
+        count, span = interval.count, interval.modes
+        before, change = np.empty((2, interval.size)), np.empty(interval.size)
+        before[0, :count], before[1, :count] = table[units.slots[span]], table[units.rate[span]]
+        before[:, count:] = attached.take(interval.ends, axis=1)
+        change[:count], change[count:] = table[units.held[span]], self.attached.take(interval.ends)
+        return before, change
+
+    def meet(
+        self, reaction: Reaction, wire: ContactWire, strip: FloatArray, element: int, motion: LineMotion
+    ) -> Meeting | None:
+        """Return where a strip crosses an interval, unless it leaves it; see `Stepper.meet`."""
+        interval = reaction.interval
+        local, row = np.empty((2, interval.size)), np.empty(interval.size)
+        load, out = np.empty(len(interval.ends)), np.empty(6)
+        found = self.kernels.meet(
+            strip, element - interval.first,
+            interval.plan, interval.plan_static, interval.height, interval.height_static,
+            reaction.slots, interval.ends, reaction.yielding, reaction.at_ends, self.newmark.a1,
+            self._table, self.attached, motion.attached, local, row, load, out,
+        )  # fmt: skip
+        if found < 0:
+            return None
+        xi, share, height, rise, rate, compliance = out.tolist()
+        count = interval.count
+        point = Point(reaction, Touch(interval, row, row[:count], row[count:], height), load, compliance)
+        return Meeting(wire.crossing(strip, interval.first + found, xi, share), point, rise, rate)
+
+    def place(self, crossing: Crossing, point: Point, motion: LineMotion, place: FloatArray) -> None:
+        """Put a point of a wire into ``place``, shape (3,) [m]."""
+        reaction, touch, _, _ = point
+        interval = reaction.interval
+        self.kernels.place(
+            interval.plan, interval.plan_static, touch.row, touch.height, reaction.slots,
+            interval.ends, self._table, motion.attached, crossing.element - interval.first, crossing.xi, place,
+        )  # fmt: skip
 
     def finish(self, motion: LineMotion) -> None:
         """Let the intervals follow their attachments, and replace the motion by that at the end of the step."""
-        self.kernels.finish(
-            *self._last, self.attached, self._ends,
-            motion.modal, motion.momentum, motion.attached, *self._parts(motion),
-        )  # fmt: skip
+        packed = self._packed(motion)
+        self.kernels.finish(*self._last, self.attached, self._ends, motion.attached, packed.table, packed.pull)
+        packed.moved = True
 
-    def place(
-        self, wire: ContactWire, crossing: Crossing, touch: Touch, motion: LineMotion, point: FloatArray
-    ) -> None:
-        """Put a point of a wire into ``point``, shape (3,) [m]."""
-        interval = touch.interval
-        self.kernels.place(
-            interval.plan, interval.plan_static, touch.row, touch.height, interval.modes.start, interval.count,
-            interval.ends, motion.modal, motion.attached, crossing.element - interval.first, crossing.xi, point,
-        )  # fmt: skip
+    def _packed(self, motion: LineMotion) -> _Packed:
+        """Return the modal part of a motion in the kernels' order, which it is kept in from now on."""
+        found = motion.packed
+        if isinstance(found, _Packed) and found.owner is self:
+            return found
+        prepared = motion.prepared
+        packed = _Packed(self, *motion.plain(), prepared)
+        if not prepared.size or prepared[0] != self.newmark.step:
+            self.kernels.prepare(*self.units.layout, packed.table, packed.pull)
+        motion.packed = packed
+        return packed
 
-    def _parts(self, motion: LineMotion) -> tuple[FloatArray, FloatArray]:
-        """Return the prepared changes of the modal amplitudes and pulls on the ends, views."""
-        return motion.prepared[1 : 1 + len(self.inverse)], motion.prepared[1 + len(self.inverse) :]
 
+class _Packed:
+    """The modal part of a motion in units; see `models.catenary.kernels.finish`.
+
+    Attributes
+    ----------
+    owner : CompiledStepper
+    table, pull : ndarray
+        See `models.catenary.kernels.finish`.
+    moved : bool
+        Whether the motion has changed since it was last unpacked.
+    """
+
+    def __init__(self, owner: CompiledStepper, modal: FloatArray, momentum: FloatArray, prepared: FloatArray) -> None:
+        units = owner.units
+        self.owner, self.moved = owner, False
+        self.table = units.table.copy()
+        self.table[units.slots], self.table[units.rate] = modal
+        self.table[units.momentum] = momentum
+        self.pull = np.zeros(owner.modes.coupling.shape[1])
+        if prepared.size:
+            self.table[units.held], self.pull[:] = np.split(prepared[1:], [len(momentum)])
+
+    def unpack(self, modal: FloatArray, momentum: FloatArray) -> None:
+        """Put it into the arrays of a `LineMotion`."""
+        if self.moved:
+            units = self.owner.units
+            np.take(self.table, units.slots, out=modal[0])
+            np.take(self.table, units.rate, out=modal[1])
+            np.take(self.table, units.momentum, out=momentum)
+            self.moved = False
+
+    def prepared(self) -> FloatArray:
+        """Return what has been found for the next step: step size, changes of the modes, forces on the ends."""
+        held = self.table[self.owner.units.held]
+        return np.concatenate(([self.owner.newmark.step], held, self.pull))
+
+
+class _Units:
+    """Modes in units of eight that move with the same ends of their interval.
+
+    Attributes
+    ----------
+    layout : tuple of ndarray
+        ``where``, ``rates``, ``more`` and ``more_coupling`` of `models.catenary.kernels.finish`.
+    table : ndarray
+        ``table`` there, of a line at rest.
+    slots, rate, momentum, held : ndarray of int, shape (n_modes,)
+        Where in it the amplitudes of the modes are, their rates, momenta and changes.
+    """
+
+    def __init__(self, stepper: CompiledStepper, coupling: sp.csr_matrix) -> None:
+        kernels, modes, newmark = stepper.kernels, stepper.modes, stepper.newmark
+        lanes, width = kernels.LANES, kernels.ENDS
+        first, unit = _first_modes(modes, lanes)
+        n_units, n_ends = len(first), coupling.shape[1]
+        lane = np.arange(len(unit)) - first[unit]
+        entries = coupling.tocoo()
+        of_entry = unit[entries.row]
+        where = np.full(n_units, n_ends - width)
+        np.minimum.at(where, of_entry, entries.col)
+        chunk = (entries.col - where[of_entry]) // width
+        table = np.zeros((n_units, kernels.ROWS, lanes))
+        own = chunk == 0
+        table[of_entry[own], (entries.col - where[of_entry])[own], lane[entries.row[own]]] = entries.data[own]
+        pairs, of_pair = np.unique(np.stack([of_entry, chunk], axis=1)[~own], axis=0, return_inverse=True)
+        end = np.minimum(where[pairs[:, 0]] + width * pairs[:, 1], n_ends - width)
+        more = np.zeros((len(pairs), width, lanes))
+        more[of_pair.ravel(), entries.col[~own] - end[of_pair.ravel()], lane[entries.row[~own]]] = entries.data[~own]
+        mu = newmark.a0 + newmark.a1 * modes.beta[first]
+        rates = np.stack([newmark.a1 / mu, np.full(n_units, newmark.a2), newmark.a2 / mu], axis=1)
+        at_more = np.stack([pairs[:, 0], end], axis=1).astype(np.uint64)
+        self.layout = where.astype(np.uint64), rates, at_more, more
+        begin = unit * kernels.ROWS * lanes + lane
+        self.slots, self.rate, self.momentum, self.held = (
+            begin + row * lanes for row in (kernels.AMPLITUDE, kernels.RATE, kernels.MOMENTUM, kernels.HELD)
+        )
+        self.table = table.ravel()
+        self.table[begin + kernels.INVERSE * lanes] = stepper.inverse
+        self.table[begin + kernels.STIFFNESS * lanes] = -2.0 * modes.eigenvalue * stepper.inverse
+
+
+def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:
+    """Return the first mode of every unit, and the unit of every mode: no unit reaches into another block."""
+    blocks = sorted((int(first), b.modes.shape[1]) for b in modes.blocks for first in b.modes[:, 0])
+    first = [start for begin, count in blocks for start in range(begin, begin + count, lanes)]
+    unit = np.zeros(len(modes.eigenvalue), dtype=np.int64)
+    unit[first[1:]] = 1
+    return np.array(first, dtype=np.int64), np.cumsum(unit)
 
 
 _Pattern = tuple[Any, Any, FloatArray]
@@ -196,33 +338,6 @@ def _pattern(matrix: sp.spmatrix) -> _Pattern:
     rows = sp.csr_matrix(matrix)
     rows.sort_indices()
     return rows.indptr.astype(np.uint32), rows.indices.astype(np.uint32), rows.data
-
-
-def _chunks(modes: IntervalModes, coupling: sp.csr_matrix, width: int) -> tuple[Any, FloatArray]:
-    """Return the coupling in chunks of modes by ``width`` ends, and where each belongs."""
-    rows, values, entry = [], [np.zeros(0)], 0
-    for first, count in sorted((int(a), b.modes.shape[1]) for b in modes.blocks for a in b.modes[:, 0]):
-        part = coupling[first : first + count]
-        low, high = (int(part.indices.min()), int(part.indices.max()) + 1) if part.nnz else (0, 1)
-        for start in range(low, high, width):
-            at = min(start, coupling.shape[1] - width)
-            dense = part[:, at : at + width].toarray()
-            dense[:, : start - at] = 0.0  # columns of the chunk before
-            values.append(dense.ravel())
-            rows.append((first, count, at, entry))
-            entry += dense.size
-    return np.array(rows, dtype=np.uint64).reshape(-1, 4), np.concatenate(values)
-
-
-def _groups(chunks: Any, rates: FloatArray) -> Any:
-    """Return where groups of chunks begin and end: not between chunks of the same modes, and of equal rates."""
-    result, begin = [], 0
-    for k in range(1, len(chunks) + 1):
-        full = k - begin >= _GROUP
-        if k == len(chunks) or ((full or (rates[k] != rates[k - 1]).any()) and chunks[k, 0] != chunks[k - 1, 0]):
-            result.append((begin, k))
-            begin = k
-    return np.array(result, dtype=np.uint64).reshape(-1, 2)
 
 
 class _Twisted:

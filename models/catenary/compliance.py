@@ -30,14 +30,14 @@ class Columns:
     values : ndarray, shape (n_rows, n)
     dropper_index : ndarray, shape (k,)
         Droppers that they stretch.
-    dropper_stretch : ndarray, shape (k, n)
-        Elongation of those droppers [m/N].
+    dropper_force : ndarray, shape (k, n)
+        What that adds to their elastic forces [N/N].
     """
 
     rows: slice
     values: FloatArray
     dropper_index: IntArray
-    dropper_stretch: FloatArray
+    dropper_force: FloatArray
 
     def at(self, places: IntArray) -> FloatArray:
         """Return the values at some displacements of the attachments, shape (len(places), n)."""
@@ -56,11 +56,14 @@ class Compliance:
         Of the matrix that the attachments feel.
     B : sparse, shape (n_droppers, n_attached)
         Rows of dropper elongation.
+    stiffness : ndarray, shape (n_droppers,)
+        Dropper force per elongation [N/m].
     """
 
-    def __init__(self, factor: Factor, B: sp.csr_matrix) -> None:
-        self._factor, self._B = factor, B
+    def __init__(self, factor: Factor, B: sp.csr_matrix, stiffness: FloatArray) -> None:
+        self._factor, self._B, self._stiffness = factor, B, stiffness
         self._kept: dict[int, Columns] = {}
+        self._prepared: IntArray | None = None
         self._whole, self._elongate = np.zeros(B.shape[1]), Product(B)
         self.dropper_columns = DropperColumns(self)
 
@@ -77,10 +80,13 @@ class Compliance:
 
     def prepare(self, places: IntArray) -> None:
         """Find one of the responses to unit loads at ``places`` that is not known yet, ahead of its use."""
+        if places is self._prepared:
+            return
         for place in places.tolist():
             if place not in self._kept:
                 self.unit(place)
                 return
+        self._prepared = places
 
     def units(self, places: IntArray) -> Columns:
         """Return the responses to unit loads at ``places``, side by side."""
@@ -88,14 +94,14 @@ class Compliance:
         first = min(part.rows.start for part in parts)
         droppers = np.unique(np.concatenate([part.dropper_index for part in parts]))
         values = np.zeros((max(part.rows.stop for part in parts) - first, len(parts)))
-        stretch = np.zeros((len(droppers), len(parts)))
+        force = np.zeros((len(droppers), len(parts)))
         for k, part in enumerate(parts):
             values[part.rows.start - first : part.rows.stop - first, k] = part.values[:, 0]
-            stretch[np.searchsorted(droppers, part.dropper_index), k] = part.dropper_stretch[:, 0]
+            force[np.searchsorted(droppers, part.dropper_index), k] = part.dropper_force[:, 0]
         size = np.abs(values).max(axis=1)
         kept = np.flatnonzero(size > CUT * size.max())
         rows = slice(first + int(kept[0]), first + int(kept[-1]) + 1)
-        return Columns(rows, np.ascontiguousarray(values[kept[0] : kept[-1] + 1]), droppers, stretch)
+        return Columns(rows, np.ascontiguousarray(values[kept[0] : kept[-1] + 1]), droppers, force)
 
     def dropper(self, index: int) -> Columns:
         """Return the response to a unit force in a dropper."""
@@ -120,7 +126,7 @@ class Compliance:
         self._whole[rows] = 0.0
         size = np.abs(stretch)
         near = np.flatnonzero(size > CUT * size.max(initial=0.0))
-        return Columns(rows, values, near, stretch[near, None])
+        return Columns(rows, values, near, (self._stiffness[near] * stretch[near])[:, None])
 
 
 class DropperColumns(Sequence[Columns]):

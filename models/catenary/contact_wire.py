@@ -64,6 +64,18 @@ class WireInterval:
         """Return the positions of its nodes in plan, x and y in turn [m]."""
         return (self.plan_static + self.plan.dot(local)).tolist()
 
+    def touch(self, element: int, xi: float) -> Touch:
+        """Return a point of one of its elements, counted from 0."""
+        powers, count = np.array((1.0, xi, xi * xi, xi * xi * xi)), self.count
+        row = powers.dot(self.height[element])
+        return Touch(self, row, row[:count], row[count:], float(powers.dot(self.height_static[element])))
+
+    def at(self, found: Crossing, local: FloatArray) -> tuple[float, float]:
+        """Return a point of the interval in plan from its local coordinates [m]."""
+        k = 2 * (found.element - self.first)
+        x1, y1, x2, y2 = (self.plan_static[k : k + 4] + self.plan[k : k + 4].dot(local)).tolist()
+        return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1)
+
 
 class Touch(NamedTuple):
     """A point of a contact wire.
@@ -162,9 +174,7 @@ class ContactWire:
     def touch(self, element: int, xi: float) -> Touch:
         """Return a point of an element."""
         interval = self._of_element[element]
-        k, powers, count = element - interval.first, np.array((1.0, xi, xi * xi, xi * xi * xi)), interval.count
-        row = powers.dot(interval.height[k])
-        return Touch(interval, row, row[:count], row[count:], float(powers.dot(interval.height_static[k])))
+        return interval.touch(element - interval.first, xi)
 
     def find(self, strip: FloatArray, positions: Positions, guess: int) -> Crossing | None:
         """Find where a strip crosses the wire, walking from the element ``guess``.
@@ -203,13 +213,6 @@ class ContactWire:
             element += step
             if not 0 <= element <= last:
                 return None
-
-    def plan(self, found: Crossing, local: FloatArray) -> tuple[float, float]:
-        """Return a point of the wire in plan from the local coordinates of its interval [m]."""
-        interval = self._of_element[found.element]
-        k = 2 * (found.element - interval.first)
-        x1, y1, x2, y2 = (interval.plan_static[k : k + 4] + interval.plan[k : k + 4].dot(local)).tolist()
-        return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1)
 
     def crossing(self, strip: FloatArray, element: int, xi: float, share: float) -> Crossing:
         """Return a crossing from its place on an element and on the strip."""

@@ -11,35 +11,43 @@ This module imports nothing of the project: it is compiled from a copy in the us
 import numpy as np
 from numba import njit
 
-#: Columns of a chunk of the coupling.
-WIDTH = 6
+#: Modes of a unit, and ends that it moves with: what the processor takes at once.
+LANES, ENDS = 8, 6
+#: Rows of a unit: the coupling mu G with its ends, 1 / K_hat, -2 lambda / K_hat, then the motion of its modes.
+INVERSE, STIFFNESS, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11, 12
 #: Sums may be reordered, not more: infinities and NaN stay what they are.
 _compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
-_0, _1, _2, _3, _4, _5, _6 = (np.uint64(i) for i in range(7))
-_FIRST, _COUNT, _END, _ENTRY = _0, _1, _2, _3
+_0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
+_LANES, _UNIT = np.uint64(LANES), np.uint64(ROWS * LANES)
+_R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _STIFFNESS, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
+    np.uint64(LANES * row) for row in range(ROWS)
+)
+#: From the place of a mode's amplitude in the table to others of the same mode.
+_TO_RATE, _TO_HELD, _FROM_INVERSE = _RATE - _AMPLITUDE, _HELD - _AMPLITUDE, _AMPLITUDE - _INVERSE
 
 
 @_compiled
-def prepare(groups, chunks, rates, coupling, stiffness, inverse, moved, modal, momentum, held, pull):
+def prepare(where, rates, more, more_coupling, table, pull):
     """Find what modes do in the next step, were the attachments held, and what they do to the ends of their intervals.
 
     Parameters
     ----------
-    groups, chunks, rates, coupling, stiffness, inverse, moved, modal, momentum
+    where, rates, more, more_coupling, table
         See `finish`.
-    held : ndarray, shape (n_modes,)
-        Result: change of the modal amplitudes.
     pull : ndarray, shape (n_ends,)
         Result: forces on the ends.
     """
     pull[:] = 0.0
-    for g in range(groups.shape[0]):
-        begin, stop = groups[g, _0], groups[g, _1]
-        for i in range(chunks[begin, _FIRST], chunks[stop - _1, _FIRST] + chunks[stop - _1, _COUNT]):
-            held[i] = stiffness[i] * modal[0, i] + rates[begin, _1] * inverse[i] * momentum[i]
-            moved[i] = rates[begin, _2] * modal[1, i] - held[i]
-        draw(chunks, begin, stop, coupling, moved, pull)
-    moved[:] = 0.0
+    for u in range(where.size):
+        end, begin = where[u], np.uint64(u) * _UNIT
+        for k in range(begin, begin + _LANES):
+            held = table[k + _STIFFNESS] * table[k + _AMPLITUDE]
+            held += rates[u, _1] * table[k + _INVERSE] * table[k + _MOMENTUM]
+            table[k + _HELD] = held
+            value = rates[u, _2] * table[k + _RATE] - held
+            for j in range(_0, np.uint64(ENDS)):
+                pull[end + j] += table[k + j * _LANES] * value
+    draw_more(rates, more, more_coupling, table, pull)
 
 
 @_compiled
@@ -81,8 +89,8 @@ def attachments(
 
 @_compiled
 def finish(
-    turn_rows, turn_columns, turn, groups, chunks, rates, coupling, stiffness, inverse, moved, a1,
-    solution, ends, modal, momentum, attached, held, pull,
+    turn_rows, turn_columns, turn, where, rates, more, more_coupling, a1,
+    solution, ends, attached, table, pull,
 ):  # fmt: skip
     """Let the intervals follow their attachments, replace the motion, and `prepare` the next step in the same pass.
 
@@ -90,27 +98,27 @@ def finish(
     ----------
     turn_rows, turn_columns, turn : ndarray
         Turn of the attachments' displacements to the axes of the intervals, compressed by rows.
-    groups : ndarray of unsigned int, shape (N_groups, 2)
-        First chunk and the one after the last: as many as stay at hand in the processor's first cache, of equal rates.
-    chunks : ndarray of unsigned int, shape (N, 4)
-        First mode, number of modes, first of six ends, first entry of ``coupling``.
+    where : ndarray of unsigned int, shape (N,)
+        First of the six ends that the modes of a unit move with.
     rates : ndarray, shape (N, 3)
         a1 / mu, a2 and a2 / mu of the modes.
-    coupling : ndarray
-        mu G, chunk by chunk, modes by six ends.
-    stiffness, inverse : ndarray, shape (n_modes,)
-        -2 lambda / K_hat and 1 / K_hat.
-    moved : ndarray, shape (n_modes,)
-        Work space; zero before and after.
+    more : ndarray of unsigned int, shape (M, 2)
+        Units that move with further ends: the unit, and the first of six such ends.
+    more_coupling : ndarray, shape (M, 6, 8)
+        mu G with these.
     a1 : float
     solution : ndarray, shape (n_attached,)
         Change of the attachments' displacements.
     ends : ndarray, shape (n_ends,)
         Work space.
-    modal, momentum, attached : ndarray
-        The motion, replaced.
-    held, pull : ndarray, shape (n_modes,), (n_ends,)
-        Changes of the modal amplitudes were the attachments held, of this step; both for the next step afterwards.
+    attached : ndarray, shape (2, n_attached)
+        Motion of the attachments, replaced.
+    table : ndarray, shape (N * 12 * 8,)
+        Unit by unit twelve rows of eight modes, see the constants above: properties, and the motion, which is replaced.
+        The last row is the change of the amplitudes were the attachments held, of this step; for the next one
+        afterwards.
+    pull : ndarray, shape (n_ends,)
+        Result: forces on the ends in the next step, the attachments held.
     """
     ends[:] = 0.0
     pull[:] = 0.0
@@ -118,79 +126,75 @@ def finish(
     for i in range(solution.size):
         attached[0, i] += solution[i]
         attached[1, i] = a1 * solution[i] - attached[1, i]
-    for g in range(groups.shape[0]):
-        begin, stop = groups[g, _0], groups[g, _1]
-        follow(chunks, begin, stop, coupling, ends, moved)
-        first, last = chunks[begin, _FIRST], chunks[stop - _1, _FIRST] + chunks[stop - _1, _COUNT]
-        advance(
-            rates[begin, _0], rates[begin, _1], rates[begin, _2], a1, stiffness[first:last], inverse[first:last],
-            moved[first:last], modal[0, first:last], modal[1, first:last], momentum[first:last], held[first:last],
-        )  # fmt: skip
-        draw(chunks, begin, stop, coupling, moved, pull)
-        for i in range(first, last):
-            moved[i] = 0.0
+    follow_more(rates, more, more_coupling, ends, table)
+    advance(where, rates, a1, ends, table, pull)
+    draw_more(rates, more, more_coupling, table, pull)
 
 
 @_compiled
-def follow(chunks, begin, stop, coupling, ends, moved):
-    """Add mu G times the motion of the ends to ``moved``, for some chunks."""
-    entry = chunks[begin, _ENTRY]
-    for b in range(begin, stop):
-        first, last, end = chunks[b, _FIRST], chunks[b, _FIRST] + chunks[b, _COUNT], chunks[b, _END]
+def advance(where, rates, a1, ends, table, pull):
+    """Replace the motion of all modes.
+
+    One array for everything and rows at fixed distances: then the compiler knows that nothing overlaps, and takes
+    several modes at once.
+    """
+    for u in range(where.size):
+        end, begin = where[u], np.uint64(u) * _UNIT
+        to_momentum, a2, from_rate = rates[u, _0], rates[u, _1], rates[u, _2]
         e0, e1, e2 = ends[end], ends[end + _1], ends[end + _2]
         e3, e4, e5 = ends[end + _3], ends[end + _4], ends[end + _5]
-        for i in range(first, last):
-            moved[i] += (
-                coupling[entry] * e0 + coupling[entry + _1] * e1 + coupling[entry + _2] * e2
-                + coupling[entry + _3] * e3 + coupling[entry + _4] * e4 + coupling[entry + _5] * e5
-            )  # fmt: skip
-            entry += _6
-
-
-@_compiled
-def advance(to_momentum, a2, from_rate, a1, stiffness, inverse, moved, amplitude, rate, momentum, held):
-    """Replace the motion of some modes; ``held`` is for the next step afterwards, ``moved`` what pulls on the ends.
-
-    Short loops of few arrays each: more of them a compiler does not dare to vectorise, as arrays might overlap.
-    """
-    n = held.size
-    for i in range(n):
-        held[i] -= moved[i] * inverse[i]
-    for i in range(n):
-        amplitude[i] += held[i]
-    for i in range(n):
-        rate[i] = a1 * held[i] - rate[i]
-    for i in range(n):
-        momentum[i] = a1 * held[i] + to_momentum * moved[i] - momentum[i]
-    for i in range(n):
-        held[i] = a2 * inverse[i] * momentum[i]
-    for i in range(n):
-        held[i] += stiffness[i] * amplitude[i]
-    for i in range(n):
-        moved[i] = from_rate * rate[i] - held[i]
-
-
-@_compiled
-def draw(chunks, begin, stop, coupling, value, pull):
-    """Add what the modes of some chunks do to the ends to ``pull``."""
-    entry = chunks[begin, _ENTRY]
-    for b in range(begin, stop):
-        first, last, end = chunks[b, _FIRST], chunks[b, _FIRST] + chunks[b, _COUNT], chunks[b, _END]
         t0 = t1 = t2 = t3 = t4 = t5 = 0.0
-        for i in range(first, last):
-            t0 += coupling[entry] * value[i]
-            t1 += coupling[entry + _1] * value[i]
-            t2 += coupling[entry + _2] * value[i]
-            t3 += coupling[entry + _3] * value[i]
-            t4 += coupling[entry + _4] * value[i]
-            t5 += coupling[entry + _5] * value[i]
-            entry += _6
+        for k in range(begin, begin + _LANES):
+            g0, g1, g2 = table[k], table[k + _R1], table[k + _R2]
+            g3, g4, g5 = table[k + _R3], table[k + _R4], table[k + _R5]
+            moved = g0 * e0 + g1 * e1 + g2 * e2 + g3 * e3 + g4 * e4 + g5 * e5
+            inverse = table[k + _INVERSE]
+            change = table[k + _HELD] - moved * inverse
+            amplitude = table[k + _AMPLITUDE] + change
+            rate = a1 * change - table[k + _RATE]
+            momentum = a1 * change + to_momentum * moved - table[k + _MOMENTUM]
+            held = a2 * inverse * momentum + table[k + _STIFFNESS] * amplitude
+            value = from_rate * rate - held
+            table[k + _AMPLITUDE], table[k + _RATE] = amplitude, rate
+            table[k + _MOMENTUM], table[k + _HELD] = momentum, held
+            t0 += g0 * value
+            t1 += g1 * value
+            t2 += g2 * value
+            t3 += g3 * value
+            t4 += g4 * value
+            t5 += g5 * value
         pull[end] += t0
         pull[end + _1] += t1
         pull[end + _2] += t2
         pull[end + _3] += t3
         pull[end + _4] += t4
         pull[end + _5] += t5
+
+
+@_compiled
+def follow_more(rates, more, coupling, ends, table):
+    """Put what further ends do to the modes into ``table``, so that `advance` finds it there."""
+    for i in range(more.shape[0]):
+        unit, end = more[i, _0], more[i, _1]
+        for k in range(_0, _LANES):
+            moved = 0.0
+            for j in range(_0, np.uint64(ENDS)):
+                moved += coupling[i, j, k] * ends[end + j]
+            at = unit * _UNIT + k
+            table[at + _HELD] -= moved * table[at + _INVERSE]
+            table[at + _MOMENTUM] -= rates[unit, _0] * moved
+
+
+@_compiled
+def draw_more(rates, more, coupling, table, pull):
+    """Add what modes do to further ends to ``pull``."""
+    for i in range(more.shape[0]):
+        unit, end = more[i, _0], more[i, _1]
+        for k in range(_0, _LANES):
+            at = unit * _UNIT + k
+            value = rates[unit, _2] * table[at + _RATE] - table[at + _HELD]
+            for j in range(_0, np.uint64(ENDS)):
+                pull[end + j] += coupling[i, j, k] * value
 
 
 @_compiled
@@ -272,12 +276,12 @@ def solve(top, bottom, middle, size, load, work, solution):
 
 @_compiled
 def meet(
-    strip, element, plan, plan_static, height, height_static, first, ends, following, a1,
-    held, solution, modal, attached, local, row, out,
+    strip, element, plan, plan_static, height, height_static, slots, ends, yielding, at_ends, a1,
+    table, solution, attached, local, row, load, out,
 ):  # fmt: skip
     """Find where a strip crosses an interval of a wire at the end of a step, forces found inside the step left out.
 
-    The same as `models.catenary.contact_wire.ContactWire.find` and `touch` do.
+    The same as `models.catenary.meeting.FreeMotion` does.
 
     Parameters
     ----------
@@ -285,41 +289,31 @@ def meet(
         Ends A and B; position and velocity.
     element : int
         Of the interval, to begin with.
-    plan, plan_static, height, height_static, first, ends : ndarray, int
-        Of the `WireInterval`; ``first`` is its first mode.
-    following : ndarray, shape (n_span, e)
-        mu G / K_hat of the interval.
+    plan, plan_static, height, height_static, ends : ndarray
+        Of the `WireInterval`.
+    slots : ndarray of unsigned int, shape (n_span,)
+        Where the amplitudes of its modes are in ``table``.
+    yielding, at_ends : ndarray
+        Of its `Reaction`.
     a1 : float
-    held, solution : ndarray, shape (n_modes,), (n_attached,)
-        Changes in this step.
-    modal, attached : ndarray, shape (2, n_modes), (2, n_attached)
-        Motion at the beginning of the step.
+    table : ndarray
+        See `finish`.
+    solution, attached : ndarray, shape (n_attached,), (2, n_attached)
+        Change of the attachments in this step, and their motion at its beginning.
     local : ndarray, shape (2, m)
         Work space.
-    row : ndarray, shape (m,)
-        Result: what unit local coordinates lift the point by.
-    out : ndarray, shape (5,)
-        Results: share of the way along the element and along the strip, static height, rise and its rate.
+    row, load : ndarray, shape (m,), (e,)
+        Results: what a unit force on the point does to the local coordinates; and to the attachments, directly and
+        through the modes.
+    out : ndarray, shape (6,)
+        Results: share of the way along the element and along the strip, static height, rise and its rate, compliance.
 
     Returns
     -------
     int
         Element of the interval; -1 where the strip crosses none of them.
     """
-    count, size = following.shape
-    for j in range(size):
-        change = solution[ends[j]]
-        local[0, count + j] = change
-    for i in range(count):
-        change = held[first + i]
-        for j in range(size):
-            change -= following[i, j] * local[0, count + j]
-        local[1, i] = a1 * change - modal[1, first + i]
-        local[0, i] = modal[0, first + i] + change
-    for j in range(size):
-        change = local[0, count + j]
-        local[1, count + j] = a1 * change - attached[1, ends[j]]
-        local[0, count + j] = attached[0, ends[j]] + change
+    follow_ends(slots, ends, yielding, a1, table, solution, attached, local)
     ax, ay = strip[0, 0, 0], strip[0, 0, 1]
     strip_x, strip_y = strip[1, 0, 0] - ax, strip[1, 0, 1] - ay
     direction = 0
@@ -348,27 +342,101 @@ def meet(
         return -1
     xi = min(max(xi, 0.0), 1.0)
     out[0], out[1] = xi, share
-    out[2], out[3], out[4] = 0.0, 0.0, 0.0
-    power = 1.0
-    row[:] = 0.0
-    for n in range(4):
-        out[2] += power * height_static[element, n]
-        for m in range(row.size):
-            row[m] += power * height[element, n, m]
-        power *= xi
+    out[2] = touch(height, height_static, element, xi, row)
+    out[3], out[4] = 0.0, 0.0
     for m in range(row.size):
         out[3] += row[m] * local[0, m]
         out[4] += row[m] * local[1, m]
+    out[5] = give(slots, yielding, at_ends, table, row, load)
     return element
 
 
 @_compiled
-def place(plan, plan_static, row, height, first, count, ends, modal, attached, element, xi, out):
+def follow_ends(slots, ends, yielding, a1, table, solution, attached, local):
+    """Put the local coordinates of an interval at the end of a step and their rates into ``local``; see `meet`."""
+    count, size = yielding.shape
+    for j in range(size):
+        change = solution[ends[j]]
+        local[0, count + j] = change
+    for i in range(count):
+        at = slots[i]
+        change = table[at + _TO_HELD]
+        for j in range(size):
+            change -= yielding[i, j] * local[0, count + j]
+        local[1, i] = a1 * change - table[at + _TO_RATE]
+        local[0, i] = table[at] + change
+    for j in range(size):
+        change = local[0, count + j]
+        local[1, count + j] = a1 * change - attached[1, ends[j]]
+        local[0, count + j] = attached[0, ends[j]] + change
+
+
+@_compiled
+def touch(height, height_static, element, xi, row):
+    """Put what a unit force on a point does to the local coordinates into ``row``; return the static height."""
+    power, static = 1.0, 0.0
+    row[:] = 0.0
+    for n in range(4):
+        static += power * height_static[element, n]
+        for m in range(row.size):
+            row[m] += power * height[element, n, m]
+        power *= xi
+    return static
+
+
+@_compiled
+def give(slots, yielding, at_ends, table, row, load):
+    """Put what a unit force on a point does to the attachments into ``load``; return the compliance of the point."""
+    count, size = yielding.shape
+    compliance = 0.0
+    for j in range(size):
+        load[j] = row[count + j]
+    for i in range(count):
+        compliance += row[i] * row[i] * table[slots[i] - _FROM_INVERSE]
+        for j in range(size):
+            load[j] -= row[i] * yielding[i, j]
+    for j in range(size):
+        for k in range(size):
+            compliance += load[j] * at_ends[j, k] * load[k]
+    return compliance
+
+
+@_compiled
+def push(height, height_static, slots, ends, yielding, at_ends, element, xi, force, row, load, table, pressed):
+    """Add a known force on a point of an interval to ``pressed``, the forces on the attachments, and to its modes."""
+    touch(height, height_static, element, xi, row)
+    give(slots, yielding, at_ends, table, row, load)
+    for j in range(ends.size):
+        pressed[ends[j]] += force * load[j]
+    press(slots, force, row, table)
+
+
+@_compiled
+def press(slots, force, row, table):
+    """Add a force on a point of an interval, its attachments held, to the changes of the interval's modes."""
+    for i in range(slots.size):
+        table[slots[i] + _TO_HELD] += force * row[i] * table[slots[i] - _FROM_INVERSE]
+
+
+@_compiled
+def apply(slots, row, load, force, first, columns, table, solution):
+    """Add what a force on a point changes in a step; ``columns`` are responses of the attachments from ``first``."""
+    press(slots, force, row, table)
+    for i in range(columns.shape[0]):
+        total = 0.0
+        for j in range(load.size):
+            total += columns[i, j] * load[j]
+        solution[first + i] += force * total
+
+
+@_compiled
+def place(plan, plan_static, row, height, slots, ends, table, attached, element, xi, out):
     """Put a point of a wire into ``out``, shape (3,); ``row`` and ``height`` are those of the point, see `meet`."""
+    count = slots.size
     x, y = plan_static[2 * element], plan_static[2 * element + 1]
     x2, y2, z = plan_static[2 * element + 2], plan_static[2 * element + 3], height
     for m in range(row.size):
-        value = modal[0, first + m] if m < count else attached[0, ends[m - count]]
+        value = table[slots[m]] if m < count else attached[0, ends[m - count]]
         x += plan[2 * element, m] * value
         y += plan[2 * element + 1, m] * value
         x2 += plan[2 * element + 2, m] * value

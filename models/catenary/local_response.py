@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.catenary.compliance import Columns
+from models.catenary.reaction import Meeting, Point
 from models.contact import ContactLaw, ContactParameters, NormalForce
 from models.part import FloatArray, IntArray
 
@@ -43,54 +44,20 @@ class OpenContact(NamedTuple):
     Attributes
     ----------
     pantograph, section : int
+    meeting : Meeting
+        Where they cross.
     penetration, velocity : float
         At the end of the step without contact force [m, m/s].
     impact_velocity : float
         delta'(-) of a contact that is closed already; 0 otherwise.
-    engagement : float
-        Share of the contact law that acts; less than 1 near the ends of strip and wire.
-    place : (int, float)
-        Element of the wire and place on it, xi.
-    interval : slice
-        Modes of the wire's interval.
-    modal : ndarray, shape (n_span,)
-        What a unit contact force does to these modes.
-    yielding : ndarray, shape (n_span,)
-        How far they give way to it, the attachments held.
-    places : ndarray, shape (e,)
-        Displacements of the interval's attachments.
-    load : ndarray, shape (e,)
-        What a unit contact force does to them, directly and through the modes.
-    columns : Columns
-        Response to unit loads at ``places``.
-    at_ends : ndarray, shape (e, e)
-        The same at ``places`` themselves.
     """
 
     pantograph: int
     section: int
+    meeting: Meeting
     penetration: float
     velocity: float
     impact_velocity: float
-    engagement: float
-    place: tuple[int, float]
-    interval: slice
-    modal: FloatArray
-    yielding: FloatArray
-    places: IntArray
-    load: FloatArray
-    columns: Columns
-    at_ends: FloatArray
-
-    @property
-    def compliance(self) -> float:
-        """Return how far the wire gives way at the contact [m/N]."""
-        return float(self.load.dot(self.at_ends.dot(self.load)) + self.modal.dot(self.yielding))
-
-    def moved_by(self, other: OpenContact) -> float:
-        """Return how far the wire is moved here by a unit force at another contact [m/N]."""
-        moved = float(self.load @ (other.columns.at(self.places) @ other.load))
-        return moved + float(self.modal @ other.yielding) if self.interval == other.interval else moved
 
 
 class LocalForces(NamedTuple):
@@ -98,26 +65,27 @@ class LocalForces(NamedTuple):
 
     Attributes
     ----------
-    contact : ndarray, shape (n_contacts,)
+    contact : list of float
         Contact forces [N].
-    penetration_velocity : ndarray, shape (n_contacts,)
+    velocity : list of float
         delta' at the end of the step [m/s].
-    closed : ndarray, shape (n_contacts,)
+    closed : list of bool
         Whether there is penetration.
     slack : ndarray, shape (n_slack,)
         Indices of slack droppers.
     compensation : ndarray, shape (n_slack,)
         Their forces f [N].
-    dropper_force : ndarray, shape (n_droppers,)
-        Elastic force of every dropper, before compensation [N].
     """
 
-    contact: FloatArray
-    penetration_velocity: FloatArray
-    closed: np.ndarray
+    contact: list[float]
+    velocity: list[float]
+    closed: list[bool]
     slack: IntArray
     compensation: FloatArray
-    dropper_force: FloatArray
+
+
+#: No droppers.
+_NONE, _NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -126,8 +94,6 @@ class LocalProblem:
 
     Attributes
     ----------
-    measure : ndarray, shape (n_droppers,)
-        Dropper force per elongation [N/m].
     unilateral : ndarray, shape (n_droppers,)
         1 - r, with r a dropper's stiffness ratio in compression.
     dropper_columns : sequence of Columns
@@ -136,7 +102,6 @@ class LocalProblem:
         d(velocity)/d(displacement) of the time integration, a1 [1/s].
     """
 
-    measure: FloatArray
     unilateral: FloatArray
     dropper_columns: Sequence[Columns]
     velocity_factor: float
@@ -168,7 +133,7 @@ class LocalProblem:
             If the iteration does not end.
         """
         if not contacts and not slack.size and free_force.min(initial=0.0) >= 0.0:
-            return _nothing(free_force)
+            return LocalForces([], [], [], _NONE, _NOTHING)
         if len(contacts) == 1 and not slack.size:
             found = self._single_contact(free_force, contacts[0], float(strip_compliance[0, 0]))
             if found is not None:
@@ -188,7 +153,8 @@ class LocalProblem:
             signature = (now_slack.tobytes(), (penetration > 0.0).tobytes())
             settled = change <= _TOLERANCE * (1.0 + forces.max(initial=0.0))
             if settled and signature == previous and np.array_equal(now_slack, slack):
-                return LocalForces(forces, velocity, penetration > 0.0, slack, compensation, elastic)
+                closed = (penetration > 0.0).tolist()
+                return LocalForces(forces.tolist(), velocity.tolist(), closed, slack, compensation)
             previous = signature
             compensation = _carried(now_slack, slack, compensation)
             slack = now_slack
@@ -201,14 +167,14 @@ class LocalProblem:
     def law_of(self, contact: OpenContact, penetration: float, velocity: float) -> NormalForce:
         """Return the contact law of one contact; its first closed instant is its impact."""
         impact = contact.impact_velocity or max(velocity, 0.0)
-        return self.law(penetration, velocity, impact, self.parameters).scaled(contact.engagement)
+        return self.law(penetration, velocity, impact, self.parameters).scaled(contact.meeting.crossing.engagement)
 
     def _single_contact(
         self, free_force: FloatArray, contact: OpenContact, strip_compliance: float
     ) -> LocalForces | None:
         """Return the solution for one contact if it leaves no dropper slack, which is what most steps are."""
-        columns, slope_of_velocity = contact.columns, self.velocity_factor
-        compliance = strip_compliance + contact.compliance
+        point, slope_of_velocity = contact.meeting.point, self.velocity_factor
+        compliance = strip_compliance + point.compliance
         force = 0.0
         for _ in range(_MAX_ITERATIONS):
             penetration = contact.penetration - compliance * force
@@ -220,15 +186,22 @@ class LocalProblem:
                 break
         else:
             return None
-        elastic = free_force.copy()
-        near = columns.dropper_index
-        elastic[near] += self.measure[near] * columns.dropper_stretch.dot(force * contact.load)
-        if elastic.min(initial=0.0) < 0.0:
+        if self._slackens(free_force, point, force):
             return None
-        none = np.zeros(0, dtype=np.int64)
-        return LocalForces(
-            np.array([force]), np.array([velocity]), np.array([penetration > 0.0]), none, np.zeros(0), elastic
-        )
+        return LocalForces([force], [velocity], [penetration > 0.0], _NONE, _NOTHING)
+
+    def _slackens(self, free_force: FloatArray, point: Point, force: float) -> bool:
+        """Return whether any dropper is slack under a force on one point."""
+        columns = point.reaction.columns
+        change = columns.dropper_force.dot(force * point.load)
+        near = free_force.take(columns.dropper_index) + change
+        if near.min(initial=0.0) < 0.0:
+            return True
+        if free_force.min(initial=0.0) >= 0.0:
+            return False
+        elastic = free_force.copy()  # one that would be slack without the force may be near
+        elastic[columns.dropper_index] = near
+        return bool(elastic.min() < 0.0)
 
 
 class _Coupling:
@@ -238,27 +211,29 @@ class _Coupling:
         self.problem, self.contacts = problem, contacts
         n = len(contacts)
         self.contact_contact = strip_compliance.copy()
-        self.dropper_contact = np.zeros((problem.measure.size, n))
+        self.dropper_contact = np.zeros((problem.unilateral.size, n))
         for j, source in enumerate(contacts):
-            index = source.columns.dropper_index
-            self.dropper_contact[index, j] = problem.measure[index] * (source.columns.dropper_stretch @ source.load)
+            point = source.meeting.point
+            columns = point.reaction.columns
+            self.dropper_contact[columns.dropper_index, j] = columns.dropper_force @ point.load
             for i, target in enumerate(contacts):
-                self.contact_contact[i, j] += target.moved_by(source)
+                self.contact_contact[i, j] += target.meeting.point.moved_by(point)
 
     def dropper_dropper(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return the compliance of droppers by slack droppers, d(-e)/df, shape (rows, columns)."""
-        result = np.zeros((self.problem.measure.size, columns.size))
+        result = np.zeros((self.problem.unilateral.size, columns.size))
         for k, j in enumerate(columns):
             column = self.problem.dropper_columns[j]
-            result[column.dropper_index, k] = column.dropper_stretch[:, 0]
-        return (self.problem.measure[:, None] * result)[rows]
+            result[column.dropper_index, k] = column.dropper_force[:, 0]
+        return result[rows]
 
     def contact_dropper(self, slack: IntArray) -> FloatArray:
         """Return d(delta)/df, shape (n_contacts, n_slack)."""
         result = np.zeros((len(self.contacts), slack.size))
         for i, contact in enumerate(self.contacts):
             for k, j in enumerate(slack):
-                result[i, k] = contact.load @ self.problem.dropper_columns[j].at(contact.places)[:, 0]
+                point = contact.meeting.point
+                result[i, k] = point.load @ self.problem.dropper_columns[j].at(point.reaction.interval.ends)[:, 0]
         return result
 
     def penetration(
@@ -324,16 +299,10 @@ class _Coupling:
 def _estimate(problem: LocalProblem, contact: OpenContact) -> float:
     """Return a first guess of a contact force: the law's secant over the free penetration."""
     law = problem.law_of(contact, contact.penetration, contact.velocity)
-    return law.force / (1.0 + law.by_penetration * contact.compliance)
+    return law.force / (1.0 + law.by_penetration * contact.meeting.point.compliance)
 
 
 def _carried(now: IntArray, before: IntArray, compensation: FloatArray) -> FloatArray:
     """Return the compensation forces for a changed set, zero for those that are new."""
     known = dict(zip(before.tolist(), compensation.tolist(), strict=True))
     return np.array([known.get(j, 0.0) for j in now.tolist()])
-
-
-def _nothing(free_force: FloatArray) -> LocalForces:
-    empty = np.zeros(0)
-    none = np.zeros(0, dtype=np.int64)
-    return LocalForces(empty, empty, np.zeros(0, dtype=bool), none, empty, free_force)

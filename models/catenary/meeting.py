@@ -3,56 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from models.catenary.compliance import Columns
-from models.catenary.contact_wire import ContactWire, Crossing, Touch, WireInterval
-from models.catenary.stepping import LineMotion, Stepper
+from models.catenary.contact_wire import ContactWire, WireInterval
+from models.catenary.motion import LineMotion
+from models.catenary.reaction import Meeting, Reaction
+from models.catenary.stepping import Stepper
 from models.part import FloatArray
-
-
-@dataclass(frozen=True)
-class Reaction:
-    """How a wire gives way about one of its intervals.
-
-    Attributes
-    ----------
-    yielding : ndarray, shape (n_span, e)
-        How the interval's modes follow the attachments within a step, mu G / K_hat.
-    columns : Columns
-        Response to unit loads at its attachments.
-    at_ends : ndarray, shape (e, e)
-        The same at the attachments themselves.
-    """
-
-    yielding: FloatArray
-    columns: Columns
-    at_ends: FloatArray
-
-    def on_attachments(self, touch: Touch) -> FloatArray:
-        """Return what a unit force on the wire does to its attachments, directly and through the modes, shape (e,)."""
-        return touch.ends - touch.modal.dot(self.yielding)
-
-
-class Meeting(NamedTuple):
-    """A strip that crosses a contact wire.
-
-    Attributes
-    ----------
-    crossing : Crossing
-    touch : Touch
-        The point of the wire.
-    rise, rate : float
-        Its height above the static one and the velocity of that [m, m/s].
-    """
-
-    crossing: Crossing
-    touch: Touch
-    rise: float
-    rate: float
 
 
 class FreeMotion:
@@ -60,6 +18,7 @@ class FreeMotion:
 
     Parameters
     ----------
+    wire : ContactWire
     reaction : callable
         WireInterval -> Reaction.
     stepper : Stepper
@@ -68,11 +27,17 @@ class FreeMotion:
         At the beginning of the step.
     """
 
-    def __init__(self, reaction: Callable[[WireInterval], Reaction], stepper: Stepper, motion: LineMotion) -> None:
-        self._reaction, self._stepper, self._motion = reaction, stepper, motion
+    def __init__(
+        self,
+        wire: ContactWire,
+        reaction: Callable[[WireInterval], Reaction],
+        stepper: Stepper,
+        motion: LineMotion,
+    ) -> None:
+        self._wire, self._reaction, self._stepper, self._motion = wire, reaction, stepper, motion
         self._known: dict[int, FloatArray] = {}
 
-    def meet(self, wire: ContactWire, strip: FloatArray, guess: int) -> Meeting | None:
+    def meet(self, strip: FloatArray, guess: int) -> Meeting | None:
         """Return where a strip crosses the wire, walking from the element ``guess``; None if it does not.
 
         Parameters
@@ -80,35 +45,19 @@ class FreeMotion:
         strip : ndarray, shape (2, 2, 3)
             Ends A and B; position and velocity.
         """
-        return self._compiled(wire, strip, guess) or self._plain(wire, strip, guess)
+        wire = self._wire
+        element = wire.start(guess, 0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
+        reaction = self._reaction(wire.interval(element))
+        met = self._stepper.meet(reaction, wire, strip, element, self._motion)
+        return met or self._walk(strip, guess)
 
-    def _plain(self, wire: ContactWire, strip: FloatArray, guess: int) -> Meeting | None:
-        found = wire.find(strip, lambda interval: interval.positions(self._of(interval)[0]), guess)
+    def _walk(self, strip: FloatArray, guess: int) -> Meeting | None:
+        found = self._wire.find(strip, lambda interval: interval.positions(self._of(interval)[0]), guess)
         if found is None:
             return None
-        touch = wire.touch(found.element, found.xi)
-        return Meeting(found, touch, *self._of(touch.interval).dot(touch.row).tolist())
-
-    def _compiled(self, wire: ContactWire, strip: FloatArray, guess: int) -> Meeting | None:
-        """Return the meeting if the kernels are there and it lies in the interval to begin with, as it mostly does."""
-        stepper = self._stepper
-        if stepper.kernels is None:
-            return None
-        element = wire.start(guess, 0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
-        interval = wire.interval(element)
-        following, motion = self._reaction(interval).yielding, self._motion
-        local, row, out = np.empty((2, interval.size)), np.empty(interval.size), np.empty(5)
-        element = stepper.kernels.meet(
-            strip, element - interval.first,
-            interval.plan, interval.plan_static, interval.height, interval.height_static,
-            interval.modes.start, interval.ends, following, stepper.newmark.a1,
-            stepper.modal, stepper.attached, motion.modal, motion.attached, local, row, out,
-        )  # fmt: skip
-        if element < 0:
-            return None
-        xi, share, height, rise, rate = out.tolist()
-        touch = Touch(interval, row, row[: interval.count], row[interval.count :], height)
-        return Meeting(wire.crossing(strip, interval.first + element, xi, share), touch, rise, rate)
+        interval = self._wire.interval(found.element)
+        point = self._reaction(interval).point(found.element - interval.first, found.xi)
+        return Meeting(found, point, *self._of(interval).dot(point.touch.row).tolist())
 
     def _of(self, interval: WireInterval) -> FloatArray:
         """Return an interval's local coordinates and their rates, shape (2, m)."""
@@ -116,16 +65,11 @@ class FreeMotion:
         if found is not None:
             return found
         stepper, count = self._stepper, interval.count
-        change = np.concatenate((stepper.modal[interval.modes], stepper.attached.take(interval.ends)))
+        result, change = stepper.local(interval, self._motion)
+        self._known[interval.first] = result
         change[:count] -= self._reaction(interval).yielding.dot(change[count:])
-        result = self._known[interval.first] = local_motion(interval, self._motion)
         displacement, velocity = result
         displacement += change
         change *= stepper.newmark.a1
         np.subtract(change, velocity, out=velocity)
         return result
-
-
-def local_motion(interval: WireInterval, motion: LineMotion) -> FloatArray:
-    """Return an interval's local coordinates and their rates, shape (2, m)."""
-    return np.concatenate((motion.modal[:, interval.modes], motion.attached.take(interval.ends, axis=1)), axis=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 
 import numpy as np
@@ -26,11 +26,13 @@ from models.catenary.intervals import (
     without_rounding,
 )
 from models.catenary.local_response import LocalForces, LocalProblem, LocalSolutionError, OpenContact
-from models.catenary.meeting import FreeMotion, Meeting, Reaction, local_motion
+from models.catenary.meeting import FreeMotion
 from models.catenary.mesh import CatenaryMesh, build_mesh
+from models.catenary.motion import LineMotion
 from models.catenary.parameters import CatenaryDefinition
 from models.catenary.product import Product, inner
-from models.catenary.stepping import LineMotion, Stepper
+from models.catenary.reaction import Meeting, Reaction
+from models.catenary.stepping import Known, Stepper, local_motion
 from models.contact import CONTACT_LAWS
 from models.part import FloatArray, IntArray, Snapshot
 from models.time_integration import Newmark
@@ -74,15 +76,16 @@ class CatenaryState:
 
     def snapshot(self) -> Snapshot:
         """Return copies of all arrays."""
-        arrays = {name: value for name, value in vars(self).items() if name != "motion"}
-        return {name: value.copy() for name, value in (arrays | vars(self.motion)).items()}
+        return {name: getattr(self, name).copy() for name in self._arrays()} | self.motion.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
         """Take over the arrays of a snapshot."""
-        for owner in (self, self.motion):
-            for name in vars(owner):
-                if name != "motion":
-                    setattr(owner, name, snapshot[name].copy())
+        self.motion.restore(snapshot)
+        for name in self._arrays():
+            setattr(self, name, snapshot[name].copy())
+
+    def _arrays(self) -> Iterator[str]:
+        return (item.name for item in fields(self) if item.name != "motion")
 
 
 @dataclass
@@ -156,7 +159,10 @@ class CatenaryModel:
             self.modes = self._modes([part for parts in by_wire for part in parts])
         self.B = self._dropper_rows()
         self._rest_load = self.B.T @ self.rest_compensation
-        self._elongate, self._stretch = Product(self.B), self.B.T.tocsc()
+        #: Elastic forces of the droppers from the attachments' displacements.
+        self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
+        #: What each of them pulls at.
+        self._stretch = [(row.indices, row.data) for row in self.B]
         self.wires = tuple(self._wires(by_wire))
         self.uplift_places = self.modes.place[self.mesh.support_nodes * NODE_DOFS + 2]
         self._law = CONTACT_LAWS[definition.contact.law]
@@ -244,13 +250,11 @@ class CatenaryModel:
         elastic = self._begin(now, state)
         placed = [(s, *self.wires[s].locate(x), force) for s, x, force in forces]
         for s, element, xi, force in placed:
-            touch = self.wires[s].touch(element, xi)
-            reaction = self._reaction(now, s, touch.interval)
-            columns, load = reaction.columns, force * reaction.on_attachments(touch)
-            now.stepper.press(touch.interval.modes, force * touch.modal)
-            now.stepper.attached[columns.rows] += columns.values @ load
-            near = columns.dropper_index
-            elastic[near] += self.dropper_stiffness[near] * (columns.dropper_stretch @ load)
+            interval = self.wires[s].interval(element)
+            point = self._reaction(now, s, interval).point(element - interval.first, xi)
+            now.stepper.apply(point, force)
+            columns = point.reaction.columns
+            elastic[columns.dropper_index] += columns.dropper_force @ (force * point.load)
         found = now.local.solve(elastic, (), np.zeros((0, 0)), state.slack)
         self._apply(now, (), found)
         now.stepper.finish(state.motion)
@@ -278,10 +282,11 @@ class CatenaryModel:
                     continue
                 state.element[p, s] = found.element
                 local, touch = motion(wire.interval(found.element)), wire.touch(found.element, found.xi)
-                delta, rate = self._penetration(Meeting(found, touch, *local.dot(touch.row).tolist()), strip)
+                rise, speed = local.dot(touch.row).tolist()
+                delta, rate = self._penetration(found.share, touch.height + rise, speed, strip)
                 law = self._law(delta, rate, max(rate, 0.0), self.definition.contact)
                 result.force[p, s] = law.scaled(found.engagement).force
-                result.point[p, s] = *wire.plan(found, local[0]), touch.height + touch.row.dot(local[0])
+                result.point[p, s] = *touch.interval.at(found, local[0]), touch.height + rise
         return result
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
@@ -315,12 +320,11 @@ class CatenaryModel:
         velocity : ndarray, shape (n, 6)
             [m/s, rad/s]; what is held stays at rest.
         """
-        motion = state.motion
+        modes, attached = self.modes, state.motion.attached
         nodal = plan_rotation(self._angles).T @ velocity.ravel()
-        motion.modal[1], motion.attached[1] = self.modes.coordinates(nodal)
-        modes = self.modes
-        motion.prepared = np.zeros(0)
-        motion.momentum[...] = motion.modal[1] + modes.coupling @ (modes.turn @ motion.attached[1])
+        modal, momentum = state.motion.plain()
+        modal[1], attached[1] = modes.coordinates(nodal)
+        momentum[...] = modal[1] + modes.coupling @ (modes.turn @ attached[1])
 
     def _modes(self, parts: Sequence[Interval]) -> IntervalModes:
         """Return the line's coordinates and matrices, droppers included."""
@@ -368,9 +372,8 @@ class CatenaryModel:
         newmark = Newmark(step)
         with self._solvable(f"make steps of {step:g} s"):
             stepper = make_stepper(self.modes, newmark)
-        compliance = Compliance(stepper.factor, self.B)
+        compliance = Compliance(stepper.factor, self.B, self.dropper_stiffness)
         local = LocalProblem(
-            measure=self.dropper_stiffness,
             unilateral=self.unilateral,
             dropper_columns=compliance.dropper_columns,
             velocity_factor=newmark.a1,
@@ -385,22 +388,17 @@ class CatenaryModel:
         What a dropper that is slack at rest lacks is part of the static state, so it acts at both ends of the step.
         """
         pressed = 2.0 * self._rest_load
-        if state.slack.size:
-            pressed -= self._stretch[:, state.slack] @ state.compensation
+        for j, force in zip(state.slack.tolist(), state.compensation.tolist(), strict=True):
+            places, stretch = self._stretch[j]
+            pressed[places] -= force * stretch
         known = []
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
-            touch = self.wires[s].touch(element, xi)
-            interval, reaction = touch.interval, self._reaction(now, s, touch.interval)
-            pressed[interval.ends] += force * reaction.on_attachments(touch)
-            known.append((interval.modes, force * touch.modal))
-        now.stepper.begin(state.motion, pressed)
-        for span, modal in known:
-            now.stepper.press(span, modal)
+            interval = self.wires[s].interval(element)
+            known.append(Known(self._reaction(now, s, interval), element - interval.first, xi, force))
+        now.stepper.begin(state.motion, pressed, known)
         np.add(state.motion.attached[0], now.stepper.attached, out=pressed)
-        elastic = np.zeros(len(self.dropper_stiffness))
-        self._elongate.add(pressed, elastic)
-        elastic *= self.dropper_stiffness
-        elastic += self.static.elastic_force
+        elastic = self.static.elastic_force.copy()
+        self._tighten.add(pressed, elastic)
         return elastic
 
     def _open_contacts(
@@ -408,67 +406,42 @@ class CatenaryModel:
     ) -> tuple[list[OpenContact], list[tuple[int, int, Meeting]]]:
         contacts, crossings = [], []
         for s, wire in enumerate(self.wires):
-            free = FreeMotion(partial(self._reaction, now, s), now.stepper, state.motion)
+            free = FreeMotion(wire, partial(self._reaction, now, s), now.stepper, state.motion)
             for p, strip in enumerate(motion.strip):
-                met = free.meet(wire, strip, int(state.element[p, s]))
+                met = free.meet(strip, int(state.element[p, s]))
                 if met is None:
                     continue
-                found = met.crossing
                 crossings.append((p, s, met))
-                state.element[p, s] = found.element
-                delta, rate = self._penetration(met, strip)
+                state.element[p, s] = met.crossing.element
+                height = met.point.touch.height + met.rise
+                delta, rate = self._penetration(met.crossing.share, height, met.rate, strip)
                 impact = float(state.impact_velocity[p, s])
                 # One that was closed stays among the candidates: other forces of the step may keep it so.
                 if delta > 0.0 or impact > 0.0:
-                    contacts.append(self._open_contact(now, (p, s), met, delta, rate, impact))
-                now.compliance.prepare(wire.next_places(found.element))
+                    contacts.append(OpenContact(p, s, met, delta, rate, impact))
+                now.compliance.prepare(wire.next_places(met.crossing.element))
         return contacts, crossings
 
-    def _penetration(self, met: Meeting, strip: FloatArray) -> tuple[float, float]:
-        """Return penetration and its velocity."""
-        share = met.crossing.share
+    def _penetration(self, share: float, height: float, rate: float, strip: FloatArray) -> tuple[float, float]:
+        """Return penetration and its velocity of a strip, where a wire of some height crosses it."""
         (z_a, v_a), (z_b, v_b) = strip[:, :, 2].tolist()
-        height = met.touch.height + met.rise - self._radii
-        return z_a + share * (z_b - z_a) - height, v_a + share * (v_b - v_a) - met.rate
-
-    def _open_contact(
-        self,
-        now: _Step,
-        which: tuple[int, int],
-        met: Meeting,
-        penetration: float,
-        velocity: float,
-        impact_velocity: float,
-    ) -> OpenContact:
-        touch = met.touch
-        interval = touch.interval
-        reaction = self._reaction(now, which[1], interval)
-        return OpenContact(
-            pantograph=which[0],
-            section=which[1],
-            place=(met.crossing.element, met.crossing.xi),
-            penetration=penetration,
-            velocity=velocity,
-            impact_velocity=impact_velocity,
-            engagement=met.crossing.engagement,
-            interval=interval.modes,
-            modal=touch.modal,
-            yielding=touch.modal * now.stepper.inverse[interval.modes],
-            places=interval.ends,
-            load=reaction.on_attachments(touch),
-            columns=reaction.columns,
-            at_ends=reaction.at_ends,
-        )
+        return z_a + share * (z_b - z_a) - (height - self._radii), v_a + share * (v_b - v_a) - rate
 
     def _reaction(self, now: _Step, section: int, interval: WireInterval) -> Reaction:
         """Return how a wire gives way about an interval; found once per interval that a strip visits."""
         kept = now.reactions
         found = kept.get((section, interval.first))
         if found is None:
-            columns = now.compliance.units(interval.ends)
-            coupling = now.stepper.coupling(interval.modes, interval.ends)
-            yielding = now.stepper.inverse[interval.modes, None] * coupling
-            found = Reaction(yielding, columns, columns.at(interval.ends))
+            stepper, columns = now.stepper, now.compliance.units(interval.ends)
+            inverse = stepper.inverse[interval.modes]
+            found = Reaction(
+                interval=interval,
+                inverse=inverse,
+                yielding=inverse[:, None] * stepper.coupling(interval.modes, interval.ends),
+                columns=columns,
+                at_ends=columns.at(interval.ends),
+                slots=stepper.slots(interval.modes),
+            )
             while len(kept) >= _KEPT_INTERVALS * len(self.wires):
                 del kept[next(iter(kept))]
             kept[(section, interval.first)] = found
@@ -476,6 +449,8 @@ class CatenaryModel:
 
     def _strip_compliance(self, contacts: Sequence[OpenContact], motion: StripMotion) -> FloatArray:
         """Two contacts of one strip share its retreat."""
+        if len(contacts) == 1:
+            return motion.compliance[contacts[0].pantograph].reshape(1, 1)
         owners = [c.pantograph for c in contacts]
         return np.array([[motion.compliance[i] if i == j else 0.0 for j in owners] for i in owners]).reshape(
             len(owners), len(owners)
@@ -484,10 +459,9 @@ class CatenaryModel:
     def _apply(self, now: _Step, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
         """Add what contact and compensation forces change within the step."""
         stepper = now.stepper
-        for contact, force in zip(contacts, forces.contact.tolist(), strict=True):
+        for contact, force in zip(contacts, forces.contact, strict=True):
             if force != 0.0:
-                stepper.press(contact.interval, force * contact.modal)
-                stepper.attached[contact.columns.rows] += contact.columns.values @ (force * contact.load)
+                stepper.apply(contact.meeting.point, force)
         for j, compensation in zip(forces.slack.tolist(), forces.compensation.tolist(), strict=True):
             column = now.local.dropper_columns[j]
             stepper.attached[column.rows] -= compensation * column.values[:, 0]
@@ -496,17 +470,15 @@ class CatenaryModel:
         """Note the forces at the end of the step; the next one begins with them."""
         state.slack, state.compensation = forces.slack, forces.compensation
         state.impact_velocity[...] = 0.0
-        for contact, velocity, closed in zip(
-            contacts, forces.penetration_velocity.tolist(), forces.closed.tolist(), strict=True
-        ):
+        for contact, velocity, closed in zip(contacts, forces.velocity, forces.closed, strict=True):
             if closed:
                 impact = contact.impact_velocity or max(velocity, 1e-6)
                 state.impact_velocity[contact.pantograph, contact.section] = impact
         state.loaded, state.load = _NOWHERE, _NOTHING
         if contacts:
-            state.loaded = np.array([(c.section, c.place[0]) for c in contacts])
-            places = [c.place[1] for c in contacts]
-            state.load = np.array(list(zip(places, forces.contact.tolist(), strict=True)))
+            places = [c.meeting.crossing for c in contacts]
+            state.loaded = np.array([(c.section, place.element) for c, place in zip(contacts, places, strict=True)])
+            state.load = np.array([(place.xi, f) for place, f in zip(places, forces.contact, strict=True)])
 
     def _result(
         self,
@@ -517,10 +489,10 @@ class CatenaryModel:
         forces: LocalForces,
     ) -> ContactResult:
         result = self._empty_result(len(state.element))
-        for contact, force in zip(contacts, forces.contact.tolist(), strict=True):
+        for contact, force in zip(contacts, forces.contact, strict=True):
             result.force[contact.pantograph, contact.section] = force
         for p, s, met in crossings:
-            now.stepper.place(self.wires[s], met.crossing, met.touch, state.motion, result.point[p, s])
+            now.stepper.place(met.crossing, met.point, state.motion, result.point[p, s])
         return result
 
     def _empty_result(self, pantographs: int) -> ContactResult:

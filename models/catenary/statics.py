@@ -263,10 +263,9 @@ class _StaticResponse:
         self._model = model
         factor = factorised(model.modes.K)
         self._solve = factor.solve
-        columns = Compliance(factor, model.B).dropper_columns
+        columns = Compliance(factor, model.B, model.dropper_stiffness).dropper_columns
         self._columns = columns
         self._local = LocalProblem(
-            measure=model.dropper_stiffness,
             unilateral=model.unilateral,
             dropper_columns=columns,
             velocity_factor=0.0,

@@ -16,52 +16,48 @@ intervals. It is added between the two products, where it costs next to nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from types import ModuleType
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from models.catenary.band import Banded, Sparse, factorised
-from models.catenary.contact_wire import ContactWire, Crossing, Touch
+from models.catenary.contact_wire import ContactWire, Crossing, WireInterval
 from models.catenary.interval_modes import IntervalModes
+from models.catenary.motion import LineMotion
 from models.catenary.product import Product
+from models.catenary.reaction import Meeting, Point, Reaction
 from models.part import FloatArray, IntArray
 from models.time_integration import Newmark
 
 
-@dataclass
-class LineMotion:
-    """Motion of a line; changed in place.
+class Known(NamedTuple):
+    """A force on a contact wire that is known before a step.
 
     Attributes
     ----------
-    modal : ndarray, shape (2, n_modes)
-        Modal amplitudes q and their rates.
-    momentum : ndarray, shape (n_modes,)
-        q' + G x', which acts on the intervals.
-    attached : ndarray, shape (2, n_attached)
-        Displacements x of the attachments [m, rad] and their velocities.
-    prepared : ndarray
-        What a stepper has found for the next step already: its step size, then its own affair; empty if nothing.
+    reaction : Reaction
+        Of the interval that it acts on.
+    element : int
+        Of the interval.
+    xi : float
+        Share of the way along the element.
+    force : float
+        Positive up [N].
     """
 
-    modal: FloatArray
-    momentum: FloatArray
-    attached: FloatArray
-    prepared: FloatArray
-
-    @classmethod
-    def at_rest(cls, modes: IntervalModes) -> LineMotion:
-        """Return a line that does not move."""
-        n, m = modes.coupling.shape[0], len(modes.attached)
-        return cls(np.zeros((2, n)), np.zeros(n), np.zeros((2, m)), np.zeros(0))
+    reaction: Reaction
+    element: int
+    xi: float
+    force: float
 
 
 class Stepper:
     """What belongs to one step size, and the arrays a step works in.
 
-    The order of calls: `begin`, then `press` and changes of ``attached`` for what acts inside the step, then `finish`.
+    The order of calls: `begin`, then `press`, `apply` and changes of ``attached`` for what acts inside the step, then
+    `finish`.
 
     Parameters
     ----------
@@ -74,15 +70,9 @@ class Stepper:
         Of what the attachments feel, intervals eliminated.
     attached : ndarray, shape (n_attached,)
         Change of the attachments' displacements in this step [m].
-    modal : ndarray, shape (n_modes,)
-        Change of the modal amplitudes in this step, were the attachments held.
     inverse : ndarray, shape (n_modes,)
         1 / K_hat of the modes.
-    kernels : module or None
-        Compiled kernels, where there are any.
     """
-
-    kernels: ModuleType | None = None
 
     def __init__(self, modes: IntervalModes, newmark: Newmark) -> None:
         a0, a1 = newmark.a0, newmark.a1
@@ -95,7 +85,7 @@ class Stepper:
             modes.K + a0 * modes.M + a1 * modes.C - G.T @ sp.diags(self.inverse) @ G
         )
         self._from_modal = -2.0 * modes.eigenvalue * self.inverse
-        self.modal, self.attached = np.empty(G.shape[0]), np.empty(G.shape[1])
+        self.attached = np.empty(G.shape[1])
         self._ends, self._right = np.empty(coupling.shape[1]), np.empty(G.shape[1])
         self._set_up(coupling)
 
@@ -108,24 +98,34 @@ class Stepper:
         self._from_momentum = newmark.a2 * self.inverse
         self._from_velocity = newmark.a2 / self._mu
         self._to_momentum = newmark.a1 / self._mu
+        #: Change of the modal amplitudes in this step, were the attachments held.
+        self._modal = np.empty(coupling.shape[0])
         self._work, self._following = np.empty(coupling.shape[0]), np.empty(coupling.shape[0])
 
-    def begin(self, motion: LineMotion, pressed: FloatArray) -> None:
-        """Find the changes of this step without forces on intervals.
+    def begin(self, motion: LineMotion, pressed: FloatArray, known: Sequence[Known] = ()) -> None:
+        """Find the changes of this step without what is found inside it.
 
         Parameters
         ----------
         motion : LineMotion
             At the beginning of the step.
         pressed : ndarray, shape (n_attached,)
-            Known forces on the attachments, beginning plus end of the step [N]. Known forces on intervals act on the
-            attachments at their ends as well, here; on the interval itself they are put by `press`.
+            Known forces on the attachments, beginning plus end of the step [N]; what those on the wires do to the
+            attachments at their ends is added.
+        known : sequence of Known
+            Forces on the contact wires, at the beginning of the step.
         """
-        modal, work, right = self.modal, self._work, self._right
-        np.multiply(self._from_modal, motion.modal[0], out=modal)
-        np.multiply(self._from_momentum, motion.momentum, out=work)
+        points = []
+        for reaction, element, xi, force in known:
+            point = reaction.point(element, xi)
+            pressed[reaction.interval.ends] += force * point.load
+            points.append(point)
+        modal, work, right = self._modal, self._work, self._right
+        (amplitude, rate), momentum = motion.plain()
+        np.multiply(self._from_modal, amplitude, out=modal)
+        np.multiply(self._from_momentum, momentum, out=work)
         modal += work
-        np.multiply(self._from_velocity, motion.modal[1], out=work)
+        np.multiply(self._from_velocity, rate, out=work)
         work -= modal
         right[...] = pressed
         self._own.add(motion.attached.ravel(), right)
@@ -133,18 +133,62 @@ class Stepper:
         self._back[0].add(work, self._ends)
         self._back[1].add(self._ends, right)
         self.attached[...] = self.factor.solve(right)
-
-    def place(
-        self, wire: ContactWire, crossing: Crossing, touch: Touch, motion: LineMotion, point: FloatArray
-    ) -> None:
-        """Put a point of a wire into ``point``, shape (3,) [m]."""
-        interval = touch.interval
-        local = np.concatenate((motion.modal[0, interval.modes], motion.attached[0].take(interval.ends)))
-        point[:] = *wire.plan(crossing, local), touch.height + touch.row.dot(local)
+        for point, load in zip(points, known, strict=True):
+            self.press(point.reaction.interval.modes, load.force * point.touch.modal)
 
     def press(self, span: slice, force: FloatArray) -> None:
         """Add a force on the modes of an interval, its attachments held."""
-        self.modal[span] += force * self.inverse[span]
+        self._modal[span] += force * self.inverse[span]
+
+    def apply(self, point: Point, force: float) -> None:
+        """Add what a force on a point of a wire changes in this step.
+
+        Parameters
+        ----------
+        force : float
+            At the end of the step [N], positive up.
+        """
+        columns = point.reaction.columns
+        self.press(point.reaction.interval.modes, force * point.touch.modal)
+        self.attached[columns.rows] += columns.values @ (force * point.load)
+
+    def slots(self, span: slice) -> IntArray:
+        """Return where the modes of an interval are kept while they are packed, shape (n_span,); empty if never."""
+        return np.zeros(0, dtype=np.uint64)
+
+    def local(self, interval: WireInterval, motion: LineMotion) -> tuple[FloatArray, FloatArray]:
+        """Return an interval's local coordinates and rates at the beginning of a step, and their changes in it.
+
+        Returns
+        -------
+        before : ndarray, shape (2, m)
+        change : ndarray, shape (m,)
+            Of the modes' amplitudes as if the attachments were held.
+        """
+        change = np.concatenate((self._modal[interval.modes], self.attached.take(interval.ends)))
+        return local_motion(interval, motion), change
+
+    def meet(
+        self, reaction: Reaction, wire: ContactWire, strip: FloatArray, element: int, motion: LineMotion
+    ) -> Meeting | None:
+        """Return where a strip crosses an interval at the end of the step, if a stepper can tell that at once.
+
+        Parameters
+        ----------
+        strip : ndarray, shape (2, 2, 3)
+            Ends A and B; position and velocity.
+        element : int
+            Of the wire, to begin with.
+        motion : LineMotion
+            At the beginning of the step.
+        """
+        return None
+
+    def place(self, crossing: Crossing, point: Point, motion: LineMotion, place: FloatArray) -> None:
+        """Put a point of a wire into ``place``, shape (3,) [m]."""
+        interval, touch = point.reaction.interval, point.touch
+        local = np.concatenate((motion.modal[0, interval.modes], motion.attached[0].take(interval.ends)))
+        place[:] = *interval.at(crossing, local), touch.height + touch.row.dot(local)
 
     def coupling(self, span: slice, places: IntArray) -> FloatArray:
         """Return mu G of one interval, a column for each displacement of its attachments, shape (n_span, n_places)."""
@@ -153,21 +197,26 @@ class Stepper:
 
     def finish(self, motion: LineMotion) -> None:
         """Let the intervals follow their attachments, and replace the motion by that at the end of the step."""
-        a1, modal, following, work = self.newmark.a1, self.modal, self._following, self._work
+        a1, modal, following, work = self.newmark.a1, self._modal, self._following, self._work
         self._ends[...] = 0.0
         self._out[1].add(self.attached, self._ends)
         following[...] = 0.0
         self._out[0].add(self._ends, following)
         np.multiply(following, self.inverse, out=work)
         modal -= work
-        amplitude, rate = motion.modal
+        (amplitude, rate), momentum = motion.plain()
         amplitude += modal
         modal *= a1
         np.subtract(modal, rate, out=rate)
         following *= self._to_momentum
         modal += following
-        np.subtract(modal, motion.momentum, out=motion.momentum)
+        np.subtract(modal, momentum, out=momentum)
         displacement, velocity = motion.attached
         displacement += self.attached
         self.attached *= a1
         np.subtract(self.attached, velocity, out=velocity)
+
+
+def local_motion(interval: WireInterval, motion: LineMotion) -> FloatArray:
+    """Return an interval's local coordinates and their rates, shape (2, m)."""
+    return np.concatenate((motion.modal[:, interval.modes], motion.attached.take(interval.ends, axis=1)), axis=1)

@@ -10,6 +10,9 @@ s = (q, x), modal amplitudes q and displacements x of the attachments. In these 
 intervals are diagonal, and feel their attachments through the mass coupling G alone. A step of the time integration
 then needs two products with G and one band solution over the attachments, an order of magnitude smaller than the line.
 
+A reduced line leaves out the modes above a natural frequency (`slower_than`). Its constraint modes stay, so that at
+rest it carries what it did.
+
 References
 ----------
 .. [1] R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968) 1313-1319.
@@ -17,15 +20,16 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from models.catenary.elements import NODE_DOFS
 from models.catenary.intervals import Interval, turns, without_rounding
-from models.part import BoolArray, FloatArray, IntArray
+from models.part import BoolArray, FloatArray, IntArray, ParameterError
 
 #: In-plane and out-of-plane degrees of freedom of a node, in axes along the wire.
 _PLANES = ((0, 2, 4), (1, 3, 5))
@@ -37,20 +41,20 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class IntervalBlocks:
-    """Parts of intervals with equally many inner degrees of freedom: in plane, out of plane, or both.
+    """Parts of intervals with equally many inner degrees of freedom and modes: in plane, out of plane, or both.
 
     Attributes
     ----------
     inner : ndarray, shape (N, m)
         Inner degrees of freedom, counted over all nodes.
-    modes : ndarray, shape (N, m)
-        Places of the modal amplitudes in q.
+    modes : ndarray, shape (N, k)
+        Places of the modal amplitudes in q; k = m unless modes are left out.
     ends : ndarray, shape (N, 12)
         Degrees of freedom of the attachments at the two ends, counted over all nodes.
     turn : ndarray, shape (N, 12, 12)
         From the ends' axes to the interval's.
     shapes : ndarray, shape (N, m, m)
-        Modes, a column each, of unit modal mass.
+        All modes, a column each in rising order, of unit modal mass; the first k are those in q.
     constraint : ndarray, shape (N, m, 12)
         How inner degrees of freedom follow the ends, in the interval's axes.
     """
@@ -87,6 +91,9 @@ class IntervalModes:
     spans : tuple of slice
         Modes of every interval.
     blocks : tuple of IntervalBlocks
+        Those that have modes.
+    followers : tuple of IntervalBlocks
+        Those whose modes are all left out, which follow their ends and no more.
     """
 
     eigenvalue: FloatArray
@@ -101,6 +108,7 @@ class IntervalModes:
     place: IntArray
     spans: tuple[slice, ...]
     blocks: tuple[IntervalBlocks, ...]
+    followers: tuple[IntervalBlocks, ...] = ()
 
     def nodal(self, modal: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return T s: what modal amplitudes and attachments' displacements move the nodes by, in nodal axes.
@@ -116,13 +124,15 @@ class IntervalModes:
         """
         result = np.zeros(len(self.place))
         result[self.attached] = displacement
-        for block in self.blocks:
-            following = _follow(block, result)
-            result[block.inner] = following + np.einsum("nij,nj->ni", block.shapes, modal[block.modes])
+        for block in (*self.blocks, *self.followers):
+            following, shapes = _follow(block, result), block.shapes[:, :, : block.modes.shape[1]]
+            result[block.inner] = following + np.einsum("nij,nj->ni", shapes, modal[block.modes])
         return result
 
     def coordinates(self, nodal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return q and x of nodal displacements, the inverse of `nodal`.
+
+        Of what modes that are left out would do nothing remains: modes are orthogonal in the mass.
 
         Parameters
         ----------
@@ -134,7 +144,7 @@ class IntervalModes:
         modal = np.zeros(len(self.eigenvalue))
         for block in self.blocks:
             own = nodal[block.inner] - _follow(block, held)
-            modal[block.modes] = np.linalg.solve(block.shapes, own[:, :, None])[:, :, 0]
+            modal[block.modes] = np.linalg.solve(block.shapes, own[:, :, None])[:, : block.modes.shape[1], 0]
         return modal, nodal[self.attached]
 
 
@@ -148,9 +158,8 @@ class IntervalMotion:
 
     def __init__(self, modes: IntervalModes) -> None:
         self._place = modes.place
-        self._by_mode = {
-            int(first): (block, i) for block in modes.blocks for i, first in enumerate(block.modes[:, 0])
-        }
+        blocks = (*modes.blocks, *modes.followers)
+        self._by_inner = {int(first): (block, i) for block in blocks for i, first in enumerate(block.inner[:, 0])}
 
     def rows(self, part: Interval, span: slice) -> tuple[tuple[IntArray, IntArray], FloatArray]:
         """Return the local coordinates of an interval and what they do.
@@ -175,14 +184,11 @@ class IntervalMotion:
         at_end = np.concatenate([np.arange(NODE_DOFS), np.arange(-NODE_DOFS, 0) + len(rows)])
         rows[at_end[free], count + np.arange(len(free))] = 1.0
         position = {int(dof): i for i, dof in enumerate((nodes[:, None] * NODE_DOFS + np.arange(NODE_DOFS)).ravel())}
-        start = span.start
-        while start < span.stop:
-            block, i = self._by_mode[start]
+        for block, i in (self._by_inner[dof] for dof in position if dof in self._by_inner):
             inner = [position[int(dof)] for dof in block.inner[i]]
             own = block.modes[i] - span.start
-            rows[np.ix_(inner, own)] = block.shapes[i]
+            rows[np.ix_(inner, own)] = block.shapes[i][:, : len(own)]
             rows[inner, count:] = (block.constraint[i] @ block.turn[i])[:, free]
-            start += len(own)
         first = free < NODE_DOFS
         return (place[free[first]], place[free[~first]]), rows
 
@@ -246,6 +252,55 @@ def interval_modes(
         spans=spans,
         blocks=tuple(batch.block for batch in batches),
     )
+
+
+def slower_than(modes: IntervalModes, highest: float) -> IntervalModes:
+    """Return a line without the modes of intervals above a natural frequency.
+
+    Parameters
+    ----------
+    modes : IntervalModes
+        With all modes.
+    highest : float
+        [Hz]
+
+    Raises
+    ------
+    ParameterError
+        If no interval has a mode left.
+    """
+    kept = modes.eigenvalue <= (2.0 * math.pi * highest) ** 2
+    if kept.all():
+        return modes
+    if not kept.any():
+        slowest = math.sqrt(modes.eigenvalue.min()) / (2.0 * math.pi)
+        raise ParameterError(
+            f"parameter 'dynamics.highest_frequency': {highest:g} Hz leaves no mode; the slowest has {slowest:.3g} Hz"
+        )
+    place = np.concatenate([[0], np.cumsum(kept)])
+    blocks = [part for block in modes.blocks for part in _slow_parts(block, kept, place)]
+    coupling = modes.coupling[kept]
+    felt = np.unique(coupling.indices)
+    return replace(
+        modes,
+        eigenvalue=modes.eigenvalue[kept],
+        alpha=modes.alpha[kept],
+        beta=modes.beta[kept],
+        coupling=coupling[:, felt],
+        turn=modes.turn[felt],
+        spans=tuple(slice(int(place[span.start]), int(place[span.stop])) for span in modes.spans),
+        blocks=tuple(block for block in blocks if block.modes.size),
+        followers=tuple(block for block in blocks if not block.modes.size),
+    )
+
+
+def _slow_parts(block: IntervalBlocks, kept: BoolArray, place: IntArray) -> Iterator[IntervalBlocks]:
+    """Split blocks by how many modes they keep, their first ones; ``place`` is where these come in q."""
+    counts = kept[block.modes].sum(axis=1)
+    for count in np.unique(counts).tolist():
+        own = counts == count
+        arrays = {name: array[own] for name, array in vars(block).items()}
+        yield IntervalBlocks(**arrays | {"modes": place[block.modes[own, :count]]})
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from models.catenary.compliance import Compliance
 from models.catenary.contact_wire import ContactWire, WireInterval
 from models.catenary.elements import NODE_DOFS
 from models.catenary.equilibrium import EquilibriumError, StaticState, find_form
-from models.catenary.interval_modes import IntervalModes, interval_modes
+from models.catenary.interval_modes import IntervalModes, interval_modes, slower_than
 from models.catenary.intervals import (
     Interval,
     attachments,
@@ -141,6 +141,8 @@ class CatenaryModel:
     ------
     EquilibriumError
         If the line has no static equilibrium of the wanted shape, or none that it could move about.
+    ParameterError
+        If the definition leaves out all modes of the wires.
     """
 
     def __init__(self, definition: CatenaryDefinition) -> None:
@@ -336,7 +338,9 @@ class CatenaryModel:
         K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (static.matrices.K + droppers, static.matrices.M, C))
         K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
         rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
-        return interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel())
+        modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel())
+        highest = self.definition.dynamics.highest_frequency
+        return slower_than(modes, highest) if highest else modes
 
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:

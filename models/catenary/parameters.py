@@ -158,6 +158,16 @@ class Mesh:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Dynamics:
+    """How much of the wires' motion between their attachments is computed."""
+
+    highest_frequency: float = quantity(
+        "Hz", "natural frequency above which modes of the wires between attachments are left out; 0: none are",
+        default=0.0, minimum=0.0, maximum=1e9,
+    )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Span:
     """A span: where it begins and ends, its droppers, and in a compound line the hangers of its auxiliary wire.
@@ -292,6 +302,7 @@ class CatenaryDefinition:
     hanger: Dropper | None = None
     steady_arm: SteadyArm | None = None
     messenger_support: MessengerSupport | None = None
+    dynamics: Dynamics = field(default_factory=Dynamics)
     pre_sag_between: str = "supports"
     extrapolation_order: int = count(
         "order of the extrapolation of the strip inside a step: 0 held, 1 velocity, 2 acceleration",
@@ -362,6 +373,7 @@ def read(table: Table) -> CatenaryDefinition:
         hanger=_read_dropper(hanger) if hanger is not None else None,
         steady_arm=schema.read(SteadyArm, arm) if arm is not None else None,
         messenger_support=schema.read(MessengerSupport, support) if support is not None else None,
+        dynamics=schema.read(Dynamics, table.table("dynamics") or Table.from_dict({})),
         pre_sag_between=profile_table.text("pre_sag_between", default="supports", choices=("supports", "droppers")),
         time_step=table.quantity("time_step", "s", default=1e-3, minimum=SHORTEST_STEP, maximum=0.1),
         provenance=table.provenance,

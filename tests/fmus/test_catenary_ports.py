@@ -6,10 +6,14 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from fmus.build import build, recipe
-from tests.fmus.support import Instance, names_of, run
+from models.catenary.parameters import load
+from models.catenary.part import CatenaryPart
+from tests.fmus.support import Instance, names_of, run, short_line_recipe
 
 pytest.importorskip("models.catenary.part")
 
@@ -104,4 +108,49 @@ def test_a_strip_between_the_sections_feels_both_wires(four):
     assert two > 0.0
     assert total == pytest.approx(one + two)
     assert made.get(["pantograph[1].contact.force"]) == [0.0]
+    made.free()
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(short_line_recipe(tmp_path_factory.mktemp("short")), tmp_path_factory.mktemp("fmu"))
+
+
+def test_fast_modes_can_be_left_out(short, tmp_path):
+    """The same forces as of a definition with that value; others than with all modes."""
+    name, made, full = "dynamics.highest_frequency", Instance(short), Instance(short)
+    (declared,) = (v for v in made.description.modelVariables if v.name == name)
+    assert (declared.causality, declared.unit, float(declared.start)) == ("parameter", "Hz", 0.0)
+    part = CatenaryPart(load(short_line_recipe(tmp_path).definition).with_values({name: 30.0}))
+    part.initialise(0.0, _strip(0))
+    made.initialise(**{name: 30.0})
+    full.initialise()
+    forces = []
+    for n in range(60):
+        for instance in (made, full):
+            for port, value in zip(names_of(instance, "input"), _strip(n).ravel(), strict=True):
+                instance[port] = float(value)
+            instance.step(n * 1e-3)
+        part.step(_strip(n), 1e-3)
+        forces.append([*(instance["pantograph[1].contact.force"] for instance in (made, full)), part.contact_force[0]])
+    reduced, whole, expected = np.array(forces).T
+    assert whole.max() > 100.0
+    assert reduced == pytest.approx(expected, rel=1e-12)
+    assert np.abs(reduced - whole).max() > 0.1
+    for instance in (made, full):
+        instance.free()
+
+
+def _strip(n):
+    """Return a strip that lifts the middle of LN2 with five spans."""
+    return np.array([[[[121.0 + 0.08 * n, y, 5.08], [80.0, 0.0, 0.0]] for y in (0.7, -0.7)]])
+
+
+@pytest.mark.parametrize(("value", "text"), [(-1.0, "is outside 0 ... 1e+09 Hz"), (1.0, "leaves no mode")])
+def test_modes_cannot_be_left_out_at_such_frequencies(short, value, text):
+    made = Instance(short)
+    made.initialise(**{"dynamics.highest_frequency": value})
+    with pytest.raises(FMICallException):
+        made.step(0.0)
+    assert f"parameter 'dynamics.highest_frequency': {value:g} Hz {text}" in made.errors[0]
     made.free()

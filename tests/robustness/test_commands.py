@@ -89,7 +89,8 @@ SETTINGS = [
     "line.contact_wire.nix=1", "line.contact_wire=1", "line.sections[1]=1", "line.sections[0].x=1", "line.name=1",
     "line.sections[²].x=1", "line.sections[].x=1", "line.sections[" + "9" * 500 + "].x=1", "line.time_step=0",
     "line.time_step=1e-9", "line.time_step=1", "line.mesh.elements_between_droppers=2.5",
-    "line.mesh.elements_between_droppers=0", "line.damping.alpha=-1", "line.contact.exponent=0",
+    "line.mesh.elements_between_droppers=0", "line.dynamics.highest_frequency=-1",
+    "line.dynamics.highest_frequency=1", "line.damping.alpha=-1", "line.contact.exponent=0",
     "line." + "a." * 300 + "b=1",
 ]  # fmt: skip
 

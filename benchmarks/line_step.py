@@ -67,10 +67,10 @@ def without_load(model: CatenaryModel) -> Callable[[], None]:
     return steps
 
 
-def under_pantograph(model: CatenaryModel) -> Callable[[], None]:
+def under_pantograph(model: CatenaryModel, name: str = "CX") -> Callable[[], None]:
     """Return a function that steps a line under a pantograph, which has left its first swing behind."""
     first, last = model.wires[0].ends
-    pantograph = load_lumped("CX").with_values({"start_position": first + 0.3 * (last - first)})
+    pantograph = load_lumped(name).with_values({"start_position": first + 0.3 * (last - first)})
     coupled = CoupledModel(model, [pantograph])
     coupled.run(1.0, STEP)
     clock = {"n": round(1.0 / STEP)}

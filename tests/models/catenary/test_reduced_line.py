@@ -14,8 +14,8 @@ from models.time_integration import Newmark
 from tests.models.nodal_line import NodalLine
 
 HIGHEST = "dynamics.highest_frequency"
-#: Leaves some intervals without any mode.
-FEW = 16.0
+#: Leaves some intervals of both wires without any mode.
+FEW = 12.0
 
 
 def reduced(definition, highest, **changes):
@@ -80,9 +80,11 @@ def test_modes_that_are_left_are_the_slow_ones(full):
 @pytest.mark.parametrize(("highest", "expected"), [(FEW, {0, 2}), (50.0, {4, 6, 8, 10})])
 def test_intervals_keep_different_numbers_of_modes(full, highest, expected):
     """Else the tests below would prove less than they say."""
-    modes = reduced(full.definition, highest).modes
-    assert {span.stop - span.start for span in modes.spans} == expected
-    assert bool(modes.followers) == (0 in expected)
+    line = reduced(full.definition, highest)
+    assert {span.stop - span.start for span in line.modes.spans} == expected
+    assert {interval.count for interval in line.wires[0].intervals} <= expected
+    assert (0 in {interval.count for interval in line.wires[0].intervals}) == (0 in expected)
+    assert bool(line.modes.followers) == (0 in expected)
 
 
 def test_steps_are_those_of_the_line_confined_to_its_coordinates(few, kernel):

@@ -79,7 +79,7 @@ class Banded:
             right = np.zeros((end - begin, load.shape[1]), order="F")
             right[first - begin : first - begin + len(load)] = load
             values = dpbtrs(self.factor[:, begin:end], right, lower=1, overwrite_b=1)[0]
-            size = np.abs(values).max(axis=1)
+            size = np.abs(values[:, 0]) if values.shape[1] == 1 else np.abs(values).max(axis=1)
             smallest, edge = CUT * size.max(), self.factor.shape[0]
             if (begin == 0 or size[:edge].max() <= smallest) and (end == n or size[-edge:].max() <= smallest):
                 kept = np.flatnonzero(size > smallest)

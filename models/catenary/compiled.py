@@ -26,7 +26,7 @@ from models.catenary.contact_wire import ContactWire, Crossing, Touch, WireInter
 from models.catenary.interval_modes import IntervalModes
 from models.catenary.motion import LineMotion
 from models.catenary.reaction import Meeting, Point, Reaction
-from models.catenary.stepping import Known, Stepper
+from models.catenary.stepping import Known, ReactionOf, Stepper
 from models.part import FloatArray, IntArray
 from models.time_integration import Newmark
 
@@ -193,20 +193,34 @@ class CompiledStepper(Stepper):
         return before, change
 
     def meet(
-        self, reaction: Reaction, wire: ContactWire, strip: FloatArray, element: int, motion: LineMotion
+        self, wire: ContactWire, reaction: ReactionOf, strip: FloatArray, element: int, motion: LineMotion
     ) -> Meeting | None:
-        """Return where a strip crosses an interval, unless it leaves it; see `Stepper.meet`."""
+        """Return where a strip crosses an interval or the one beside it; see `Stepper.meet`."""
+        interval = wire.interval(element)
+        found = self._meet(wire, reaction(interval), strip, element, motion)
+        if found == self.kernels.BEYOND and interval.first + len(interval.height) < wire.elements:
+            element = interval.first + len(interval.height)
+        elif found == self.kernels.BEFORE and interval.first > 0:
+            element = interval.first - 1
+        else:
+            return found if isinstance(found, Meeting) else None
+        found = self._meet(wire, reaction(wire.interval(element)), strip, element, motion)
+        return found if isinstance(found, Meeting) else None
+
+    def _meet(
+        self, wire: ContactWire, reaction: Reaction, strip: FloatArray, element: int, motion: LineMotion
+    ) -> Meeting | int:
         interval = reaction.interval
         local, row = np.empty((2, interval.size)), np.empty(interval.size)
         load, out = np.empty(len(interval.ends)), np.empty(6)
-        found = self.kernels.meet(
+        found: int = self.kernels.meet(
             strip, element - interval.first,
             interval.plan, interval.plan_static, interval.height, interval.height_static,
             reaction.slots, interval.ends, reaction.yielding, reaction.at_ends, self.newmark.a1,
             self._table, self.attached, motion.attached, local, row, load, out,
         )  # fmt: skip
         if found < 0:
-            return None
+            return found
         xi, share, height, rise, rate, compliance = out.tolist()
         count = interval.count
         point = Point(reaction, Touch(interval, row, row[:count], row[count:], height), load, compliance)

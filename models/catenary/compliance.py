@@ -63,7 +63,6 @@ class Compliance:
     def __init__(self, factor: Factor, B: sp.csr_matrix, stiffness: FloatArray) -> None:
         self._factor, self._B, self._stiffness = factor, B, stiffness
         self._kept: dict[int, Columns] = {}
-        self._prepared: IntArray | None = None
         self._whole, self._elongate = np.zeros(B.shape[1]), Product(B)
         self.dropper_columns = DropperColumns(self)
 
@@ -78,37 +77,36 @@ class Compliance:
             kept[place] = found
         return found
 
-    def prepare(self, places: IntArray) -> None:
-        """Find one of the responses to unit loads at ``places`` that is not known yet, ahead of its use."""
-        if places is self._prepared:
-            return
+    def prepare(self, places: IntArray) -> bool:
+        """Find one of the responses to unit loads at ``places`` ahead of its use; return whether all are there."""
         for place in places.tolist():
             if place not in self._kept:
                 self.unit(place)
-                return
-        self._prepared = places
+                return False
+        return True
 
     def units(self, places: IntArray) -> Columns:
         """Return the responses to unit loads at ``places``, side by side."""
         parts = [self.unit(place) for place in places.tolist()]
-        first = min(part.rows.start for part in parts)
-        droppers = np.unique(np.concatenate([part.dropper_index for part in parts]))
-        values = np.zeros((max(part.rows.stop for part in parts) - first, len(parts)))
-        force = np.zeros((len(droppers), len(parts)))
+        first, last = min(part.rows.start for part in parts), max(part.rows.stop for part in parts)
+        values, force = np.zeros((len(parts), last - first)), np.zeros((len(parts), self.droppers))
         for k, part in enumerate(parts):
-            values[part.rows.start - first : part.rows.stop - first, k] = part.values[:, 0]
-            force[np.searchsorted(droppers, part.dropper_index), k] = part.dropper_force[:, 0]
-        size = np.abs(values).max(axis=1)
+            values[k, part.rows.start - first : part.rows.stop - first] = part.values[:, 0]
+            force[k, part.dropper_index] = part.dropper_force[:, 0]
+        size = np.abs(values).max(axis=0)
         kept = np.flatnonzero(size > CUT * size.max())
         rows = slice(first + int(kept[0]), first + int(kept[-1]) + 1)
-        return Columns(rows, np.ascontiguousarray(values[kept[0] : kept[-1] + 1]), droppers, force)
+        near = np.flatnonzero(force.any(axis=0))
+        values, force = values[:, kept[0] : kept[-1] + 1], force[:, near]
+        return Columns(rows, np.ascontiguousarray(values.T), near, np.ascontiguousarray(force.T))
 
     def dropper(self, index: int) -> Columns:
         """Return the response to a unit force in a dropper."""
-        row = self._B[[index]].tocoo()
-        first = int(row.col.min())
-        load = np.zeros((int(row.col.max()) - first + 1, 1))
-        load[row.col - first, 0] = row.data
+        row = slice(self._B.indptr[index], self._B.indptr[index + 1])
+        places, values = self._B.indices[row], self._B.data[row]
+        first = int(places.min())
+        load = np.zeros((int(places.max()) - first + 1, 1))
+        load[places - first, 0] = values
         return self._response(first, load)
 
     @property

@@ -156,6 +156,11 @@ class ContactWire:
         """Return where the wire begins and ends along the track [m]."""
         return self._starts[0], self._starts[-1]
 
+    @property
+    def elements(self) -> int:
+        """Return the number of its elements."""
+        return len(self._of_element)
+
     def locate(self, x: float) -> tuple[int, float]:
         """Return the element at a position of the track and the share of the way along it, in the static shape."""
         element = self.start(-1, x)
@@ -166,10 +171,10 @@ class ContactWire:
         """Return the interval that an element belongs to."""
         return self._of_element[element]
 
-    def next_places(self, element: int) -> IntArray:
-        """Return the displacements of the attachment that a strip on an element comes to after the next one."""
+    def next_interval(self, element: int) -> WireInterval:
+        """Return the interval after that of an element; the last one follows itself."""
         after = self._of_element[element].first + len(self._of_element[element].height)
-        return self._of_element[min(after, len(self._of_element) - 1)].sides[1]
+        return self._of_element[min(after, len(self._of_element) - 1)]
 
     def touch(self, element: int, xi: float) -> Touch:
         """Return a point of an element."""

@@ -15,6 +15,8 @@ from numba import njit
 LANES, ENDS = 8, 6
 #: Rows of a unit: the coupling mu G with its ends, 1 / K_hat, -2 lambda / K_hat, then the motion of its modes.
 INVERSE, STIFFNESS, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11, 12
+#: What `meet` returns where there is no crossing.
+NOWHERE, BEFORE, BEYOND = -1, -2, -3
 #: Sums may be reordered, not more: infinities and NaN stay what they are.
 _compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
 _0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
@@ -311,7 +313,8 @@ def meet(
     Returns
     -------
     int
-        Element of the interval; -1 where the strip crosses none of them.
+        Element of the interval; NOWHERE where the strip and the wire are parallel or pass beside each other, BEFORE or
+        BEYOND where they may cross in another interval on that side.
     """
     follow_ends(slots, ends, yielding, a1, table, solution, attached, local)
     ax, ay = strip[0, 0, 0], strip[0, 0, 1]
@@ -327,7 +330,7 @@ def meet(
             y2 += plan[2 * element + 3, m] * local[0, m]
         determinant = strip_y * (x2 - x) - strip_x * (y2 - y)
         if determinant == 0.0:
-            return -1
+            return NOWHERE
         dx, dy = x - ax, y - ay
         share = (dy * (x2 - x) - dx * (y2 - y)) / determinant
         xi = (strip_x * dy - strip_y * dx) / determinant
@@ -336,10 +339,12 @@ def meet(
             break
         direction = step
         element += step
-        if element < 0 or element >= height.shape[0]:
-            return -1
+        if element < 0:
+            return BEFORE
+        if element >= height.shape[0]:
+            return BEYOND
     if not 0.0 <= share <= 1.0:
-        return -1
+        return NOWHERE
     xi = min(max(xi, 0.0), 1.0)
     out[0], out[1] = xi, share
     out[2] = touch(height, height_static, element, xi, row)

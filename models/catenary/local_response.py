@@ -209,6 +209,9 @@ class _Coupling:
 
     def __init__(self, problem: LocalProblem, contacts: Sequence[OpenContact], strip_compliance: FloatArray) -> None:
         self.problem, self.contacts = problem, contacts
+        self._penetration = np.array([c.penetration for c in contacts])
+        self._velocity = np.array([c.velocity for c in contacts])
+        self._slack: IntArray | None = None
         n = len(contacts)
         self.contact_contact = strip_compliance.copy()
         self.dropper_contact = np.zeros((problem.unilateral.size, n))
@@ -219,42 +222,39 @@ class _Coupling:
             for i, target in enumerate(contacts):
                 self.contact_contact[i, j] += target.meeting.point.moved_by(point)
 
-    def dropper_dropper(self, rows: IntArray, columns: IntArray) -> FloatArray:
-        """Return the compliance of droppers by slack droppers, d(-e)/df, shape (rows, columns)."""
-        result = np.zeros((self.problem.unilateral.size, columns.size))
-        for k, j in enumerate(columns):
-            column = self.problem.dropper_columns[j]
-            result[column.dropper_index, k] = column.dropper_force[:, 0]
-        return result[rows]
+    def by_slack(self, slack: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what forces of slack droppers do to the elastic forces of all droppers and to the penetrations.
 
-    def contact_dropper(self, slack: IntArray) -> FloatArray:
-        """Return d(delta)/df, shape (n_contacts, n_slack)."""
-        result = np.zeros((len(self.contacts), slack.size))
-        for i, contact in enumerate(self.contacts):
-            for k, j in enumerate(slack):
-                point = contact.meeting.point
-                result[i, k] = point.load @ self.problem.dropper_columns[j].at(point.reaction.interval.ends)[:, 0]
-        return result
+        Returns
+        -------
+        d(-e)/df : ndarray, shape (n_droppers, n_slack)
+        d(delta)/df : ndarray, shape (n_contacts, n_slack)
+        """
+        if self._slack is None or not np.array_equal(self._slack, slack):  # the set rarely changes
+            self._slack = slack
+            on_droppers = np.zeros((self.problem.unilateral.size, slack.size))
+            on_contacts = np.zeros((len(self.contacts), slack.size))
+            self._by_slack = on_droppers, on_contacts
+            for k, j in enumerate(slack.tolist()):
+                column = self.problem.dropper_columns[j]
+                on_droppers[column.dropper_index, k] = column.dropper_force[:, 0]
+                for i, contact in enumerate(self.contacts):
+                    point = contact.meeting.point
+                    on_contacts[i, k] = point.load.dot(column.at(point.reaction.interval.ends)[:, 0])
+        return self._by_slack
 
     def penetration(
         self, forces: FloatArray, slack: IntArray, compensation: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return penetrations and their velocities under given forces."""
-        change = -self.contact_contact @ forces
-        if slack.size and len(self.contacts):
-            change += self.contact_dropper(slack) @ compensation
-        free = np.array([c.penetration for c in self.contacts])
-        free_velocity = np.array([c.velocity for c in self.contacts])
-        return free + change, free_velocity + self.problem.velocity_factor * change
+        change = self.by_slack(slack)[1] @ compensation - self.contact_contact @ forces
+        return self._penetration + change, self._velocity + self.problem.velocity_factor * change
 
     def dropper_force(
         self, free: FloatArray, forces: FloatArray, slack: IntArray, compensation: FloatArray
     ) -> FloatArray:
         """Return the elastic dropper forces under given forces."""
-        result = free + self.dropper_contact @ forces
-        if slack.size:
-            result -= self.dropper_dropper(np.arange(free.size), slack) @ compensation
-        return result
+        return free + self.dropper_contact @ forces - self.by_slack(slack)[0] @ compensation
 
     def laws(self, forces: FloatArray, slack: IntArray, compensation: FloatArray) -> list[NormalForce]:
         """Return the contact law and its slopes at the present penetrations."""
@@ -281,8 +281,7 @@ class _Coupling:
         right = np.zeros(n + m)
         slope = np.array([a.by_penetration + self.problem.velocity_factor * a.by_velocity for a in laws])
         if n:
-            by_contact = -self.contact_contact
-            by_slack = self.contact_dropper(slack)
+            by_contact, by_slack = -self.contact_contact, self.by_slack(slack)[1]
             system[:n, :n] -= slope[:, None] * by_contact
             system[:n, n:] -= slope[:, None] * by_slack
             value = np.array([a.force for a in laws])
@@ -290,7 +289,7 @@ class _Coupling:
         if m:
             share = self.problem.unilateral[slack]
             system[n:, :n] += share[:, None] * self.dropper_contact[slack]
-            system[n:, n:] -= share[:, None] * self.dropper_dropper(slack, slack)
+            system[n:, n:] -= share[:, None] * self.by_slack(slack)[0][slack]
             right[n:] = -share * free[slack]
         solution = np.asarray(np.linalg.solve(system, right) if n + m else right, dtype=np.float64)
         return solution[:n], solution[n:]

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from models.catenary.contact_wire import ContactWire, WireInterval
 from models.catenary.motion import LineMotion
-from models.catenary.reaction import Meeting, Reaction
-from models.catenary.stepping import Stepper
+from models.catenary.reaction import Meeting
+from models.catenary.stepping import ReactionOf, Stepper
 from models.part import FloatArray
 
 
@@ -20,7 +18,7 @@ class FreeMotion:
     ----------
     wire : ContactWire
     reaction : callable
-        WireInterval -> Reaction.
+        How the wire gives way about an interval.
     stepper : Stepper
         In the midst of a step.
     motion : LineMotion
@@ -30,7 +28,7 @@ class FreeMotion:
     def __init__(
         self,
         wire: ContactWire,
-        reaction: Callable[[WireInterval], Reaction],
+        reaction: ReactionOf,
         stepper: Stepper,
         motion: LineMotion,
     ) -> None:
@@ -45,10 +43,8 @@ class FreeMotion:
         strip : ndarray, shape (2, 2, 3)
             Ends A and B; position and velocity.
         """
-        wire = self._wire
-        element = wire.start(guess, 0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
-        reaction = self._reaction(wire.interval(element))
-        met = self._stepper.meet(reaction, wire, strip, element, self._motion)
+        element = self._wire.start(guess, 0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
+        met = self._stepper.meet(self._wire, self._reaction, strip, element, self._motion)
         return met or self._walk(strip, guess)
 
     def _walk(self, strip: FloatArray, guess: int) -> Meeting | None:

@@ -423,7 +423,7 @@ class CatenaryModel:
                 # One that was closed stays among the candidates: other forces of the step may keep it so.
                 if delta > 0.0 or impact > 0.0:
                     contacts.append(OpenContact(p, s, met, delta, rate, impact))
-                now.compliance.prepare(wire.next_places(met.crossing.element))
+                self._prepare(now, s, wire.next_interval(met.crossing.element))
         return contacts, crossings
 
     def _penetration(self, share: float, height: float, rate: float, strip: FloatArray) -> tuple[float, float]:
@@ -450,6 +450,11 @@ class CatenaryModel:
                 del kept[next(iter(kept))]
             kept[(section, interval.first)] = found
         return found
+
+    def _prepare(self, now: _Step, section: int, interval: WireInterval) -> None:
+        """Find a part of how a wire gives way about an interval before a strip gets there: no step shall take long."""
+        if (section, interval.first) not in now.reactions and now.compliance.prepare(interval.ends):
+            self._reaction(now, section, interval)
 
     def _strip_compliance(self, contacts: Sequence[OpenContact], motion: StripMotion) -> FloatArray:
         """Two contacts of one strip share its retreat."""

@@ -74,8 +74,11 @@ class LineMotion:
 
     def plain(self) -> tuple[FloatArray, FloatArray]:
         """Return the arrays of the modal part and of the momentum, which may be changed: no stepper keeps others."""
-        self._unpack()
-        self.packed, self._prepared = None, np.zeros(0)
+        if self.packed is not None:
+            self._unpack()
+            self.packed = None
+        if self._prepared.size:
+            self._prepared = np.zeros(0)
         return self._modal, self._momentum
 
     def snapshot(self) -> Snapshot:

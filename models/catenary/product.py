@@ -10,9 +10,10 @@ import scipy.sparse as sp
 from models.part import FloatArray
 
 try:  # The routine behind scipy's own product, which spends a third of a small product on looking at its operands.
+    from scipy.sparse._sparsetools import csc_matvec as _csc_matvec
     from scipy.sparse._sparsetools import csr_matvec as _csr_matvec
 except ImportError:  # pragma: no cover - a scipy that has moved it
-    _csr_matvec = None
+    _csc_matvec = _csr_matvec = None
 
 _Routine = Callable[..., None]
 
@@ -52,6 +53,38 @@ class Product:
         """
         if self._routine is None:
             result += self.matrix @ vector
+        else:
+            self._routine(*self._arguments, vector, result)
+
+
+class TransposedProduct:
+    """The transpose of a matrix that has a `Product`, without a second copy of it: there is less to read in a step.
+
+    Parameters
+    ----------
+    product : Product
+    routine : callable, optional
+        scipy's compiled product of compressed columns; None takes the public operator.
+    """
+
+    def __init__(self, product: Product, routine: _Routine | None = _csc_matvec) -> None:
+        matrix = product.matrix
+        self._matrix = matrix.T
+        self._arguments = (matrix.shape[1], matrix.shape[0], matrix.indptr, matrix.indices, matrix.data)
+        self._routine = routine
+
+    def add(self, vector: FloatArray, result: FloatArray) -> None:
+        """Add matrix.T @ vector to ``result``, shapes (m,) and (n,); ``result`` is contiguous.
+
+        Examples
+        --------
+        >>> result = np.zeros(2)
+        >>> TransposedProduct(Product(sp.csr_matrix([[1.0, 2.0], [0.0, 3.0]]))).add(np.array([1.0, 1.0]), result)
+        >>> result.tolist()
+        [1.0, 5.0]
+        """
+        if self._routine is None:
+            result += self._matrix @ vector
         else:
             self._routine(*self._arguments, vector, result)
 

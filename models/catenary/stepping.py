@@ -16,7 +16,7 @@ intervals. It is added between the two products, where it costs next to nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,10 +26,13 @@ from models.catenary.band import Banded, Sparse, factorised
 from models.catenary.contact_wire import ContactWire, Crossing, WireInterval
 from models.catenary.interval_modes import IntervalModes
 from models.catenary.motion import LineMotion
-from models.catenary.product import Product
+from models.catenary.product import Product, TransposedProduct
 from models.catenary.reaction import Meeting, Point, Reaction
 from models.part import FloatArray, IntArray
 from models.time_integration import Newmark
+
+#: How a wire gives way about an interval.
+ReactionOf = Callable[[WireInterval], Reaction]
 
 
 class Known(NamedTuple):
@@ -93,11 +96,13 @@ class Stepper:
         """Lay out what the two halves of a step read, from mu G over the intervals' ends."""
         modes, newmark = self.modes, self.newmark
         self._out = Product(coupling), Product(modes.turn)
-        self._back = Product(coupling.T), Product(modes.turn.T)
+        self._back = TransposedProduct(self._out[0]), Product(modes.turn.T)
         self._own = Product(sp.hstack([-2.0 * modes.K, newmark.a2 * modes.M]))
         self._from_momentum = newmark.a2 * self.inverse
-        self._from_velocity = newmark.a2 / self._mu
-        self._to_momentum = newmark.a1 / self._mu
+        # One number where all wires are damped alike, as a number is sooner read than a vector.
+        alike = np.all(self._mu == self._mu[:1])
+        mu = float(self._mu[0]) if alike and self._mu.size else self._mu
+        self._from_velocity, self._to_momentum = newmark.a2 / mu, newmark.a1 / mu
         #: Change of the modal amplitudes in this step, were the attachments held.
         self._modal = np.empty(coupling.shape[0])
         self._work, self._following = np.empty(coupling.shape[0]), np.empty(coupling.shape[0])
@@ -169,9 +174,9 @@ class Stepper:
         return local_motion(interval, motion), change
 
     def meet(
-        self, reaction: Reaction, wire: ContactWire, strip: FloatArray, element: int, motion: LineMotion
+        self, wire: ContactWire, reaction: ReactionOf, strip: FloatArray, element: int, motion: LineMotion
     ) -> Meeting | None:
-        """Return where a strip crosses an interval at the end of the step, if a stepper can tell that at once.
+        """Return where a strip crosses a wire at the end of the step, if a stepper can tell that at once.
 
         Parameters
         ----------
@@ -192,8 +197,13 @@ class Stepper:
 
     def coupling(self, span: slice, places: IntArray) -> FloatArray:
         """Return mu G of one interval, a column for each displacement of its attachments, shape (n_span, n_places)."""
-        turned = (self.modes.coupling[span] @ self.modes.turn)[:, places]
-        return self._mu[span, None] * turned.toarray()
+        modes = self.modes
+        moved, low = _dense_rows(modes.coupling, span.start, span.stop)
+        turned, first = _dense_rows(modes.turn, low, low + moved.shape[1])
+        inside = (places >= first) & (places < first + turned.shape[1])
+        result = np.zeros((moved.shape[0], len(places)))
+        result[:, inside] = moved @ turned[:, places[inside] - first]
+        return self._mu[span, None] * result
 
     def finish(self, motion: LineMotion) -> None:
         """Let the intervals follow their attachments, and replace the motion by that at the end of the step."""
@@ -220,3 +230,15 @@ class Stepper:
 def local_motion(interval: WireInterval, motion: LineMotion) -> FloatArray:
     """Return an interval's local coordinates and their rates, shape (2, m)."""
     return np.concatenate((motion.modal[:, interval.modes], motion.attached.take(interval.ends, axis=1)), axis=1)
+
+
+def _dense_rows(matrix: sp.csr_matrix, start: int, stop: int) -> tuple[FloatArray, int]:
+    """Return some rows of a matrix from their first column that is not empty, and that column."""
+    bounds = matrix.indptr[start : stop + 1]
+    columns = matrix.indices[bounds[0] : bounds[-1]]
+    if not columns.size:
+        return np.zeros((stop - start, 0)), 0
+    low = int(columns.min())
+    result = np.zeros((stop - start, int(columns.max()) - low + 1))
+    result[np.repeat(np.arange(stop - start), np.diff(bounds)), columns - low] = matrix.data[bounds[0] : bounds[-1]]
+    return result, low

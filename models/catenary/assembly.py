@@ -19,6 +19,10 @@ from models.catenary.mesh import CatenaryMesh
 from models.catenary.parameters import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition, Dropper
 from models.part import FloatArray, IntArray
 
+#: What holds a wire without anchors along the track at every support [N/m]: soft enough to be of no account (a span of
+#: messenger wire on it has a period of half a minute), but the wire has a place.
+ANCHORAGE = 1.0
+
 
 @dataclass(frozen=True)
 class BeamProperties:
@@ -78,7 +82,7 @@ def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatAr
     K_e = to_global(K_local, axes)
     M_e = to_global(beam_mass(properties.mass, properties.gyration, length), axes)
     C_e = properties.alpha[:, None, None] * K_e + properties.beta[:, None, None] * M_e
-    dofs = element_dofs(mesh.beams)
+    dofs = element_dofs(mesh.owner[mesh.beams])
     size = NODE_DOFS * len(points)
     M = _assembled(M_e, dofs, size) + _lumped(definition, mesh, points)
     load = _gravity(M) + _tensioning(mesh, axes, properties.tension, size)
@@ -86,16 +90,18 @@ def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatAr
     C = _assembled(C_e, dofs, size) + _dropper_mass_damping(definition, mesh, points)
     support = definition.messenger_support
     K = _assembled(K_e, dofs, size)
+    if len(mesh.adrift):
+        K += ANCHORAGE * _on_nodes(mesh.adrift, 0, size)
     if support is not None:
         load[mesh.sprung * NODE_DOFS + 2] += support.stiffness * (mesh.seat - points[mesh.sprung, 2])
-        K += support.stiffness * _on_supports(mesh, size)
-        C += support.damping * _on_supports(mesh, size)
+        K += support.stiffness * _on_nodes(mesh.sprung, 2, size)
+        C += support.damping * _on_nodes(mesh.sprung, 2, size)
     return Matrices(K, M, C, load)
 
 
-def _on_supports(mesh: CatenaryMesh, size: int) -> sp.csc_matrix:
-    """Return 1 on the diagonal at the vertical displacements of the messenger wire's supports."""
-    dofs = mesh.sprung * NODE_DOFS + 2
+def _on_nodes(nodes: IntArray, axis: int, size: int) -> sp.csc_matrix:
+    """Return 1 on the diagonal at the displacements of some nodes along an axis."""
+    dofs = nodes * NODE_DOFS + axis
     return sp.csc_matrix((np.ones(len(dofs)), (dofs, dofs)), shape=(size, size))
 
 
@@ -106,7 +112,7 @@ def axial_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: 
     EA = beam_properties(definition, mesh).EA
     none = np.zeros_like(EA)
     K_e = to_global(beam_stiffness(EA, none, none, length), axes)
-    return _assembled(K_e, element_dofs(mesh.beams), NODE_DOFS * len(points))
+    return _assembled(K_e, element_dofs(mesh.owner[mesh.beams]), NODE_DOFS * len(points))
 
 
 def element_dofs(nodes: IntArray) -> IntArray:
@@ -213,8 +219,8 @@ def _tensioning(mesh: CatenaryMesh, axes: FloatArray, tension: FloatArray, size:
     """Return the constant tension of every wire element, pulling its two nodes together [2.9]."""
     load = np.zeros((size // NODE_DOFS, NODE_DOFS))
     pull = tension[:, None] * axes[:, 0, :]
-    np.add.at(load[:, :3], mesh.beams[:, 0], pull)
-    np.add.at(load[:, :3], mesh.beams[:, 1], -pull)
+    np.add.at(load[:, :3], mesh.owner[mesh.beams[:, 0]], pull)
+    np.add.at(load[:, :3], mesh.owner[mesh.beams[:, 1]], -pull)
     return load.ravel()
 
 

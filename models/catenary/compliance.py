@@ -25,8 +25,8 @@ class Columns:
 
     Attributes
     ----------
-    rows : slice
-        Attachments' displacements that they reach.
+    rows : slice or ndarray of int, shape (n_rows,)
+        Attachments' displacements that they reach; listed where they reach round the end of a line that closes on itself.
     values : ndarray, shape (n_rows, n)
     dropper_index : ndarray, shape (k,)
         Droppers that they stretch.
@@ -34,16 +34,20 @@ class Columns:
         What that adds to their elastic forces [N/N].
     """
 
-    rows: slice
+    rows: slice | IntArray
     values: FloatArray
     dropper_index: IntArray
     dropper_force: FloatArray
 
     def at(self, places: IntArray) -> FloatArray:
         """Return the values at some displacements of the attachments, shape (len(places), n)."""
-        inside = (places >= self.rows.start) & (places < self.rows.stop)
+        if isinstance(self.rows, slice):
+            offset = places - self.rows.start
+        else:
+            offset = (places - self.rows[0]) % (self.rows.max() + 1)
+        inside = (offset >= 0) & (offset < len(self.values))
         result = np.zeros((len(places), self.values.shape[1]))
-        result[inside] = self.values[places[inside] - self.rows.start]
+        result[inside] = self.values[offset[inside]]
         return result
 
 
@@ -88,17 +92,11 @@ class Compliance:
     def units(self, places: IntArray) -> Columns:
         """Return the responses to unit loads at ``places``, side by side."""
         parts = [self.unit(place) for place in places.tolist()]
-        first, last = min(part.rows.start for part in parts), max(part.rows.stop for part in parts)
-        values, force = np.zeros((len(parts), last - first)), np.zeros((len(parts), self.droppers))
+        force = np.zeros((len(parts), self.droppers))
         for k, part in enumerate(parts):
-            values[k, part.rows.start - first : part.rows.stop - first] = part.values[:, 0]
             force[k, part.dropper_index] = part.dropper_force[:, 0]
-        size = np.abs(values).max(axis=0)
-        kept = np.flatnonzero(size > CUT * size.max())
-        rows = slice(first + int(kept[0]), first + int(kept[-1]) + 1)
         near = np.flatnonzero(force.any(axis=0))
-        values, force = values[:, kept[0] : kept[-1] + 1], force[:, near]
-        return Columns(rows, np.ascontiguousarray(values.T), near, np.ascontiguousarray(force.T))
+        return Columns(*self._side_by_side(parts), near, np.ascontiguousarray(force[:, near].T))
 
     def dropper(self, index: int) -> Columns:
         """Return the response to a unit force in a dropper."""
@@ -117,7 +115,7 @@ class Compliance:
     def _response(self, first: int, load: FloatArray) -> Columns:
         """Return the response to a load of shape (k, 1) on the displacements from ``first``."""
         begin, values = self._factor.near(first, load)
-        rows = slice(begin, begin + len(values))
+        rows = self._rows(begin, len(values))
         self._whole[rows] = values[:, 0]
         stretch = np.zeros(self._B.shape[0])
         self._elongate.add(self._whole, stretch)
@@ -125,6 +123,34 @@ class Compliance:
         size = np.abs(stretch)
         near = np.flatnonzero(size > CUT * size.max(initial=0.0))
         return Columns(rows, values, near, (self._stiffness[near] * stretch[near])[:, None])
+
+    def _rows(self, first: int, count: int) -> slice | IntArray:
+        """Return ``count`` rows from ``first`` on; in a line that closes on itself the first follows on the last."""
+        n = len(self._whole)
+        return slice(first, first + count) if first + count <= n else (first + np.arange(count)) % n
+
+    def _side_by_side(self, parts: Sequence[Columns]) -> tuple[slice | IntArray, FloatArray]:
+        """Return the rows that single responses reach together, and their values there."""
+        reached = [part.rows for part in parts if isinstance(part.rows, slice)]
+        is_open = len(reached) == len(parts)
+        first = min(rows.start for rows in reached) if is_open else 0
+        last = max(rows.stop for rows in reached) if is_open else len(self._whole)
+        values = np.zeros((len(parts), last - first))
+        for k, part in enumerate(parts):
+            rows = part.rows
+            inside = slice(rows.start - first, rows.stop - first) if isinstance(rows, slice) else rows
+            values[k, inside] = part.values[:, 0]
+        size = np.abs(values).max(axis=0)
+        kept = np.flatnonzero(size > CUT * size.max())
+        begin, end = int(kept[0]), int(kept[-1]) + 1
+        if not is_open:  # all but the widest gap, which is the far side of the ring
+            gaps = np.diff(kept, append=kept[0] + last)
+            widest = int(gaps.argmax())
+            begin = int(kept[(widest + 1) % len(kept)])
+            end = begin + last - int(gaps[widest]) + 1
+        chosen = self._rows(first + begin, end - begin)
+        inside = chosen if not is_open else slice(begin, end)
+        return chosen, np.ascontiguousarray(values[:, inside].T)
 
 
 class DropperColumns(Sequence[Columns]):

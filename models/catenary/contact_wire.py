@@ -126,6 +126,9 @@ Positions = Callable[[WireInterval], Sequence[float]]
 class ContactWire:
     """Contact wire of one section.
 
+    One that closes on itself (``period`` > 0) is met at the same place after every lap; a strip is looked for in the lap
+    of the elements, and may cross the wire on either side of the place where it closes.
+
     Parameters
     ----------
     chain : Chain
@@ -137,6 +140,8 @@ class ContactWire:
         Coordinates of the line.
     angles : ndarray, shape (n,)
         Direction of the nodal axes in plan [rad].
+    period : float
+        Length after which the wire is met again, because it closes on itself [m]; 0 for one that ends.
     """
 
     def __init__(
@@ -146,7 +151,9 @@ class ContactWire:
         static: StaticState,
         modes: IntervalModes,
         angles: FloatArray,
+        period: float = 0.0,
     ) -> None:
+        self.period = period
         self._starts: list[float] = static.positions[chain.nodes, 0].tolist()
         self.intervals = _intervals(parts, static, modes, angles)
         self._of_element = [i for i in self.intervals for _ in i.height]
@@ -163,6 +170,7 @@ class ContactWire:
 
     def locate(self, x: float) -> tuple[int, float]:
         """Return the element at a position of the track and the share of the way along it, in the static shape."""
+        x -= self._laps(x) * self.period
         element = self.start(-1, x)
         start, end = self._starts[element : element + 2]
         return element, (x - start) / (end - start)
@@ -172,9 +180,9 @@ class ContactWire:
         return self._of_element[element]
 
     def next_interval(self, element: int) -> WireInterval:
-        """Return the interval after that of an element; the last one follows itself."""
-        after = self._of_element[element].first + len(self._of_element[element].height)
-        return self._of_element[min(after, len(self._of_element) - 1)]
+        """Return the interval after that of an element; the last one of a wire that ends follows itself."""
+        after, count = self._of_element[element].first + len(self._of_element[element].height), self.elements
+        return self._of_element[after % count if self.period else min(after, count - 1)]
 
     def touch(self, element: int, xi: float) -> Touch:
         """Return a point of an element."""
@@ -197,6 +205,8 @@ class ContactWire:
             None beyond the wire's ends, or where the wire passes beside the strip.
         """
         a, b = strip[:, 0].tolist()
+        if self.period:
+            self._shift(a, b, -self._laps((a[0] + b[0]) / 2.0))
         element = self.start(guess, (a[0] + b[0]) / 2.0)
         last = len(self._of_element) - 1
         interval: WireInterval | None = None
@@ -217,14 +227,17 @@ class ContactWire:
             direction = step
             element += step
             if not 0 <= element <= last:
-                return None
+                if not self.period:
+                    return None
+                element %= last + 1
+                self._shift(a, b, -step)
 
     def crossing(self, strip: FloatArray, element: int, xi: float, share: float) -> Crossing:
         """Return a crossing from its place on an element and on the strip."""
         a, b = strip[:, 0, :2].tolist()
         start, end = self._starts[element : element + 2]
         x = start + xi * (end - start)
-        from_wire_end = min(x - self._starts[0], self._starts[-1] - x)
+        from_wire_end = math.inf if self.period else min(x - self._starts[0], self._starts[-1] - x)
         return Crossing(element, xi, share, engagement(min(share, 1.0 - share) * math.dist(a, b), from_wire_end))
 
     def start(self, guess: int, x: float) -> int:
@@ -233,6 +246,27 @@ class ContactWire:
             return guess
         found = int(np.searchsorted(self._starts, x)) - 1
         return min(max(found, 0), len(self._of_element) - 1)
+
+    def alongside(self, x: FloatArray, place: FloatArray) -> FloatArray:
+        """Return places along the track of a wire that closes on itself in the lap of strips near them.
+
+        Parameters
+        ----------
+        x : ndarray, shape (P,)
+            Where the strips are [m].
+        place : ndarray, shape (P,)
+            As its elements stand [m]; NaN stays.
+        """
+        return place + self.period * np.round((x - place) / self.period)
+
+    def _laps(self, x: float) -> int:
+        """Return how often a position of the track has gone round a wire that closes on itself; 0 on one that ends."""
+        return math.floor((x - self._starts[0]) / self.period) if self.period else 0
+
+    def _shift(self, a: list[float], b: list[float], laps: int) -> None:
+        """Move the ends of a strip by whole laps."""
+        a[0] += laps * self.period
+        b[0] += laps * self.period
 
 
 def height_polynomials(

@@ -145,7 +145,7 @@ def _movable(mesh: CatenaryMesh) -> np.ndarray:
     movable[:, 0] = False
     movable[mesh.arms[:, 1], 1] = False
     movable[~attachments(mesh), 1] = False
-    return movable
+    return movable[mesh.owner]
 
 
 def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
@@ -229,6 +229,7 @@ def _solve(
         ) from error
     displacement = np.zeros(load.size)
     displacement[free] = solution[: len(free)]
+    displacement = displacement.reshape(-1, NODE_DOFS)[mesh.owner].ravel()
     return displacement, solution[len(free) :] * scale
 
 

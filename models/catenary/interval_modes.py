@@ -87,7 +87,7 @@ class IntervalModes:
     attached : ndarray, shape (n_attached,)
         Which degrees of freedom of the nodes the displacements x are, along the track.
     place : ndarray, shape (6 n,)
-        Place of a degree of freedom in x; -1 where it is held or inside an interval.
+        Place of a degree of freedom in x, of an image that of its owner; -1 where it is held or inside an interval.
     spans : tuple of slice
         Modes of every interval.
     blocks : tuple of IntervalBlocks
@@ -121,6 +121,7 @@ class IntervalModes:
         Returns
         -------
         ndarray, shape (6 n,)
+            Zero at images.
         """
         result = np.zeros(len(self.place))
         result[self.attached] = displacement
@@ -205,6 +206,7 @@ def interval_modes(
     damping: Sequence[tuple[float, float]],
     angles: FloatArray,
     fixed: BoolArray,
+    owner: IntArray,
 ) -> IntervalModes:
     """Change to modes of intervals and displacements of attachments.
 
@@ -220,6 +222,8 @@ def interval_modes(
         Direction in plan of the nodal axes at inner nodes [rad].
     fixed : ndarray of bool, shape (6 n,)
         Degrees of freedom that are held.
+    owner : ndarray, shape (n,)
+        Node whose degrees of freedom a node has; see `CatenaryMesh`.
     """
     inside = np.zeros(len(fixed), dtype=bool)
     for part in parts:
@@ -227,8 +231,9 @@ def interval_modes(
     attached = np.flatnonzero(~fixed & ~inside)
     place = np.full(len(fixed), -1)
     place[attached] = np.arange(len(attached))
+    place = place.reshape(-1, NODE_DOFS)[owner].ravel()
     K, M, _ = matrices
-    spans, layouts = _layout(_planes_apart(abs(K) + abs(M), parts), parts, angles)
+    spans, layouts = _layout(_planes_apart(abs(K) + abs(M), parts), parts, angles, owner)
     batches = [_batch(matrices, place, layout) for layout in layouts]
     n = spans[-1].stop if spans else 0
     eigenvalue, alpha, beta = np.empty(n), np.empty(n), np.empty(n)
@@ -314,7 +319,7 @@ class _Layout:
 
 
 def _layout(
-    planes_apart: bool, parts: Sequence[Interval], angles: FloatArray
+    planes_apart: bool, parts: Sequence[Interval], angles: FloatArray, owner: IntArray
 ) -> tuple[tuple[slice, ...], list[_Layout]]:
     """Number the modes interval by interval, those in plane first."""
     planes = _PLANES if planes_apart else (tuple(range(NODE_DOFS)),)
@@ -323,7 +328,7 @@ def _layout(
     start = 0
     for part in parts:
         begin = start
-        ends = (part.nodes[[0, -1], None] * NODE_DOFS + np.arange(NODE_DOFS)).ravel()
+        ends = (owner[part.nodes[[0, -1], None]] * NODE_DOFS + np.arange(NODE_DOFS)).ravel()
         for plane in planes if len(part.nodes) > 2 else ():
             inner = (part.nodes[1:-1, None] * NODE_DOFS + np.array(plane)).ravel()
             modes = np.arange(start, start + inner.size)

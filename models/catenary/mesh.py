@@ -68,6 +68,11 @@ class CatenaryMesh:
         Registration node and contact-wire node of the steady arms.
     section : ndarray, shape (n,)
         Section of every node, from 0.
+    owner : ndarray, shape (n,)
+        Node whose degrees of freedom a node has: its own, but for the images where a periodic line closes. An image is
+        the last node of a wire, one period behind the first, whose motion it shares.
+    adrift : ndarray, shape (k,)
+        Nodes at the supports of wires that close on themselves and that nothing holds along the track.
     """
 
     points: FloatArray
@@ -86,6 +91,8 @@ class CatenaryMesh:
     support_nodes: IntArray
     arms: IntArray
     section: IntArray
+    owner: IntArray
+    adrift: IntArray
 
     def contact_chains(self) -> tuple[Chain, ...]:
         """Return the contact wire of every section."""
@@ -111,6 +118,8 @@ class _Draft:
     supports: list[int] = field(default_factory=list)
     arms: list[tuple[int, int]] = field(default_factory=list)
     section: list[int] = field(default_factory=list)
+    owner: list[int] = field(default_factory=list)
+    adrift: list[int] = field(default_factory=list)
     current: int = 0
 
     def node(self, x: float, y: float, z: float, held: str = "") -> int:
@@ -118,7 +127,15 @@ class _Draft:
         self.fixed.append(tuple(name in held.split() for name in ("x", "y", "z", "rx", "ry", "rz")))
         self.mass.append(0.0)
         self.section.append(self.current)
+        self.owner.append(len(self.owner))
         return len(self.points) - 1
+
+    def image(self, node: int, x: float) -> int:
+        """Add a node that moves as another one; it has no degrees of freedom of its own."""
+        _, y, z = self.points[node]
+        image = self.node(x, y, z, "x y z rx ry rz")
+        self.owner[image] = node
+        return image
 
     def beam(self, i: int, j: int, component: str) -> None:
         self.beams.append((i, j))
@@ -198,20 +215,25 @@ class _SectionMesher:
     def __init__(self, definition: CatenaryDefinition, section: Section, index: int, draft: _Draft) -> None:
         self.definition, self.section, self.index, self.draft = definition, section, index, draft
         self.elements = definition.mesh.elements_between_droppers
-        self.supports = [s.x for s in section.supports]
-        self._staggers = np.array([(s.x, s.stagger) for s in section.supports]).T
+        self.boundaries = [section.spans[0].start, *(span.end for span in section.spans)]
+        held = section.supports if section.periodic else section.supports[1:-1]
+        self.supports = [s.x for s in held]
+        staggers = [(s.x, s.stagger) for s in section.supports]
+        if section.periodic:
+            staggers.append((self.boundaries[-1], section.supports[0].stagger))
+        self._staggers = np.array(staggers).T
         self.droppers = [x for span in section.spans for x in span.droppers]
         self.hangers = [x for span in section.spans for x in span.hangers]
         self.lengths = _given_lengths((s.droppers, s.dropper_lengths) for s in section.spans)
         self.hanger_lengths = _given_lengths((s.hangers, s.hanger_lengths) for s in section.spans)
 
     def build(self) -> None:
-        contact = self._wire("contact_wire", [*self.supports, *self.droppers], self._contact_height)
+        contact = self._wire("contact_wire", [*self.boundaries, *self.droppers], self._contact_height)
         clamps = self._stitch_clamps()
         hung = [x for x in self.droppers if not _inside(x, clamps)] if clamps else self.droppers
         on_messenger = self.hangers if self.definition.auxiliary_wire is not None else hung
         ends = [x for pair in clamps for x in pair]
-        messenger = self._wire("messenger_wire", [*self.supports, *on_messenger, *ends], self._messenger_height)
+        messenger = self._wire("messenger_wire", [*self.boundaries, *on_messenger, *ends], self._messenger_height)
         self._supports(contact, messenger)
         self._arms(contact)
         upper = dict.fromkeys(on_messenger, messenger)
@@ -225,11 +247,16 @@ class _SectionMesher:
 
     def _wire(self, component: str, breaks: Iterable[float], height: Callable[[float], float]) -> _Wire:
         wire = _Wire(self.draft, component, self.index)
-        for x in _subdivide(breaks, self.elements):
+        *inner, last = _subdivide(breaks, self.elements)
+        for x in inner:
             wire.append(x, self.draft.node(x, self._lateral(x), height(x)))
-        for end in (wire.nodes[0], wire.nodes[-1]):
-            # Held against torsion as well: nothing else would, and a static solution needs it.
-            self.draft.hold(end, "x y z rx")
+        if self.section.periodic:
+            wire.append(last, self.draft.image(wire.nodes[0], last))
+        else:
+            wire.append(last, self.draft.node(last, self._lateral(last), height(last)))
+            for end in (wire.nodes[0], wire.nodes[-1]):
+                # Held against torsion as well: nothing else would, and a static solution needs it.
+                self.draft.hold(end, "x y z rx")
         wire.close()
         return wire
 
@@ -254,17 +281,25 @@ class _SectionMesher:
         return self._base_height(x) + (self.definition.profile.auxiliary_height or 0.0)
 
     def _auxiliary(self) -> _Wire:
-        wire = self._wire("auxiliary_wire", [*self.supports, *self.droppers, *self.hangers], self._auxiliary_height)
-        for x in self.supports[1:-1]:
-            self.draft.hold(wire.at(x), "y")
+        breaks = [*self.boundaries, *self.droppers, *self.hangers]
+        wire = self._wire("auxiliary_wire", breaks, self._auxiliary_height)
+        for x in self.supports:
+            self.draft.hold(wire.at(x), "y rx" if self.section.periodic else "y")
+        self._let_adrift(wire)
         return wire
 
     def _supports(self, contact: _Wire, messenger: _Wire) -> None:
         held = "y z" if self.definition.messenger_support is None else "y"
-        for x in self.supports[1:-1]:
+        for x in self.supports:
             self.draft.hold(messenger.at(x), held)
             self.draft.sprung.append(messenger.at(x))
             self.draft.supports.append(contact.at(x))
+        self._let_adrift(messenger)
+
+    def _let_adrift(self, wire: _Wire) -> None:
+        """Note a wire without anchors and without steady arms, which could wander along the track."""
+        if self.section.periodic:
+            self.draft.adrift += [wire.at(x) for x in self.supports]
 
     def _arms(self, contact: _Wire) -> None:
         arm = self.definition.steady_arm
@@ -369,4 +404,6 @@ def _numbered(draft: _Draft) -> CatenaryMesh:
         support_nodes=new[np.array(draft.supports, dtype=np.int64)],
         arms=new[np.array(draft.arms, dtype=np.int64).reshape(-1, 2)],
         section=np.array(draft.section, dtype=np.int64)[order],
+        owner=new[np.array(draft.owner)[order]],
+        adrift=new[np.array(draft.adrift, dtype=np.int64)],
     )

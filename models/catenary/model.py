@@ -229,7 +229,7 @@ class CatenaryModel:
         self._apply(now, contacts, forces)
         now.stepper.finish(state.motion)
         self._note(state, contacts, forces)
-        return self._result(now, state, contacts, crossings, forces)
+        return self._in_lap(self._result(now, state, contacts, crossings, forces), motion.strip)
 
     def push(self, state: CatenaryState, step: float, forces: Sequence[tuple[int, float, float]]) -> None:
         """Advance the line by one time step under given vertical forces on its contact wires.
@@ -289,7 +289,7 @@ class CatenaryModel:
                 law = self._law(delta, rate, max(rate, 0.0), self.definition.contact)
                 result.force[p, s] = law.scaled(found.engagement).force
                 result.point[p, s] = *touch.interval.at(found, local[0]), touch.height + rise
-        return result
+        return self._in_lap(result, strips)
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
         """Return the force that every dropper carries [N], shape (n_droppers,): 0 where slack."""
@@ -312,7 +312,7 @@ class CatenaryModel:
     def displacement(self, state: CatenaryState) -> FloatArray:
         """Return the displacements and rotations of all nodes from the static shape [m, rad], shape (n, 6)."""
         nodal = self.modes.nodal(state.motion.modal[0], state.motion.attached[0])
-        return np.asarray(plan_rotation(self._angles) @ nodal).reshape(-1, NODE_DOFS)
+        return np.asarray(plan_rotation(self._angles) @ nodal).reshape(-1, NODE_DOFS)[self.mesh.owner]
 
     def set_velocity(self, state: CatenaryState, velocity: FloatArray) -> None:
         """Give the nodes velocities.
@@ -338,7 +338,7 @@ class CatenaryModel:
         K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (static.matrices.K + droppers, static.matrices.M, C))
         K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
         rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
-        modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel())
+        modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel(), self.mesh.owner)
         highest = self.definition.dynamics.highest_frequency
         return slower_than(modes, highest) if highest else modes
 
@@ -361,7 +361,8 @@ class CatenaryModel:
         for chain, parts in zip(self.mesh.chains, by_wire, strict=True):
             own = [(part, next(spans)) for part in parts]
             if chain.component == "contact_wire":
-                yield ContactWire(chain, own, self.static, self.modes, self._angles)
+                period = self.definition.sections[chain.section].period
+                yield ContactWire(chain, own, self.static, self.modes, self._angles, period)
 
     def _step(self, step: float) -> _Step:
         found = self._steps.get(step)
@@ -502,6 +503,13 @@ class CatenaryModel:
             result.force[contact.pantograph, contact.section] = force
         for p, s, met in crossings:
             now.stepper.place(met.crossing, met.point, state.motion, result.point[p, s])
+        return result
+
+    def _in_lap(self, result: ContactResult, strips: FloatArray) -> ContactResult:
+        """Move points of wires that close on themselves along with their strips, which travel on."""
+        for s, wire in enumerate(self.wires):
+            if wire.period:
+                result.point[:, s, 0] = wire.alongside(strips[:, :, 0, 0].mean(axis=1), result.point[:, s, 0])
         return result
 
     def _empty_result(self, pantographs: int) -> ContactResult:

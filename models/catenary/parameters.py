@@ -237,18 +237,27 @@ class Section:
     Attributes
     ----------
     supports : tuple of Support
-        From anchor to anchor; the first and last are the anchors of the wires.
+        From anchor to anchor; the first and last are the anchors of the wires. Of a periodic line all are supports, and
+        the one where it closes is the first.
     spans : tuple of Span
     ends : EndSpans
         Where the wires rise to their anchors.
     measured : tuple of (x, z) or empty
         Wanted heights of the contact wire instead of nominal height minus pre-sag.
+    periodic : bool
+        Whether the last span ends at the support where the first begins.
     """
 
     supports: tuple[Support, ...]
     spans: tuple[Span, ...]
     ends: EndSpans
     measured: tuple[tuple[float, float], ...] = ()
+    periodic: bool = False
+
+    @property
+    def period(self) -> float:
+        """Return the length after which a periodic line repeats [m]; 0 if it does not."""
+        return self.spans[-1].end - self.spans[0].start if self.periodic else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -380,6 +389,7 @@ def read(table: Table) -> CatenaryDefinition:
     )
     _check_stitch(table, definition)
     _check_auxiliary(table, profile)
+    _check_periodic(table, definition)
     table.finish()
     return definition
 
@@ -422,6 +432,21 @@ def _check_auxiliary(table: Table, profile: Profile) -> None:
     if height is not None and height >= profile.encumbrance:
         text = f"{height:g} m: the auxiliary wire must lie below the encumbrance, {profile.encumbrance:g} m"
         table.problem("profile.auxiliary_height", text)
+
+
+def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:
+    """A line that closes on itself is one section of wires that something holds, and none of them crosses the seam."""
+    if not any(section.periodic for section in definition.sections):
+        return
+    if len(definition.sections) > 1:
+        text = f"{len(definition.sections)} sections: a periodic line has one; write one section, or no 'periodic'"
+        table.problem("section", text)
+    if definition.steady_arm is None:
+        text = "a periodic line needs a table [steady_arm]: it has no anchors, and nothing else holds the contact wire"
+        table.problem("steady_arm", text)
+    if definition.stitch_wire is not None:
+        text = "a periodic line cannot have stitch wires: that of its first support would lie across the place where it"
+        table.problem("stitch_wire", f"{text} closes; take type 'simple' or 'compound'")
 
 
 def _check_type(
@@ -474,13 +499,20 @@ def _read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section
     hangers = [_Hung()] * len(droppers)
     if has_hangers:
         hangers = _read_hung(spans_table, boundaries, "hangers", "listed_hangers")
-    free, ends = _read_ends(table.required_table("ends"), boundaries)
-    supports = _read_supports(table, boundaries, free, has_arms=has_arms)
+    periodic = spans_table.flag("periodic", default=False)
+    if periodic:
+        ends, supports = _read_ring(table, boundaries, has_arms=has_arms)
+    else:
+        free, ends = _read_ends(table.required_table("ends"), boundaries)
+        supports = _read_supports(table, boundaries, free, has_arms=has_arms)
     spans = tuple(_span(a, b, d, h) for (a, b), d, h in zip(pairwise(boundaries), droppers, hangers, strict=True))
     measured = _read_measured(table, boundaries)
     if measured and any(s.dropper_lengths for s in spans):
         table.problem("measured", "gives the contact wire's profile, and so do the droppers' lengths: give one of them")
-    return Section(supports, spans, ends, measured)
+    if periodic and measured and abs(measured[-1][1] - measured[0][1]) > 1e-6:
+        text = f"a periodic line ends as it begins: the last height must be the first, {measured[0][1]:g} m"
+        table.problem("measured.heights", f"{text}, not {measured[-1][1]:g} m")
+    return Section(supports, spans, ends, measured, periodic)
 
 
 def _span(start: float, end: float, droppers: _Hung, hangers: _Hung) -> Span:
@@ -629,6 +661,23 @@ def _read_end(table: Table, boundaries: Sequence[float]) -> _End:
     return _End(free, working, rise)
 
 
+def _read_ring(table: Table, boundaries: Sequence[float], *, has_arms: bool) -> tuple[EndSpans, tuple[Support, ...]]:
+    """Return the ends, which a line that closes on itself has not, and its supports, the one where it closes once."""
+    if table.has("ends"):
+        table.problem("ends", "a periodic line has no ends: take this table away")
+        _read_ends(table.required_table("ends"), boundaries)
+    inner, ends = boundaries[:-1], (boundaries[0], boundaries[-1])
+    stagger = table.required_table("stagger")
+    if stagger.has("anchor"):
+        stagger.problem("anchor", "a periodic line has no anchors: take this value away")
+        stagger.quantity("anchor", "m")
+    if stagger.has("amplitude") and len(inner) % 2:
+        text = f"changes sides at every support, and after {len(inner)} spans the line would close on the other side:"
+        stagger.problem("amplitude", f"{text} take an even number of spans, or list the stagger of every support")
+    supports = zip(inner, _registered_stagger(stagger, len(inner)), strict=True)
+    return EndSpans(ends, ends, (0.0, 0.0)), tuple(Support(x, y, has_steady_arm=has_arms) for x, y in supports)
+
+
 def _read_supports(
     table: Table, boundaries: Sequence[float], free: tuple[int, int], *, has_arms: bool
 ) -> tuple[Support, ...]:
@@ -644,16 +693,19 @@ def _read_supports(
 
 def _read_stagger(table: Table, boundaries: Sequence[float], registered: Sequence[bool]) -> list[float]:
     inner = [i for i, ok in enumerate(registered) if ok]
-    if table.has("listed"):
-        listed = table.quantities("listed", "m", length=len(inner))
-        values = dict(zip(inner, listed, strict=False))
-    else:
-        amplitude = table.quantity("amplitude", "m", minimum=0.0, maximum=1.0)
-        values = {i: amplitude * (-1.0) ** n for n, i in enumerate(inner)}
+    values = dict(zip(inner, _registered_stagger(table, len(inner)), strict=True))
     anchors = table.quantity("anchor", "m", default=0.0)
     known = {0: anchors, len(boundaries) - 1: anchors} | values
     held = sorted(known)
     return [_straight(known, held, boundaries, i) for i in range(len(boundaries))]
+
+
+def _registered_stagger(table: Table, count: int) -> tuple[float, ...]:
+    """Return the stagger of the registered supports: listed, or alternating."""
+    if table.has("listed"):
+        return table.quantities("listed", "m", length=count)
+    amplitude = table.quantity("amplitude", "m", minimum=0.0, maximum=1.0)
+    return tuple(amplitude * (-1.0) ** n for n in range(count))
 
 
 def _straight(known: Mapping[int, float], held: Sequence[int], x: Sequence[float], i: int) -> float:

@@ -91,6 +91,22 @@ def make_sections(*sections: dict[str, object], **changes: object) -> CatenaryDe
     return make_line(spans=None, stagger=None, ends=None, section=list(sections), **changes)
 
 
+def make_ring(spans: int = 10, stagger: object = None, **changes: object) -> CatenaryDefinition:
+    """Return a line of LN2's wires that closes on itself after ``spans`` spans of 50 m."""
+    source = "test"
+    section = {
+        "spans": {
+            "start": [0.0, "m", source],
+            "count": spans,
+            "length": [50.0, "m", source],
+            "droppers": {"first": [4.5, "m", source], "count": 7},
+            "periodic": True,
+        },
+        "stagger": stagger or {"amplitude": [0.2, "m", source]},
+    }
+    return make_sections(section, **changes)
+
+
 @pytest.fixture(scope="session")
 def section_maker():
     return make_section
@@ -99,6 +115,11 @@ def section_maker():
 @pytest.fixture(scope="session")
 def sections_maker():
     return make_sections
+
+
+@pytest.fixture(scope="session")
+def ring_maker():
+    return make_ring
 
 
 @pytest.fixture(scope="session")

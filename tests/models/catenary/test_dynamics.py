@@ -45,6 +45,8 @@ def _single_wire(length, elements):
         clamp_mass=np.zeros(n),
         support_nodes=np.zeros(0, dtype=np.int64),
         arms=np.zeros((0, 2), dtype=np.int64),
+        owner=nodes,
+        adrift=np.zeros(0, dtype=np.int64),
     )
 
 

@@ -20,6 +20,17 @@ def long_line_file(spans: int) -> str:
     return re.sub(r"\[spans\]\n.*?(?=\n\[)", rule, text, count=1, flags=re.DOTALL)
 
 
+def ring_file(spans: int) -> str:
+    """Return the definition file of LN2 with ``spans`` equal spans that close on themselves."""
+    text = long_line_file(spans).replace("[spans]\n", "[spans]\nperiodic = true\n", 1)
+    return re.sub(r"\[ends\]\n.*?\n(?=\[)", "", text, count=1, flags=re.DOTALL)
+
+
+def ring(spans: int) -> CatenaryDefinition:
+    """Return LN2 with ``spans`` equal spans that close on themselves."""
+    return read(Table.from_dict(tomllib.loads(ring_file(spans)), "benchmark"))
+
+
 def long_line(spans: int) -> CatenaryDefinition:
     """Return LN2 with ``spans`` equal spans."""
     return read(Table.from_dict(tomllib.loads(long_line_file(spans)), "benchmark"))

@@ -39,7 +39,8 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
         "definition.",
-        "A strip beyond the modelled length finds no wire.",
+        "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: there a strip meets "
+        "the same wire again after every lap, with what its last passage has left of the wire's motion.",
         "All that the definition marks as a choice is not taken from the source.",
     )
 
@@ -55,7 +56,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
             local=(_dropper_port(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
-            calculated=(*_geometry_ports(part), *_section_ports(part), _wave_port()),
+            calculated=(*_geometry_ports(part), *_section_ports(part), *_period_ports(part), _wave_port()),
         )
 
     def _initialise(self, part: CatenaryPart, time: float, inputs: FloatArray) -> None:
@@ -154,6 +155,14 @@ def _section_ports(part: CatenaryPart) -> tuple[Port, ...]:
         )
         for thing, count in counts
     )
+
+
+def _period_ports(part: CatenaryPart) -> tuple[Port, ...]:
+    """Say after which length a line repeats that closes on itself."""
+    if not part.period.any():
+        return ()
+    text = "length after which the line repeats: its last span ends where its first one begins"
+    return (Port((Signal("period", "m", text),), attrgetter("period")),)
 
 
 def _wave_port() -> Port:

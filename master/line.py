@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,6 +15,10 @@ from master.network import Network
 from master.recorder import Recording
 from master.system import System
 
+#: Calculated parameter of a line that closes on itself: the length after which it repeats [m].
+PERIOD: Final = "period"
+#: What is this near to an interval counts as in it [m].
+_NEAR: Final = 1.0
 _INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
 
 #: Values of one component's calculated parameters by variable name.
@@ -34,6 +39,8 @@ class Uplift:
         Its position along the track [m], if the FMU says it.
     section : int, optional
         The section that it belongs to, if the line has several.
+    period : float
+        Length after which the line repeats, and with it the support [m]; 0 if it does not.
     maximum : float
         Largest uplift [m].
     time : float
@@ -46,6 +53,7 @@ class Uplift:
     maximum: float
     time: float
     section: int | None = None
+    period: float = 0.0
 
     @property
     def place(self) -> str:
@@ -102,6 +110,76 @@ def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:
     return np.array([found[i] for i in sorted(found)])
 
 
+def period_of(geometry: Mapping[str, float]) -> float:
+    """Return the length after which a line repeats because it closes on itself [m]; 0 if it does not."""
+    return geometry.get(PERIOD, 0.0)
+
+
+def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArray:
+    """Return by how much a line is to be moved along to be where it is met between two positions of the track [m].
+
+    Parameters
+    ----------
+    limits : (float, float)
+        Both positions [m].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Whole periods for a line that closes on itself; a single 0 for one that ends.
+
+    Examples
+    --------
+    >>> laps({"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}, (120.0, 310.0)).tolist()
+    [100.0, 200.0, 300.0]
+    """
+    period, x = period_of(geometry), indexed(geometry, "support", "x")
+    if not period or not len(x):
+        return np.zeros(1)
+    first, last = (math.floor((limit - x.min()) / period) for limit in limits)
+    return period * np.arange(first, last + 1)
+
+
+def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -> FloatArray:
+    """Return where supports or droppers are met between two positions of the track [m], shape (n,).
+
+    On a line that closes on itself they are met once a lap.
+
+    Examples
+    --------
+    >>> met({"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}, "support", (120.0, 310.0)).tolist()
+    [150.0, 200.0, 250.0, 300.0]
+    """
+    x = (laps(geometry, limits)[:, None] + indexed(geometry, kind, "x")).ravel()
+    return x[(x >= limits[0]) & (x <= limits[1])]
+
+
+def lies_within(x: float | None, interval: tuple[float | None, float | None], period: float = 0.0) -> bool:
+    """Return whether a place is in an interval of the track or beside it; on a line that repeats, in some lap.
+
+    Parameters
+    ----------
+    x : float or None
+        The place, None if it is not known [m].
+    interval : (float or None, float or None)
+        Its ends [m]; None where it has none.
+    period : float
+        Length after which the line repeats [m]; 0 if it does not.
+
+    Examples
+    --------
+    >>> lies_within(20.0, (110.0, 150.0)), lies_within(20.0, (110.0, 150.0), 100.0)
+    (False, True)
+    """
+    if x is None:
+        return False
+    start = -math.inf if interval[0] is None else interval[0] - _NEAR
+    end = math.inf if interval[1] is None else interval[1] + _NEAR
+    if period:
+        x = start if math.isinf(start) else x + period * math.ceil((start - x) / period)
+    return start <= x <= end
+
+
 def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:
     """Return the static geometry of each section of a line; a line of one section as it is.
 
@@ -140,5 +218,11 @@ def _uplift(recording: Recording, full: str, geometry: Geometry) -> Uplift:
     x, section = known.get(f"support[{number}].x"), known.get(f"support[{number}].section")
     peak_time = float(recording.time[peak])
     return Uplift(
-        component, number, x, float(values[peak]), peak_time, None if section is None else round(section)
+        component,
+        number,
+        x,
+        float(values[peak]),
+        peak_time,
+        None if section is None else round(section),
+        period_of(known),
     )

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
 from master.contacts import track_position
-from master.line import Uplift, by_section, indexed
+from master.line import Uplift, by_section, indexed, lies_within, met
 from master.quality import low_pass, settled
 from master.recorder import Recording
 from master.results import Results
@@ -73,7 +73,7 @@ def _support_label(u: Uplift) -> str:
 
 def uplift_history(results: Results, most: int = 8) -> Figure | None:
     """Uplift of the supports in the interval of interest over time."""
-    chosen = [u for u in results.uplifts if _within(u.x, results.interval)] or list(results.uplifts)
+    chosen = [u for u in results.uplifts if lies_within(u.x, results.interval, u.period)] or list(results.uplifts)
     if not chosen:
         return None
     figure, (axes,) = _figure(1, height=3.0)
@@ -180,12 +180,11 @@ def _mark_line(axes: Any, results: Results, catenary: str, shown: tuple[float, f
         first, last = shown[0] if start is None else start, shown[1] if end is None else end
         axes.axvspan(first, last, color=_INTERVAL, alpha=0.6, linewidth=0, label="interval of interest")
     values = results.geometry.get(catenary, {})
-    supports, droppers = indexed(values, "support", "x"), indexed(values, "dropper", "x")
     transform = axes.get_xaxis_transform()
-    inside = _inside(supports, shown)
-    axes.vlines(inside, 0.0, 1.0, transform=transform, color="#5f6368", linewidth=0.6, linestyle="--", label="support")
+    supports = met(values, "support", shown)
+    axes.vlines(supports, 0.0, 1.0, transform=transform, color="#5f6368", linewidth=0.6, linestyle="--", label="support")
     axes.vlines(
-        _inside(droppers, shown),
+        met(values, "dropper", shown),
         0.0,
         0.03,
         transform=transform,
@@ -196,10 +195,6 @@ def _mark_line(axes: Any, results: Results, catenary: str, shown: tuple[float, f
     axes.set_xlim(*shown)
 
 
-def _inside(x: FloatArray, shown: tuple[float, float]) -> FloatArray:
-    return x[(x >= shown[0]) & (x <= shown[1])]
-
-
 def _force_range(
     force: FloatArray, filtered: FloatArray, x: FloatArray, interval: tuple[float | None, float | None]
 ) -> tuple[float, float]:
@@ -208,11 +203,6 @@ def _force_range(
     shown = filtered[np.isfinite(filtered)]
     top = max(float(shown.max(initial=1.0)), float(force[inside].max(initial=0.0)))
     return min(0.0, float(shown.min(initial=0.0))), 1.05 * top
-
-
-def _within(x: float | None, interval: tuple[float | None, float | None]) -> bool:
-    start, end = interval
-    return x is not None and (start is None or x >= start - 1.0) and (end is None or x <= end + 1.0)
 
 
 def _step(recording: Recording) -> float:

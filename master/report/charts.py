@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.line import Uplift, by_section, indexed
+from master.line import Uplift, by_section, indexed, lies_within, met, period_of
 from master.quality import CUTOFF, MAX_UPLIFT
 from master.recorder import Recording
 from master.report.encode import kept_samples, packed
@@ -27,6 +27,8 @@ DASHES: Final = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 GREY: Final = "#8a8f98"
 MARK: Final = "#6b7280"
 INTERVAL: Final = "rgba(230,180,40,0.16)"
+#: What is said of a place on a line that closes on itself.
+_IN_LAP: Final = " in its lap"
 #: Points of one of many histories.
 _FEW_POINTS: Final = 700
 #: Droppers whose histories are drawn.
@@ -159,9 +161,9 @@ def line_marks(results: Results, catenary: str, limits: tuple[float, float]) -> 
     values = results.geometry.get(catenary, {})
     marks = (("support", "dash", 1.0, (0.0, 1.0)), ("dropper", "solid", 1.0, (0.0, 0.03)))
     return [
-        _ticks(_within(indexed(values, kind, "x"), limits), kind, dash, width, span)
+        _ticks(met(values, kind, limits), kind, dash, width, span)
         for kind, dash, width, span in marks
-        if len(_within(indexed(values, kind, "x"), limits))
+        if len(met(values, kind, limits))
     ]
 
 
@@ -269,8 +271,9 @@ def uplift_bars(results: Results) -> Chart | None:
     catenaries = sorted({u.component for u in uplifts})
     traces = [uplift_trace([u for u in uplifts if u.component == c], c, i) for i, c in enumerate(catenaries)]
     shapes = [_level(1e3 * MAX_UPLIFT, f"limit {1e3 * MAX_UPLIFT:g} mm")]
-    limits = _limits(uplifts)
-    axes = Axes(_support_axis(uplifts), "largest uplift [mm]", [*shapes, *interval_shape(results, limits)])
+    if not uplifts[0].period:
+        shapes += interval_shape(results, _limits(uplifts))
+    axes = Axes(_support_axis(uplifts), "largest uplift [mm]", shapes)
     axes.y_range = (0.0, 1e3 * max(1.1 * MAX_UPLIFT, *(1.1 * u.maximum for u in uplifts)))
     return Chart("uplift", "Uplift of the contact wire at the supports", _figure(traces, axes), "Whole run.", 320)
 
@@ -289,7 +292,9 @@ def _place(u: Uplift) -> float:
 
 
 def _support_axis(uplifts: Sequence[Uplift]) -> str:
-    return "track position of the support [m]" if uplifts[0].x is not None else "support number"
+    if uplifts[0].x is None:
+        return "support number"
+    return f"track position of the support{_IN_LAP if uplifts[0].period else ''} [m]"
 
 
 def _limits(uplifts: Sequence[Uplift]) -> tuple[float, float]:
@@ -307,7 +312,7 @@ def _level(y: float, text: str) -> Figure:
 
 def uplift_history(results: Results) -> Chart | None:
     """Return the uplift of the supports in the interval over time."""
-    chosen = [u for u in results.uplifts if _in_interval(u.x, results)] or list(results.uplifts)
+    chosen = [u for u in results.uplifts if lies_within(u.x, results.interval, u.period)] or list(results.uplifts)
     if not chosen:
         return None
     traces = [_uplift_curve(results, u, i) for i, u in enumerate(chosen)]
@@ -336,15 +341,17 @@ def dropper_charts(results: Results) -> list[Chart]:
 
 
 def _dropper_charts(results: Results, recording: Recording, component: str, names: Sequence[str]) -> list[Chart]:
-    x = indexed(results.geometry.get(component, {}), "dropper", "x")
+    values = results.geometry.get(component, {})
+    x, period = indexed(values, "dropper", "x"), period_of(values)
     place = x if len(x) == len(names) else np.arange(1.0, len(names) + 1.0)
     forces = np.column_stack([recording[n] for n in names])
-    title = "track position of the dropper [m]" if place is x else "dropper number"
+    title = f"track position of the dropper{_IN_LAP if period else ''} [m]" if place is x else "dropper number"
     limits = (float(place.min()), float(place.max()))
-    axes = Axes(title, "dropper force [N]", interval_shape(results, limits) if place is x else [])
+    axes = Axes(title, "dropper force [N]", interval_shape(results, limits) if place is x and not period else [])
     note = "Bar: from least to greatest in the run; dot: at the start; cross: slack at some time (hover for its share)."
     found = [Chart(f"droppers_{component}", "Dropper forces", _figure(_dropper_range(place, forces), axes), note, 360)]
-    chosen = _middle([i for i, p in enumerate(place) if _in_interval(float(p), results)] or list(range(len(names))))
+    inside = [i for i, p in enumerate(place) if lies_within(float(p), results.interval, period)]
+    chosen = _middle(inside or list(range(len(names))))
     curves = [_dropper_curve(recording.time, forces[:, i], f"{place[i]:.1f}", k) for k, i in enumerate(chosen)]
     found.append(_dropper_history(component, curves))
     return found
@@ -474,15 +481,6 @@ def _merged(x1: FloatArray, y1: FloatArray, x2: FloatArray, y2: FloatArray) -> t
     x, y = np.concatenate((x1, x2[known])), np.concatenate((y1, points[known]))
     order = np.argsort(x, kind="stable")
     return x[order], y[order]
-
-
-def _within(x: FloatArray, limits: tuple[float, float]) -> FloatArray:
-    return x[(x >= limits[0]) & (x <= limits[1])]
-
-
-def _in_interval(x: float | None, results: Results) -> bool:
-    start, end = results.interval
-    return x is not None and (start is None or x >= start - 1.0) and (end is None or x <= end + 1.0)
 
 
 def _figure(traces: Iterable[Figure], axes: Axes) -> Figure:

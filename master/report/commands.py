@@ -78,7 +78,7 @@ def _say_measured(measured: Comparison) -> None:
 def _film(done: Results, options: argparse.Namespace) -> Path:
     movie = make_movie(done, all_signals(done))
     if movie is None:
-        raise MasterError(f"{done.folder} has no recorded uplift, contact point and geometry, which a film needs")
+        raise MasterError(f"{done.folder} has no recorded uplift, contact point and geometry, which a film needs, or too many laps")
     start, end = done.interval
     return write_film(movie, options.film, FilmOptions(options.magnify, start=start, end=end))
 

@@ -2,7 +2,7 @@
 
 Recorded are the wire's uplift at the supports and its height at the contacts, and at the droppers if
 ``dropper[j].lower.uplift`` is among the recorded variables. Between these points the deformation is drawn
-straight; the messenger wire is drawn at rest.
+straight; the messenger wire is drawn at rest. A line that closes on itself is drawn once for every lap of the run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from master.arrays import BoolArray, FloatArray, IntArray
 from master.contacts import strip_centre
-from master.line import by_section, indexed
+from master.line import by_section, indexed, laps
 from master.recorder import Recording
 from master.report.encode import packed, packed_integers
 from master.report.signals import Signals
@@ -28,6 +28,8 @@ SHORTEST_FRAME: Final = 0.005
 #: Unit of packed displacements [m] and forces [N].
 DISPLACEMENT_UNIT: Final = 1e-5
 FORCE_UNIT: Final = 0.05
+#: Most laps on a line that closes on itself: every one is drawn, and its share of the page is that of a line.
+MOST_LAPS: Final = 50
 
 
 @dataclass(frozen=True)
@@ -115,37 +117,50 @@ def make_movie(results: Results, signals: Sequence[Signals]) -> Movie | None:
     if not signals or signals[0].contact.point("z") not in results.recordings[0]:
         return None
     catenary, time = signals[0].contact.catenary, _frames(results.recordings[0].time)
-    found = [_section(results, catenary, part, time) for part in by_section(results.geometry.get(catenary, {}))]
+    own = [s for s in signals if s.contact.catenary == catenary]
+    way = min(float(s.position.min()) for s in own), max(float(s.position.max()) for s in own)
+    values = results.geometry.get(catenary, {})
+    if len(laps(values, way)) > MOST_LAPS:
+        return None
+    found = [_section(results, catenary, part, time, laps(values, way)) for part in by_section(values)]
     sections = tuple(s for s in found if s is not None)
     if not sections or len(sections) < len(found):
         return None
-    own = [s for s in signals if s.contact.catenary == catenary]
     return Movie(time, sections, tuple(_rider(results.recordings[0], s, sections, time) for s in own))
 
 
-def _section(results: Results, catenary: str, values: Mapping[str, float], time: FloatArray) -> Section | None:
-    line = _line(values)
+def _section(
+    results: Results, catenary: str, values: Mapping[str, float], time: FloatArray, at: FloatArray
+) -> Section | None:
+    line = _line(values, at)
     if line is None:
         return None
     forms = {"support": "support[{}].uplift", "dropper": "dropper[{}].lower.uplift"}
-    moved = [h for kind, form in forms.items() for h in _histories(results, catenary, values, kind, form, time)]
+    once = [h for kind, form in forms.items() for h in _histories(results, catenary, values, kind, form, time)]
+    moved = [(x + offset, history) for offset in at.tolist() for x, history in once]
     moved = sorted((h for h in moved if h[1] is not None), key=lambda h: h[0])
     if not moved:
         return None
     forces = [f for _, f in _histories(results, catenary, values, "dropper", "dropper[{}].force", time)]
-    slack = np.column_stack([np.zeros(len(time), np.bool_) if f is None else f <= 0.0 for f in forces])
+    slack = np.column_stack([np.zeros(len(time), np.bool_) if f is None else f <= 0.0 for f in forces] * len(at))
     displacement = np.column_stack([h for _, h in moved if h is not None])
     return Section(line, np.array([x for x, _ in moved]), displacement, slack)
 
 
-def _line(values: Mapping[str, float]) -> Line | None:
-    droppers = [indexed(values, "dropper", n) for n in ("x", "lower.z", "upper.z")]
-    supports = [indexed(values, "support", n) for n in ("x", "z", "messenger_wire.z")]
+def _line(values: Mapping[str, float], at: FloatArray) -> Line | None:
+    """Return a section at rest, once at every place that it is to be moved to."""
+    droppers = [_repeated(indexed(values, "dropper", n), at, n == "x") for n in ("x", "lower.z", "upper.z")]
+    supports = [_repeated(indexed(values, "support", n), at, n == "x") for n in ("x", "z", "messenger_wire.z")]
     if not len(droppers[0]) or not len(supports[0]) or len({len(v) for v in droppers}) > 1:
         return None
     wire = _sorted((droppers[0], droppers[1]), (supports[0], supports[1]))
     messenger = _sorted((droppers[0], droppers[2]), (supports[0], supports[2]))
     return Line(wire, messenger, np.array(droppers), supports[0])
+
+
+def _repeated(values: FloatArray, at: FloatArray, is_place: bool) -> FloatArray:
+    """Return values once for every lap, and those that are places moved along."""
+    return (values + at[:, None] * is_place).ravel()
 
 
 def _sorted(*curves: tuple[FloatArray, FloatArray]) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from master.arrays import BoolArray, FloatArray
 from master.contacts import Contact, strip_centre, track_position
+from master.line import lies_within
 from master.recorder import Recording
 from master.results import Assessment, Results, assess_contacts
 from master.study.family import Interval
@@ -79,7 +80,7 @@ class Entry:
 def entries(variant: str, done: Results, interval: Interval) -> tuple[Entry, ...]:
     """Return the entries of a run's pantographs in an interval, the leading one first."""
     limits = (interval.start, interval.end)
-    uplifts = [u for u in done.uplifts if u.x is None or interval.start - 1.0 <= u.x <= interval.end + 1.0]
+    uplifts = [u for u in done.uplifts if u.x is None or lies_within(u.x, limits, u.period)]
     found = assess_contacts(done.recordings, done.contacts, limits, uplifts)
     ordered = leading_first(done.recordings[0], [a.contact for a in found])
     by_index = {(a.contact.catenary, a.contact.index): a for a in found}

@@ -12,12 +12,12 @@ import numpy as np
 from master.arrays import BoolArray, FloatArray
 from master.contacts import track_position
 from master.errors import MasterError
-from master.line import Uplift
+from master.line import Uplift, lies_within
 from master.quality import Quality, interval_mask
 from master.recorder import Recording
 from master.results import Assessment, Results
 
-#: A support belongs to a place along the track, or to the interval of interest, within this distance [m].
+#: A support belongs to a place along the track within this distance [m].
 SUPPORT_TOLERANCE: Final = 1.0
 _WAVE_SPEED: Final = "contact_wire.wave_speed"
 
@@ -121,8 +121,7 @@ def _uplifts(results: Results, choice: Choice) -> tuple[Uplift, ...]:
 
 def _largest_uplift(results: Results, choice: Choice) -> Measured:
     """Largest uplift at the supports of the interval of interest."""
-    start, end = _widened(results.interval)
-    inside = [u for u in _uplifts(results, choice) if u.x is not None and start <= u.x <= end]
+    inside = [u for u in _uplifts(results, choice) if lies_within(u.x, results.interval, u.period)]
     if not inside:
         raise MissingQuantityError("there is no support in the interval of interest")
     most = max(inside, key=lambda u: u.maximum)
@@ -147,14 +146,6 @@ def _nearest(uplifts: Sequence[Uplift], x: float) -> Uplift:
     if not near:
         raise MissingQuantityError(f"there is no support within {SUPPORT_TOLERANCE:g} m of x = {x:g} m")
     return min(near, key=lambda u: abs((u.x or 0.0) - x))
-
-
-def _widened(interval: tuple[float | None, float | None]) -> tuple[float, float]:
-    start, end = interval
-    return (
-        -math.inf if start is None else start - SUPPORT_TOLERANCE,
-        math.inf if end is None else end + SUPPORT_TOLERANCE,
-    )
 
 
 def _slack_share(results: Results, choice: Choice) -> Measured:

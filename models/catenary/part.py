@@ -153,6 +153,11 @@ class CatenaryPart:
         )
 
     @property
+    def period(self) -> FloatArray:
+        """Return the length after which a line that closes on itself repeats [m], shape (1,); 0 if it does not."""
+        return np.array([max(section.period for section in self.definition.sections)])
+
+    @property
     def contact_wire_wave_speed(self) -> FloatArray:
         """Return the speed of waves in the contact wire, taken for the longest span [m/s], shape (1,)."""
         return np.array([contact_wire_wave_speed(self.definition)])

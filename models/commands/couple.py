@@ -99,7 +99,8 @@ def _span_of(arguments: argparse.Namespace, line: CatenaryModel) -> tuple[float,
     length = last - first
     start = arguments.start if arguments.start is not None else first + 0.2 * length
     end = arguments.end if arguments.end is not None else last - 0.2 * length
-    if not first <= start < end <= last:
+    furthest = math.inf if line.wires[0].period else last  # one that closes on itself is travelled on and on
+    if not first <= start < end <= furthest:
         text = f"the run from {start:g} m to {end:g} m does not lie on the line, {first:g} m to {last:g} m"
         raise ParameterError(f"--start, --end: {text}")
     return start, end

@@ -29,7 +29,7 @@ def soak(monkeypatch):
 def test_a_multibody_pantograph_for_twenty_seconds(soak):
     """At 30 m/s over twelve spans: joints stay closed, nothing is kept, and the contact never opens after the raise."""
     pantograph = soak.at_speed(soak.load_pantograph("generic_multibody"), 30.0)
-    system = soak.system_of(soak.line(STOP * 30.0, periodic=False), pantograph)
+    system = soak.system_of(soak.line(STOP * 30.0), pantograph)
     windows = list(soak.run(system, STOP, WINDOW))
     assert len(windows) == 10
     violation = np.array([w.violation for w in windows])

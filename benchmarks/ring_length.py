@@ -20,8 +20,8 @@ from models.catenary.model import CatenaryModel
 from models.catenary.parameters import CatenaryDefinition
 from models.coupled import CoupledModel
 from models.library import load_lumped
-from models.part import FloatArray
 from models.pantograph.parameters import LumpedDefinition
+from models.part import FloatArray
 
 STEP = 1e-3
 #: Where the pantograph starts [m]; how far it runs at least before it is looked at, in spans; what is looked at.
@@ -56,9 +56,8 @@ def main() -> None:
     pantograph = load_lumped(options.pantograph).with_values({"start_position": START})
     spans = SETTLING + SHOWN + REACH
     reference = passage(long_line(2 * spans), pantograph, spans)
-    rows = [reference.row("open", reference)]
-    for count in options.spans:
-        rows.append(passage(ring(count), pantograph, max(spans, 3 * count)).row(f"{count} spans", reference))
+    runs = {f"{n} spans": passage(ring(n), pantograph, max(spans, 3 * n)) for n in options.spans}
+    rows = [run.row(name, reference) for name, run in {"open": reference, **runs}.items()]
     title = f"{options.pantograph} at {3.6 * pantograph.speed:.0f} km/h, contact force below 20 Hz"
     columns = ("line", "mean N", "deviation N", "least N", "most N", "off the open line N", "the same, not filtered N")
     table(title, columns, rows)

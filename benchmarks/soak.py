@@ -8,10 +8,10 @@ A lumped pantograph is solved together with the line; a multibody one exchanges 
 FMUs do, and its rows end with the largest violation of its joints.
 
 The line is as long as the run, 100 spans for a minute at 300 km/h, and a step costs more the longer the line is.
-With ``--periodic`` it closes on itself after ``--spans`` spans, 20 unless told otherwise, and costs the same however long
-the run is. That assumes a train of pantographs, one every 20 spans: each meets what the one before has left of the
-wire's motion, which `ring_length.py` shows to be next to nothing. There, the last column tells by how much the force at
-any step is off that of a window before; a window should then be a whole number of span pairs.
+With ``--periodic`` it closes on itself after ``--spans`` spans, 20 unless told otherwise, and costs the same however
+long the run is. That assumes a train of pantographs, one every 20 spans: each meets what the one before has left of the
+wire's motion; `ring_length.py` tells how much that is. The last column then tells by how much the force at any step is
+off that of the window before, in which the pantograph must have passed a whole number of span pairs.
 """
 
 from __future__ import annotations

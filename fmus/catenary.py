@@ -39,8 +39,8 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
         "definition.",
-        "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: there a strip meets "
-        "the same wire again after every lap, with what its last passage has left of the wire's motion.",
+        "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: a strip meets the "
+        "same wire again after every lap, with what its last passage has left of the wire's motion.",
         "All that the definition marks as a choice is not taken from the source.",
     )
 

@@ -181,8 +181,8 @@ def _mark_line(axes: Any, results: Results, catenary: str, shown: tuple[float, f
         axes.axvspan(first, last, color=_INTERVAL, alpha=0.6, linewidth=0, label="interval of interest")
     values = results.geometry.get(catenary, {})
     transform = axes.get_xaxis_transform()
-    supports = met(values, "support", shown)
-    axes.vlines(supports, 0.0, 1.0, transform=transform, color="#5f6368", linewidth=0.6, linestyle="--", label="support")
+    inside = met(values, "support", shown)
+    axes.vlines(inside, 0.0, 1.0, transform=transform, color="#5f6368", linewidth=0.6, linestyle="--", label="support")
     axes.vlines(
         met(values, "dropper", shown),
         0.0,

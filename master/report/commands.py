@@ -17,7 +17,7 @@ from master.report import tables
 from master.report.comparison import columns, comparison_page
 from master.report.film import FilmOptions, write_film
 from master.report.measured import Comparison, compare_measured, read_measured
-from master.report.movie import make_movie
+from master.report.movie import MOST_LAPS, make_movie
 from master.report.signals import all_signals
 from master.results import Results
 
@@ -78,7 +78,8 @@ def _say_measured(measured: Comparison) -> None:
 def _film(done: Results, options: argparse.Namespace) -> Path:
     movie = make_movie(done, all_signals(done))
     if movie is None:
-        raise MasterError(f"{done.folder} has no recorded uplift, contact point and geometry, which a film needs, or too many laps")
+        needed = "a film needs recorded uplift, contact point and geometry"
+        raise MasterError(f"{done.folder} cannot be drawn: {needed}, and at most {MOST_LAPS} laps of a line")
     start, end = done.interval
     return write_film(movie, options.film, FilmOptions(options.magnify, start=start, end=end))
 

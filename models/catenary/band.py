@@ -1,8 +1,8 @@
 """Solving for the attachments: one factorisation a step size, whole solutions and solutions near a load.
 
-The displacements of the attachments are numbered along the track, so their matrix is a band. That of a line which closes
-on itself is a cyclic band: the last few rows reach the first few as well. Without its last rows, the border, it is a
-band again; and it may be cut open anywhere, so that what is solved near a load is far from the cut.
+The displacements of the attachments are numbered along the track, so their matrix is a band. That of a line which
+closes on itself is a cyclic band: the last few rows reach the first few as well. Without its last rows, the border, it
+is a band again; and it may be cut open anywhere, so that what is solved near a load is far from the cut.
 """
 
 from __future__ import annotations

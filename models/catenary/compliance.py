@@ -26,7 +26,7 @@ class Columns:
     Attributes
     ----------
     rows : slice or ndarray of int, shape (n_rows,)
-        Attachments' displacements that they reach; listed where they reach round the end of a line that closes on itself.
+        Attachments' displacements that they reach; listed where a line closes on itself within their reach.
     values : ndarray, shape (n_rows, n)
     dropper_index : ndarray, shape (k,)
         Droppers that they stretch.

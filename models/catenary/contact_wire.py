@@ -126,8 +126,8 @@ Positions = Callable[[WireInterval], Sequence[float]]
 class ContactWire:
     """Contact wire of one section.
 
-    One that closes on itself (``period`` > 0) is met at the same place after every lap; a strip is looked for in the lap
-    of the elements, and may cross the wire on either side of the place where it closes.
+    One that closes on itself (``period`` > 0) is met at the same place after every lap; a strip is looked for in the
+    lap of the elements, and may cross the wire on either side of the place where it closes.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.band import Banded, Sparse, factorised
+from models.catenary.band import Banded, Cyclic, Sparse, factorised
 from models.catenary.contact_wire import ContactWire, Crossing, WireInterval
 from models.catenary.interval_modes import IntervalModes
 from models.catenary.motion import LineMotion
@@ -84,7 +84,7 @@ class Stepper:
         self.inverse = 1.0 / (modes.eigenvalue * (1.0 + a1 * modes.alpha) + self._mu)
         coupling = (sp.diags(self._mu) @ modes.coupling).tocsr()
         G = coupling @ modes.turn
-        self.factor: Banded | Sparse = factorised(
+        self.factor: Banded | Cyclic | Sparse = factorised(
             modes.K + a0 * modes.M + a1 * modes.C - G.T @ sp.diags(self.inverse) @ G
         )
         self._from_modal = -2.0 * modes.eigenvalue * self.inverse

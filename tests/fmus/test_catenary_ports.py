@@ -154,3 +154,65 @@ def test_modes_cannot_be_left_out_at_such_frequencies(short, value, text):
         made.step(0.0)
     assert f"parameter 'dynamics.highest_frequency': {value:g} Hz {text}" in made.errors[0]
     made.free()
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(recipe("Catenary_LN2_ring"), tmp_path_factory.mktemp("fmu"))
+
+
+def _on_ring(instance: Instance, steps: range, place: float) -> list[list[float]]:
+    """Step under a strip that runs at 80 m/s from ``place`` and return force, place and an uplift after every step."""
+    rows = []
+    for n in steps:
+        for end in "AB":
+            instance[f"pantograph[1].{end}.x"] = place + 0.08 * n
+        instance.step(n * 1e-3)
+        rows.append(instance.get([*(f"pantograph[1].contact.{v}" for v in ("force", "x", "y")), "support[1].uplift"]))
+    return rows
+
+
+def _raised(path: Path, place: float) -> Instance:
+    made = Instance(path)
+    ends = {f"pantograph[1].{end}.{name}": v for end in "AB" for name, v in (("x", place), ("z", 5.11), ("vx", 80.0))}
+    made.initialise(**ends)
+    return made
+
+
+def test_a_line_that_closes_on_itself_says_so_and_one_that_ends_does_not(ring, fmu):
+    made = Instance(ring)
+    assert "period" in names_of(made, "calculatedParameter")
+    made.initialise()
+    assert made["period"] == 990.0
+    made.free()
+    with zipfile.ZipFile(fmu) as archive:
+        assert b'name="period"' not in archive.read("modelDescription.xml")
+
+
+def test_a_strip_meets_the_same_wire_after_many_laps(ring):
+    """Over the place where the line closes, in the first lap and in the fifth."""
+    once, later = _raised(ring, 985.0), _raised(ring, 985.0 + 4 * 990.0)
+    first = _on_ring(once, range(120), 985.0)
+    fifth = _on_ring(later, range(120), 985.0 + 4 * 990.0)
+    assert min(row[0] for row in first[60:]) > 10.0
+    assert first[-1][1] > 990.0
+    assert first[-1][3] > 1e-3  # the support where it closes is lifted
+    for one, five in zip(first, fifth, strict=True):
+        assert five[0] == pytest.approx(one[0], abs=1e-8)
+        assert five[1] - one[1] == pytest.approx(4 * 990.0, abs=1e-9)
+        assert five[2:] == pytest.approx(one[2:], abs=1e-12)
+    once.free()
+    later.free()
+
+
+def test_a_state_beyond_the_seam_goes_on_bit_for_bit(ring):
+    place = 985.0 + 3 * 990.0
+    made, other = _raised(ring, place), _raised(ring, 12.0)
+    _on_ring(made, range(80), place)
+    data = made.slave.serializeFMUstate(made.slave.getFMUstate())
+    expected = _on_ring(made, range(80, 120), place)
+    other.slave.setFMUstate(other.slave.deSerializeFMUstate(data))
+    assert _on_ring(other, range(80, 120), place) == expected
+    assert expected[-1][0] > 10.0
+    made.free()
+    other.free()

@@ -19,7 +19,7 @@ from models.library import line_path, load_line, load_pantograph, pantograph_pat
 from tests.robustness.mutation import changes
 from tests.robustness.support import ANSWER_SECONDS, PROFILE, TRIED, ask, assert_quick, assert_worded
 
-LINES = ("LN2", "Re330", "Shinkansen", "LN2_overlap")
+LINES = ("LN2", "Re330", "Shinkansen", "LN2_overlap", "LN2_ring")
 PANTOGRAPHS = ("CX", "CX_multibody", "generic_multibody")
 FILES = {
     **{f"line {n}": line_path(n) for n in LINES},

@@ -86,3 +86,24 @@ def test_a_film_plays_the_interval(movie, tmp_path):
 def test_an_unknown_kind_of_film_is_refused(movie, tmp_path):
     with pytest.raises(MasterError, match=r"\.gif or \.mp4"):
         write_film(movie, tmp_path / "run.avi", FilmOptions())
+
+
+def test_a_line_that_closes_on_itself_is_drawn_for_every_lap(made_up):
+    """Supports at 50 and 100 m and what lies between, every 100 m: the run from 20 to 140 m sees laps 0 and 1 ..."""
+    run = made_up()
+    gone = ("support[3]", "dropper[3]", "dropper[4]")
+    values = {k: v for k, v in run.geometry["catenary"].items() if k[:10] not in gone}
+    run = dataclasses.replace(run, geometry={"catenary": values | {"period": 100.0}})
+    movie = make_movie(run, all_signals(run))
+    (section,) = movie.sections
+    assert section.points.tolist() == [-50.0, 0.0, 50.0, 100.0]  # ... of which lap 0 begins 50 m before the run's end
+    assert section.line.droppers[0].tolist() == [-45.0, -20.0, 55.0, 80.0]
+    assert (section.displacement[:, :2] == section.displacement[:, 2:]).all()
+    assert section.slack.any(axis=0).tolist() == [False, True] * 2
+    assert movie.riders[0].x[-1] == pytest.approx(140.0, abs=0.07)
+
+
+def test_so_many_laps_are_not_drawn(made_up):
+    run = made_up()
+    run = dataclasses.replace(run, geometry={"catenary": run.geometry["catenary"] | {"period": 2.0}})
+    assert make_movie(run, all_signals(run)) is None

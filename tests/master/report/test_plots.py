@@ -1,11 +1,14 @@
 """Plots as files."""
 
+import base64
 import dataclasses
 
 import numpy as np
 import pytest
 
 from master import plots
+from master.report.charts import line_marks, run_charts
+from master.report.signals import all_signals
 
 
 def lines(axes):
@@ -50,3 +53,44 @@ def test_what_has_no_data_has_no_plot(made_up):
     bare = dataclasses.replace(made_up(with_geometry=False), recordings=(made_up().recordings[0],))
     assert set(plots.all_plots(bare)) == {"contact_force", "contact_height"}
     assert plots.geometry({"support[1].x": 1.0}) is None
+
+
+@pytest.fixture
+def on_ring(made_up):
+    """The run on a line of supports at 50 and 100 m that repeats after 100 m, interest in 110 to 125 m."""
+    run = made_up()
+    gone = ("support[3]", "dropper[3]", "dropper[4]")
+    values = {k: v for k, v in run.geometry["catenary"].items() if k[:10] not in gone}
+    settings = run.summary["settings"] | {"interval": {"start": 110.0, "end": 125.0}}
+    summary = run.summary | {"settings": settings}
+    return dataclasses.replace(run, summary=summary, geometry={"catenary": values | {"period": 100.0}})
+
+
+def test_supports_of_a_line_that_closes_on_itself_are_marked_in_every_lap(on_ring):
+    (axes,) = plots.contact_force(on_ring).axes
+    shown = {c.get_label(): c for c in axes.collections}
+    assert [s[0, 0] for s in shown["support"].get_segments()] == [50.0, 100.0]
+    assert [s[0, 0] for s in shown["dropper"].get_segments()] == [55.0, 80.0]
+    packed = [mark["x"] for mark in line_marks(on_ring, "catenary", (120.0, 260.0))]
+    supports, droppers = (np.frombuffer(base64.b64decode(x["bdata"]), x["dtype"]) for x in packed)
+    assert sorted(set(supports)) == [150.0, 200.0, 250.0]
+    assert sorted(set(droppers)) == [155.0, 180.0, 255.0]
+
+
+def test_the_interval_of_a_later_lap_has_its_supports(on_ring):
+    settings = on_ring.summary["settings"] | {"interval": {"start": 140.0, "end": 160.0}}
+    run = dataclasses.replace(on_ring, summary=on_ring.summary | {"settings": settings})
+    (axes,) = plots.uplift_history(run).axes
+    assert [line.get_label() for line in axes.get_lines()] == ["50 m"]
+
+
+def test_charts_over_places_of_one_lap_say_so(made_up):
+    ends = made_up()
+    ring = dataclasses.replace(ends, geometry={"catenary": ends.geometry["catenary"] | {"period": 200.0}})
+    for run, named in ((ring, True), (ends, False)):
+        (bars,) = [c for c in run_charts(run, all_signals(run)) if c.key == "uplift"]
+        (droppers,) = [c for c in run_charts(run, all_signals(run)) if c.key == "droppers_catenary"]
+        for chart in (bars, droppers):
+            layout = chart.figure["layout"]
+            assert ("in its lap" in layout["xaxis"]["title"]["text"]) == named
+            assert any(s["type"] == "rect" for s in layout["shapes"]) != named  # the interval is not of one lap

@@ -35,17 +35,20 @@ def test_every_node_is_used_and_no_element_is_degenerate(line_and_mesh):
     assert np.linalg.norm(end - start, axis=1).min() > 0.05
 
 
-def test_wires_run_from_anchor_to_anchor_without_gap(line_and_mesh):
+def test_wires_run_from_end_to_end_without_gap(line_and_mesh):
     line, mesh = line_and_mesh
     pairs = {(int(i), int(j)) for i, j in mesh.beams}
     for chain in mesh.chains:
         assert all((int(i), int(j)) in pairs for i, j in itertools.pairwise(chain.nodes))
         if chain.component != "stitch_wire":
-            supports = line.sections[chain.section].supports
-            first, last = supports[0].x, supports[-1].x
+            section = line.sections[chain.section]
+            first, last = section.spans[0].start, section.spans[-1].end
             assert mesh.points[chain.nodes[0], 0] == pytest.approx(first)
             assert mesh.points[chain.nodes[-1], 0] == pytest.approx(last)
-            assert mesh.fixed[chain.nodes[[0, -1]], :3].all()
+            if section.periodic:
+                assert mesh.owner[chain.nodes[-1]] == chain.nodes[0]
+            else:
+                assert mesh.fixed[chain.nodes[[0, -1]], :3].all()
 
 
 def test_six_elements_between_neighbouring_droppers(line_and_mesh):

@@ -163,3 +163,15 @@ def test_a_kernel_that_does_not_exist_is_told_on_one_line(monkeypatch, capsys):
     monkeypatch.setenv("OPENPANTO_KERNEL", "cuda")
     assert main(["couple", "generic_simple", "CX", "--speed", "200"]) != 0
     assert "OPENPANTO_KERNEL is 'cuda'" in capsys.readouterr().err
+
+
+def test_a_run_may_go_on_where_a_line_closes_on_itself(tmp_path, capsys):
+    """LN2's last support is at 1136.9 m; on a ring of 990 m a run may end anywhere behind its start."""
+    run = ["CX", "--start", "950", "--end", "1150", "--interval", "1050", "1150", "--quiet", "--out", str(tmp_path)]
+    assert main(["couple", "LN2", *run]) != 0
+    assert "does not lie on the line" in capsys.readouterr().err
+    assert main(["couple", "LN2_ring", *run]) == 0
+    table = np.genfromtxt(tmp_path / "timeseries.csv", delimiter=",", names=True)
+    force = table["catenarypantograph1contactforce_N"]
+    assert table["catenarypantograph1contactx_m"][-1] == pytest.approx(1150.0, abs=0.1)
+    assert force[len(force) // 2 :].min() > 50.0  # never lost over the place where the line closes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -39,3 +40,16 @@ def test_a_multibody_pantograph_for_twenty_seconds(soak):
     settled = np.concatenate([w.force for w in windows[3:]])
     assert settled.min() > 0.0
     assert settled.mean() == pytest.approx(windows[-1].force.mean(), rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_lumped_pantograph_for_four_laps(soak):
+    """Round ten spans at 300 km/h, a lap in six seconds: the third lap is the second within a newton, and so on."""
+    pantograph = soak.at_speed(soak.load_pantograph("CX"), None)
+    windows = list(soak.run(soak.system_of(soak.line(0.0, 10), pantograph), 24.0, 6.0))
+    off = [float(soak.off(b.force, a.force)) for a, b in pairwise(windows)]
+    assert off[0] > 100.0  # it is raised in the first
+    assert off[1] < 1.0
+    assert off[2] < 0.01
+    assert windows[-1].memory - windows[1].memory < 1.0

@@ -117,7 +117,7 @@ def _cache_folder() -> Path:
 
 
 class _UnsuitedError(Exception):
-    """A line that the kernels are not made for: too short, or too wide a band."""
+    """A line that the kernels are not made for: it is too short."""
 
 
 class CompiledStepper(Stepper):
@@ -136,19 +136,15 @@ class CompiledStepper(Stepper):
         super().__init__(modes, newmark)
 
     def _set_up(self, coupling: sp.csr_matrix) -> None:
-        if not isinstance(self.factor, Banded) or coupling.shape[1] < self.kernels.ENDS:
-            raise _UnsuitedError("the line's attachments are not a band, or too few")
+        if coupling.shape[1] < self.kernels.ENDS:
+            raise _UnsuitedError("the line has too few intervals for them")
         modes, newmark = self.modes, self.newmark
-        band = _Twisted(self.factor)
+        self._band = _Twisted(self.factor) if isinstance(self.factor, Banded) and _Twisted.suits(self.factor) else None
         units = self.units = _Units(self, coupling)
         own = sp.triu(-2.0 * modes.K + 1j * newmark.a2 * modes.M)  # both on one pattern
         rows, columns, entries = _pattern(own)
-        self._first = (
-            *_pattern(modes.turn.T), rows, columns, np.stack([entries.real, entries.imag], axis=1),
-            band.top, band.bottom, band.middle, band.size,
-        )  # fmt: skip
+        self._first = *_pattern(modes.turn.T), rows, columns, np.stack([entries.real, entries.imag], axis=1)
         self._last = *_pattern(modes.turn), *units.layout, newmark.a1
-        self._band_work = np.zeros((2, int(band.size[0] + band.size[2])))
         self._table = np.zeros(0)
 
     def begin(self, motion: LineMotion, pressed: FloatArray, known: Sequence[Known] = ()) -> None:
@@ -162,9 +158,11 @@ class CompiledStepper(Stepper):
                 interval.height, interval.height_static, reaction.slots, interval.ends, reaction.yielding,
                 reaction.at_ends, element, xi, force, row, load, table, pressed,
             )  # fmt: skip
-        self.kernels.attachments(
-            *self._first, motion.attached, pressed, packed.pull, self._right, self._band_work, self.attached
-        )
+        self.kernels.load(*self._first, motion.attached, pressed, packed.pull, self._right)
+        if self._band is None:  # a line that closes on itself, or is very short
+            self.attached[...] = self.factor.solve(self._right)
+        else:
+            self.kernels.solve(*self._band.parts, self._right, self._band.work, self.attached)
 
     def press(self, span: slice, force: FloatArray) -> None:
         """Add a force on the modes of an interval, its attachments held."""
@@ -175,7 +173,7 @@ class CompiledStepper(Stepper):
         reaction, touch, load, _ = point
         columns = reaction.columns
         self.kernels.apply(
-            reaction.slots, touch.row, load, force, columns.rows.start, columns.values, self._table, self.attached
+            reaction.slots, touch.row, load, force, reaction.reached, columns.values, self._table, self.attached
         )
 
     def slots(self, span: slice) -> IntArray:
@@ -193,18 +191,19 @@ class CompiledStepper(Stepper):
         return before, change
 
     def meet(
-        self, wire: ContactWire, reaction: ReactionOf, strip: FloatArray, element: int, motion: LineMotion
+        self, wire: ContactWire, reaction: ReactionOf, strip: FloatArray, guess: int, motion: LineMotion
     ) -> Meeting | None:
         """Return where a strip crosses an interval or the one beside it; see `Stepper.meet`."""
+        strip = wire.in_lap(strip)
+        element = wire.start(guess, 0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
         interval = wire.interval(element)
         found = self._meet(wire, reaction(interval), strip, element, motion)
-        if found == self.kernels.BEYOND and interval.first + len(interval.height) < wire.elements:
+        if found == self.kernels.BEYOND:
             element = interval.first + len(interval.height)
-        elif found == self.kernels.BEFORE and interval.first > 0:
+        elif found == self.kernels.BEFORE:
             element = interval.first - 1
-        else:
-            return found if isinstance(found, Meeting) else None
-        found = self._meet(wire, reaction(wire.interval(element)), strip, element, motion)
+        if not isinstance(found, Meeting) and found != self.kernels.NOWHERE and 0 <= element < wire.elements:
+            found = self._meet(wire, reaction(wire.interval(element)), strip, element, motion)
         return found if isinstance(found, Meeting) else None
 
     def _meet(
@@ -359,15 +358,15 @@ class _Twisted:
 
     Attributes
     ----------
-    top, bottom, middle, size
-        See `models.catenary.kernels.solve`.
+    parts : tuple of ndarray
+        ``top``, ``bottom``, ``middle`` and ``size`` of `models.catenary.kernels.solve`.
+    work : ndarray
+        As there.
     """
 
     def __init__(self, factor: Banded) -> None:
         matrix, width = factor.matrix, factor.factor.shape[0] - 1
         n = matrix.shape[0]
-        if n < 2 * width + 2:
-            raise _UnsuitedError("the line is too short for them")
         p = (n - width + 1) // 2
         q = n - width - p
         between = slice(p, p + width)
@@ -377,9 +376,15 @@ class _Twisted:
         right = _lower(last[q:])[::-1, ::-1]
         rest = left @ left.T + right @ right.T - matrix[between, between].toarray()
         inverse = np.linalg.inv(rest)
-        self.middle = np.ascontiguousarray(0.5 * (inverse + inverse.T))
-        self.top, self.bottom = (_inverted(half[:count]) for half, count in ((first, p), (last, q)))
-        self.size = np.array([p, q, width, width + 1], dtype=np.uint64)
+        middle = np.ascontiguousarray(0.5 * (inverse + inverse.T))
+        size = np.array([p, q, width, width + 1], dtype=np.uint64)
+        self.parts = _inverted(first[:p]), _inverted(last[:q]), middle, size
+        self.work = np.zeros((2, p + width))
+
+    @staticmethod
+    def suits(factor: Banded) -> bool:
+        """Return whether a band is long enough to have a middle."""
+        return factor.matrix.shape[0] >= 2 * factor.factor.shape[0]
 
     @staticmethod
     def _half(part: sp.spmatrix, width: int) -> FloatArray:

@@ -53,11 +53,8 @@ def prepare(where, rates, more, more_coupling, table, pull):
 
 
 @_compiled
-def attachments(
-    back_rows, back_columns, back, own_rows, own_columns, own, top, bottom, middle, size,
-    attached, pressed, pull, right, work, solution,
-):  # fmt: skip
-    """Find the change of the attachments' displacements.
+def load(back_rows, back_columns, back, own_rows, own_columns, own, attached, pressed, pull, right):
+    """Find the forces on the attachments that their change in this step balances.
 
     Parameters
     ----------
@@ -66,13 +63,11 @@ def attachments(
     own_rows, own_columns, own : ndarray
         -2 K and a2 M of the attachments, an entry (k, 2) for both: upper triangles compressed by rows, each of
         which begins with its diagonal.
-    top, bottom, middle, size, work
-        See `solve`.
     attached : ndarray, shape (2, n_attached)
     pressed : ndarray, shape (n_attached,)
     pull : ndarray, shape (n_ends,)
-    right, solution : ndarray, shape (n_attached,)
-        Work space; the result.
+    right : ndarray, shape (n_attached,)
+        Result.
     """
     for i in range(right.size):
         right[i] = pressed[i]
@@ -86,7 +81,6 @@ def attachments(
             right[j] += own[k, _0] * x + own[k, _1] * v
         right[i] += total
     add_product(back_rows, back_columns, back, pull, right)
-    solve(top, bottom, middle, size, right, work, solution)
 
 
 @_compiled
@@ -424,14 +418,14 @@ def press(slots, force, row, table):
 
 
 @_compiled
-def apply(slots, row, load, force, first, columns, table, solution):
-    """Add what a force on a point changes in a step; ``columns`` are responses of the attachments from ``first``."""
+def apply(slots, row, load, force, rows, columns, table, solution):
+    """Add what a force on a point changes in a step; ``columns`` are responses of the attachments ``rows``."""
     press(slots, force, row, table)
-    for i in range(columns.shape[0]):
+    for i in range(rows.size):
         total = 0.0
         for j in range(load.size):
             total += columns[i, j] * load[j]
-        solution[first + i] += force * total
+        solution[rows[i]] += force * total
 
 
 @_compiled

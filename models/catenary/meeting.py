@@ -43,8 +43,7 @@ class FreeMotion:
         strip : ndarray, shape (2, 2, 3)
             Ends A and B; position and velocity.
         """
-        element = self._wire.start(guess, 0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
-        met = self._stepper.meet(self._wire, self._reaction, strip, element, self._motion)
+        met = self._stepper.meet(self._wire, self._reaction, strip, guess, self._motion)
         return met or self._walk(strip, guess)
 
     def _walk(self, strip: FloatArray, guess: int) -> Meeting | None:

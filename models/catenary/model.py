@@ -446,6 +446,7 @@ class CatenaryModel:
                 columns=columns,
                 at_ends=columns.at(interval.ends),
                 slots=stepper.slots(interval.modes),
+                reached=np.arange(len(self.modes.attached))[columns.rows].astype(np.uint64),
             )
             while len(kept) >= _KEPT_INTERVALS * len(self.wires):
                 del kept[next(iter(kept))]

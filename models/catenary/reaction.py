@@ -27,6 +27,8 @@ class Reaction:
         The same at the attachments themselves.
     slots : ndarray of unsigned int, shape (n_span,)
         Where a compiled stepper keeps its modes.
+    reached : ndarray of unsigned int, shape (n_rows,)
+        Attachments' displacements that ``columns`` reach, one by one.
     """
 
     interval: WireInterval
@@ -35,6 +37,7 @@ class Reaction:
     columns: Columns
     at_ends: FloatArray
     slots: IntArray
+    reached: IntArray
 
     def point(self, element: int, xi: float) -> Point:
         """Return a point of the interval.

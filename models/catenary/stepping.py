@@ -174,7 +174,7 @@ class Stepper:
         return local_motion(interval, motion), change
 
     def meet(
-        self, wire: ContactWire, reaction: ReactionOf, strip: FloatArray, element: int, motion: LineMotion
+        self, wire: ContactWire, reaction: ReactionOf, strip: FloatArray, guess: int, motion: LineMotion
     ) -> Meeting | None:
         """Return where a strip crosses a wire at the end of the step, if a stepper can tell that at once.
 
@@ -182,8 +182,8 @@ class Stepper:
         ----------
         strip : ndarray, shape (2, 2, 3)
             Ends A and B; position and velocity.
-        element : int
-            Of the wire, to begin with.
+        guess : int
+            Element of the wire, to begin with.
         motion : LineMotion
             At the beginning of the step.
         """

@@ -10,9 +10,11 @@ travel along the track at a known speed, so a position is a time stamp.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from models.part import FloatArray, Snapshot
 
@@ -22,6 +24,8 @@ _STAMP_TOLERANCE = 0.25
 _LEAST_TRAVEL = 1e-9
 #: Highest order of the polynomials.
 MAX_ORDER = 2
+#: What a strip's extrapolation knows of its ends.
+_MOTION = ("position", "velocity", "acceleration")
 
 
 def lead_of(position: float, expected: float, speed: float, step: float) -> float:
@@ -55,11 +59,16 @@ class ForceExtrapolation:
     ----------
     order : int
         0, 1 or 2; fewer as long as fewer values are known.
+    times, values : list of float
+        When the last values hold [s], and they [N], the latest first: plain floats, several times as fast as so
+        short arrays.
+    known : int
+        How many of them have been received.
     """
 
     order: int = MAX_ORDER
-    times: FloatArray = field(default_factory=lambda: np.full(MAX_ORDER + 1, np.nan))
-    values: FloatArray = field(default_factory=lambda: np.zeros(MAX_ORDER + 1))
+    times: list[float] = field(default_factory=lambda: [math.nan] * (MAX_ORDER + 1))
+    values: list[float] = field(default_factory=lambda: [0.0] * (MAX_ORDER + 1))
     known: int = 0
 
     def start(self, time: float, force: float) -> None:
@@ -72,9 +81,8 @@ class ForceExtrapolation:
         if self.known and time <= self.times[0] + 1e-12:
             self.values[0] = force
             return
-        self.times[1:] = self.times[:-1]
-        self.values[1:] = self.values[:-1]
-        self.times[0], self.values[0] = time, force
+        self.times = [time, *self.times[:-1]]
+        self.values = [force, *self.values[:-1]]
         self.known = min(self.known + 1, MAX_ORDER + 1)
 
     def receive_at(
@@ -92,12 +100,11 @@ class ForceExtrapolation:
     def snapshot(self) -> Snapshot:
         """Return the whole state."""
         known = np.array([self.known])
-        return {"force.times": self.times.copy(), "force.values": self.values.copy(), "force.known": known}
+        return {"force.times": np.array(self.times), "force.values": np.array(self.values), "force.known": known}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
-        self.times[...] = snapshot["force.times"]
-        self.values[...] = snapshot["force.values"]
+        self.times, self.values = (_as_list(snapshot[n], MAX_ORDER + 1) for n in ("force.times", "force.values"))
         self.known = int(snapshot["force.known"][0])
 
     def at(self, time: float) -> float:
@@ -111,7 +118,7 @@ class ForceExtrapolation:
 
     def _polynomial(self, time: float) -> float:
         """Newton's divided differences through the last values."""
-        t, f = self.times.tolist(), self.values.tolist()  # plain floats: the same bits, several times as fast
+        t, f = self.times, self.values
         order = min(self.order, self.known - 1)
         result: float = f[0]
         if order >= 1:
@@ -132,52 +139,64 @@ class StripExtrapolation:
     order : int
         0 holds the positions, 1 moves them on by the velocity, 2 also by the change of velocity.
     time : float
-        When ``strip`` holds [s].
-    strip : ndarray, shape (2, 2, 3)
-        End A, B; position, velocity; x, y, z.
-    acceleration : ndarray, shape (2, 3)
+        When they hold [s].
+    position, velocity, acceleration : list of float
+        x, y, z of end A, then of end B: plain floats, faster than so short arrays.
     """
 
     order: int = MAX_ORDER
     time: float = 0.0
-    strip: FloatArray = field(default_factory=lambda: np.zeros((2, 2, 3)))
-    acceleration: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+    position: list[float] = field(default_factory=lambda: [0.0] * 6)
+    velocity: list[float] = field(default_factory=lambda: [0.0] * 6)
+    acceleration: list[float] = field(default_factory=lambda: [0.0] * 6)
 
     def start(self, time: float, strip: FloatArray) -> None:
-        """Forget everything but one state."""
+        """Forget everything but one state, shape (2, 2, 3): end A, B; position, velocity; x, y, z."""
         self.time = time
-        self.strip[...] = strip
-        self.acceleration[...] = 0.0
+        self._take(strip)
+        self.acceleration = [0.0] * 6
 
     def receive(self, time: float, strip: FloatArray, step: float) -> None:
-        """Take a strip state for a step that begins at ``time``, finding out when it holds."""
-        speed = float(strip[0, 1, 0])
-        expected = float(self.strip[0, 0, 0]) + speed * (time - self.time)
-        holds = time + lead_of(float(strip[0, 0, 0]), expected, speed, step)
+        """Take a strip state, shape (2, 2, 3), for a step that begins at ``time``, finding out when it holds."""
+        known, before, velocity = self.position[0], self.velocity, self._take(strip)
+        speed = velocity[0]
+        holds = time + lead_of(self.position[0], known + speed * (time - self.time), speed, step)
         if holds > self.time + 1e-12:
-            np.subtract(strip[:, 1], self.strip[:, 1], out=self.acceleration)
-            self.acceleration /= holds - self.time
+            elapsed = holds - self.time
+            self.acceleration = [(new - old) / elapsed for new, old in zip(velocity, before, strict=True)]
         self.time = holds
-        self.strip[...] = strip
 
     def at(self, time: float, out: FloatArray) -> FloatArray:
         """Write positions and velocities at ``time`` into ``out``, shape (2, 2, 3)."""
         tau = time - self.time
-        out[...] = self.strip
+        position, velocity = self.position, self.velocity
         if self.order >= 1 and tau != 0.0:
-            out[:, 0] += tau * self.strip[:, 1]
+            position = [p + tau * v for p, v in zip(position, velocity, strict=True)]
         if self.order >= 2 and tau != 0.0:
-            out[:, 0] += 0.5 * tau**2 * self.acceleration
-            out[:, 1] += tau * self.acceleration
+            half = 0.5 * tau**2
+            position = [p + half * a for p, a in zip(position, self.acceleration, strict=True)]
+            velocity = [v + tau * a for v, a in zip(velocity, self.acceleration, strict=True)]
+        out[...] = (position[:3], velocity[:3]), (position[3:], velocity[3:])
         return out
 
     def snapshot(self) -> Snapshot:
         """Return the whole state."""
-        time = np.array([self.time])
-        return {"strip.time": time, "strip.strip": self.strip.copy(), "strip.acceleration": self.acceleration.copy()}
+        motion = {f"strip.{name}": np.array(getattr(self, name)) for name in _MOTION}
+        return {"strip.time": np.array([self.time]), **motion}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
         self.time = float(snapshot["strip.time"][0])
-        self.strip[...] = snapshot["strip.strip"]
-        self.acceleration[...] = snapshot["strip.acceleration"]
+        self.position, self.velocity, self.acceleration = (_as_list(snapshot[f"strip.{name}"], 6) for name in _MOTION)
+
+    def _take(self, strip: FloatArray) -> list[float]:
+        """Take positions and velocities; returns the velocities."""
+        (a, velocity_a), (b, velocity_b) = strip.tolist()
+        self.position, self.velocity = a + b, velocity_a + velocity_b
+        return self.velocity
+
+
+def _as_list(values: npt.ArrayLike, count: int) -> list[float]:
+    """Return numbers as a list; raises ``ValueError`` if they are not so many."""
+    numbers: list[float] = np.asarray(values, dtype=np.float64).reshape(count).tolist()
+    return numbers

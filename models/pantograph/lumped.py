@@ -40,7 +40,8 @@ class LumpedModel:
     def __init__(self, definition: LumpedDefinition) -> None:
         self.definition = definition
         n = len(definition.stage)
-        self.M = np.diag([s.mass for s in definition.stage])
+        self._masses = [s.mass for s in definition.stage]
+        self.M = np.diag(self._masses)
         self.C = _chain([s.damping for s in definition.stage])
         self.K = _chain([s.stiffness for s in definition.stage])
         self.size = n
@@ -53,11 +54,13 @@ class LumpedModel:
 
     def free_response(self, state: LumpedState, step: float, load: FloatArray) -> FloatArray:
         """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value."""
-        newmark, inverse = self._effective(step)
-        d, v, a = state.displacement, state.velocity, state.acceleration
-        inertia = newmark.a0 * d + newmark.a2 * v + newmark.a3 * a
-        damping = newmark.a1 * d + newmark.a4 * v + newmark.a5 * a
-        result: FloatArray = inverse @ (load + self.M @ inertia + self.C @ damping)
+        n, inverse = self._effective(step)
+        # Plain floats where it goes mass by mass: the same bits, and for so few masses faster than arrays.
+        displacement, velocity, acceleration = state.displacement, state.velocity, state.acceleration
+        motion = list(zip(displacement.tolist(), velocity.tolist(), acceleration.tolist(), strict=True))
+        inertia = [m * (n.a0 * d + n.a2 * v + n.a3 * a) for m, (d, v, a) in zip(self._masses, motion, strict=True)]
+        damping = [n.a1 * d + n.a4 * v + n.a5 * a for d, v, a in motion]
+        result: FloatArray = inverse.dot(load + inertia + self.C.dot(damping))
         return result
 
     def compliance(self, step: float) -> FloatArray:
@@ -67,19 +70,13 @@ class LumpedModel:
 
     def velocity_of(self, state: LumpedState, step: float, displacement: FloatArray) -> FloatArray:
         """Return the velocity that belongs to a new displacement, shape (n,)."""
-        n = self._effective(step)[0]
-        change = displacement - state.displacement
-        result: FloatArray = n.a1 * change - n.a4 * state.velocity - n.a5 * state.acceleration
-        return result
+        return np.array(self._rates(state, step, displacement)[0])
 
     def advance(self, state: LumpedState, step: float, displacement: FloatArray) -> None:
         """Replace the state by the one that belongs to a new displacement."""
-        n = self._effective(step)[0]
-        velocity = self.velocity_of(state, step, displacement)
-        change = displacement - state.displacement
-        state.acceleration = n.a0 * change - n.a2 * state.velocity - n.a3 * state.acceleration
-        state.velocity = velocity
+        velocity, acceleration = self._rates(state, step, displacement)
         state.displacement = displacement
+        state.velocity, state.acceleration = np.array(velocity), np.array(acceleration)
 
     def load(self, time: float, base: FloatArray) -> FloatArray:
         """Return uplift and roof motion as loads, shape (n,) [N].
@@ -90,10 +87,19 @@ class LumpedModel:
             Height [m] and velocity [m/s] of the roof, 0 at rest.
         """
         result = np.zeros(self.size)
-        lowest = self.definition.stage[0]
-        result[0] = self.definition.static_force * self.definition.raised(time)
-        result[0] += lowest.stiffness * base[0] + lowest.damping * base[1]
+        lowest, (height, velocity) = self.definition.stage[0], base.tolist()
+        uplift = self.definition.static_force * self.definition.raised(time)
+        result[0] = uplift + (lowest.stiffness * height + lowest.damping * velocity)
         return result
+
+    def _rates(self, state: LumpedState, step: float, displacement: FloatArray) -> tuple[list[float], list[float]]:
+        """Return velocity and acceleration of every mass that belong to a new displacement."""
+        n = self._effective(step)[0]
+        change = displacement - state.displacement
+        motion = list(zip(change.tolist(), state.velocity.tolist(), state.acceleration.tolist(), strict=True))
+        velocity = [n.a1 * c - n.a4 * v - n.a5 * a for c, v, a in motion]
+        acceleration = [n.a0 * c - n.a2 * v - n.a3 * a for c, v, a in motion]
+        return velocity, acceleration
 
     def _effective(self, step: float) -> tuple[Newmark, FloatArray]:
         if step not in self._inverse:
@@ -124,7 +130,10 @@ class LumpedPantographPart:
         self.state = self.model.initial_state()
         self.time = 0.0
         self._start_time = 0.0
-        self.strip = np.zeros((2, 2, 3))
+        # A step changes x, z and z's velocity alone.
+        half, y = 0.5 * definition.strip_length, definition.strip_offset
+        velocity = [definition.speed, 0.0, 0.0]
+        self.strip = np.array([[[0.0, y + side, 0.0], velocity] for side in (half, -half)])
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._base = np.zeros(2)
         self._balance: LumpedBalance | None = None
@@ -154,13 +163,13 @@ class LumpedPantographPart:
 
     def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
-        self._force.receive_at(self.time, force, float(point[0]), self._x(self.time), self.definition.speed, step)
+        self._force.receive_at(self.time, force, point.item(0), self._x(self.time), self.definition.speed, step)
         count = steps_within(step, self.definition.time_step)
         start, h = self.time, step / count
-        self._base[...] = base
+        height, velocity = base.tolist()
         for k in range(1, count + 1):
             # Received for the step's beginning; the roof goes on with its velocity.
-            self._base[0] = base[0] + k * h * base[1]
+            self._base[...] = height + k * h * velocity, velocity
             self._substep(start + k * h, h)
         self.time = start + step
         self._place_strip()
@@ -221,11 +230,10 @@ class LumpedPantographPart:
 
     def _place_strip(self) -> None:
         d = self.definition
-        half = 0.5 * d.strip_length
         height, velocity = d.reference_height + self.state.displacement.item(-1), self.state.velocity.item(-1)
-        x, y = self._x(self.time), d.strip_offset
-        ends = [[[x, y + side, height], [d.speed, 0.0, velocity]] for side in (half, -half)]
-        self.strip[...] = ends
+        self.strip[:, 0, 0] = self._x(self.time)
+        self.strip[:, 0, 2] = height
+        self.strip[:, 1, 2] = velocity
 
 
 def _chain(values: list[float]) -> FloatArray:

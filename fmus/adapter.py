@@ -50,6 +50,7 @@ PartT = TypeVar("PartT", bound=Part)
 #: Beyond every value reference: no value is out of date.
 _NOTHING = sys.maxsize
 
+
 def hold(names: dict[str, Any]) -> None:
     """Add a reference to the namespace of a script that pythonfmu loads.
 
@@ -196,7 +197,7 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         try:
             if max(vrs) >= self._stale_from:
                 self._bring_up_to_date()
-            return self._values.take(vrs).tolist()
+            return self._values[self._places_of(vrs)].tolist()
         except BaseException as error:
             self._refuse(error)
             return [math.nan] * len(vrs)
@@ -206,10 +207,8 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         if not vrs:
             return
         try:
-            if vrs == self._input_references:  # what most hosts do at every step
-                self._inputs[:] = values
-            elif min(vrs) >= self._first_input and max(vrs) < self._first_output:
-                self._values[vrs] = values
+            if min(vrs) >= self._first_input and max(vrs) < self._first_output:
+                self._values[self._places_of(vrs)] = values
             else:
                 self._set_one_by_one(vrs, values)
         except BaseException as error:
@@ -299,7 +298,7 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         self._first_input, self._first_output, self._first_local = (
             kind.start for kind in (table.inputs, table.outputs, table.local)
         )
-        self._input_references = list(range(self._first_input, self._first_output))
+        self._references = list(range(len(table)))
         # Views: whoever writes to the values must write into the array, not replace it.
         self._inputs, self._outputs = self._values[table.inputs], self._values[table.outputs]
         self._output_places = self._places(table.outputs, table.ports.outputs)
@@ -337,12 +336,16 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
 
     def _initialise_part(self) -> None:
         self._make_part_for(self._values[self._table.parameters])
-        self._initialise(self._part, self._time, self._checked_inputs(self._time))
-        self._is_built = True
+        self._build_part(self._time, self._checked_inputs(self._time))
         for places in (self._output_places, self._local_places, self._calculated_places):
-            self._check_sizes(places)
             self._read(places)
         self._check_outputs()
+
+    def _build_part(self, time: float, inputs: FloatArray) -> None:
+        self._initialise(self._part, time, inputs)
+        self._is_built = True
+        for places in (self._output_places, self._local_places, self._calculated_places):
+            self._fit(places)
 
     def _make_part_for(self, parameters: FloatArray) -> None:
         if parameters.tobytes() == self._part_parameters:
@@ -378,19 +381,21 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
     def _places(self, kind: slice, ports: Sequence[Port]) -> list[tuple[FloatArray, Port]]:
         return [(self._values[place], port) for place, port in self._table.places(kind, ports)]
 
-    def _check_sizes(self, places: Sequence[tuple[FloatArray, Port]]) -> None:
-        for _, port in places:
-            count = np.size(port.read(self._part))
-            if count != len(port.signals):
-                first = port.signals[0].name
+    def _fit(self, places: list[tuple[FloatArray, Port]]) -> None:
+        """Give the places the shapes of the part's arrays, that these can be copied as they are."""
+        for i, (place, port) in enumerate(places):
+            shape = np.shape(port.read(self._part))
+            if math.prod(shape) != len(port.signals):
+                count, first = math.prod(shape), port.signals[0].name
                 raise AdapterError(
                     f"{first} and its like are {count} values, the FMU has {len(port.signals)}: "
                     "a change of how many there are needs another FMU, built from an edited definition"
                 )
+            places[i] = place.reshape(shape), port
 
     def _read(self, places: Sequence[tuple[FloatArray, Port]]) -> None:
         for place, port in places:
-            place[:] = port.read(self._part).reshape(-1)
+            place[...] = port.read(self._part)
 
     def _check_step(self, time: float, step: float) -> None:
         is_ready = self._phase is _Phase.STEPPING and not (self._refused or self._broken)
@@ -408,6 +413,11 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
             f"a step from t = {time:.9g} s, but the model is at t = {self._time:.9g} s: "
             "go on from there, or restore a state saved at the wanted time"
         )
+
+    def _places_of(self, references: list[int]) -> slice | list[int]:
+        """Return where variables lie: as a slice, which costs least, if they follow one another, as they mostly do."""
+        run = slice(references[0], references[-1] + 1)
+        return run if self._references[run] == references else references
 
     def _set_one_by_one(self, references: Sequence[int], values: Sequence[float]) -> None:
         for reference, value in zip(references, values, strict=True):
@@ -501,8 +511,7 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         self._make_part_for(values[self._table.parameters])
         if not self._is_built:
             # Whatever the state's inputs are, the start values are fit to build with.
-            self._initialise(self._part, time, self._table.start_values()[self._table.inputs])
-            self._is_built = True
+            self._build_part(time, self._table.start_values()[self._table.inputs])
         arrays = state.arrays.items()
         self._part.restore({name.removeprefix("part."): a for name, a in arrays if name.startswith("part.")})
 

@@ -73,8 +73,9 @@ class Group:
         references = [instance.component.fmu.variables[name].reference for name in names]
         self._references = (c_uint * n)(*references)
         self._buffer = (c_double * n).from_buffer(self.values.data) if n else (c_double * 0)()
-        self._arguments = (instance.handle, self._references, n, self._buffer)
-        self._get, self._set = instance.function("fmi2GetReal"), instance.function("fmi2SetReal")
+        # Of the C types already: to convert and check the same arguments at every call would cost half of it again.
+        self._arguments = (c_void_p(instance.handle), self._references, c_size_t(n), self._buffer)
+        self._get, self._set = instance.bare_function("fmi2GetReal"), instance.bare_function("fmi2SetReal")
         self._instance = instance
 
     def read(self) -> None:
@@ -126,6 +127,11 @@ class Instance:
     def function(self, name: str) -> Callable[..., int]:
         """Return an FMI function of the library; FMPy has declared its argument types."""
         return getattr(self._fmu.dll, name)
+
+    def bare_function(self, name: str) -> Callable[..., int]:
+        """Return an FMI function of the library that takes arguments of the C types themselves, and nothing else."""
+        function: Callable[..., int] = self._fmu.dll[name]
+        return function
 
     def group(self, names: Sequence[str]) -> Group:
         """Return a group for further variables, e.g. for recording."""

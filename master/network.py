@@ -94,7 +94,7 @@ class Network:
 
     def gather(self, outputs: FloatArray | None = None) -> None:
         """Set all inputs from ``outputs`` (default: the current ones)."""
-        np.take(self.outputs if outputs is None else outputs, self._from, out=self.inputs, mode="clip")
+        (self.outputs if outputs is None else outputs).take(self._from, out=self.inputs, mode="clip")
         if not self.is_plain:
             self.inputs *= self._factor
             self.inputs += self._offset

@@ -195,9 +195,10 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         if not vrs:
             return []
         try:
-            if max(vrs) >= self._stale_from:
+            places, _, highest = self._find(vrs)
+            if highest >= self._stale_from:
                 self._bring_up_to_date()
-            return self._values[self._places_of(vrs)].tolist()
+            return self._values[places].tolist()
         except BaseException as error:
             self._refuse(error)
             return [math.nan] * len(vrs)
@@ -207,8 +208,9 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         if not vrs:
             return
         try:
-            if min(vrs) >= self._first_input and max(vrs) < self._first_output:
-                self._values[self._places_of(vrs)] = values
+            places, lowest, highest = self._find(vrs)
+            if self._first_input <= lowest and highest < self._first_output:
+                self._values[places] = values
             else:
                 self._set_one_by_one(vrs, values)
         except BaseException as error:
@@ -414,10 +416,16 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
             "go on from there, or restore a state saved at the wanted time"
         )
 
-    def _places_of(self, references: list[int]) -> slice | list[int]:
-        """Return where variables lie: as a slice, which costs least, if they follow one another, as they mostly do."""
-        run = slice(references[0], references[-1] + 1)
-        return run if self._references[run] == references else references
+    def _find(self, references: list[int]) -> tuple[slice | list[int], int, int]:
+        """Return where variables lie, the lowest and the highest reference.
+
+        A slice, which costs least, if they follow one another, as what hosts ask for again and again mostly does.
+        """
+        first, last = references[0], references[-1]
+        run = slice(first, last + 1)
+        if self._references[run] == references:
+            return run, first, last
+        return references, min(references), max(references)
 
     def _set_one_by_one(self, references: Sequence[int], values: Sequence[float]) -> None:
         for reference, value in zip(references, values, strict=True):

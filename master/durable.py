@@ -79,15 +79,14 @@ class LineFile:
             raise cannot_write(path, error) from error
         self.is_open = True
 
-    def write(self, lines: str) -> None:
+    def write(self, lines: bytes) -> None:
         """Write lines, each with its end."""
-        data = lines.encode()
         done = 0
         try:
-            while done < len(data):
-                done += os.write(self._file, data[done:])
+            while done < len(lines):
+                done += os.write(self._file, lines[done:])
         except OSError as error:
-            self._cut(data[:done])
+            self._cut(lines[:done])
             raise cannot_write(self.path, error) from error
         self._size += done
 

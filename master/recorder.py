@@ -119,17 +119,17 @@ class Recorder:
         self.units = tuple(units.get(n, "") for n in self.names)
         self._sources = tuple(sources)
         self._every = every
-        self._format = ",".join([NUMBER_FORMAT] * (len(self.names) + 1)) + "\n"
+        self._format = (",".join([NUMBER_FORMAT] * (len(self.names) + 1)) + "\n").encode()
         self._is_steady = is_steady
         self._waiting: list[list[float]] = []
-        self._lines: list[str] = []
+        self._lines: list[bytes] = []
         self._count = 0  # rows not written yet, as numbers or as lines
         self._oldest = self._latest = -math.inf
         self._goes_on = keep > 0
         titles = _title_line(self.names, self.units)
         self._file = LineFile(path, _end_of_rows(path, titles, keep) if keep else 0)
         if not keep:
-            self._file.write(titles)
+            self._file.write(titles.encode())
 
     def begin(self, time: float, network: Network) -> None:
         """Record the start, unless it is the last row of a file that is gone on with."""
@@ -180,7 +180,7 @@ class Recorder:
 
     def _write(self) -> None:
         self._format_rows()
-        lines, self._count = "".join(self._lines), 0
+        lines, self._count = b"".join(self._lines), 0
         self._lines.clear()  # before writing: what cannot be written now is not tried again
         if lines:
             self._file.write(lines)

@@ -152,10 +152,13 @@ def application_point(force: FloatArray, point: FloatArray, strip: FloatArray) -
     forces, points = force.tolist(), point.tolist()  # plain floats: for so few wires several times as fast
     total = sum(forces)
     if total > 0.0:
-        touched = [(f, p) for f, p in zip(forces, points, strict=True) if f > 0.0]
-        return np.array([sum(f * p[axis] for f, p in touched) / total for axis in range(3)])
-    for p in points:
-        if not math.isnan(p[0]):
-            return np.array(p)
+        moment_x = moment_y = moment_z = 0.0
+        for f, (x, y, z) in zip(forces, points, strict=True):
+            if f > 0.0:
+                moment_x, moment_y, moment_z = moment_x + f * x, moment_y + f * y, moment_z + f * z
+        return np.array((moment_x / total, moment_y / total, moment_z / total))
+    for crossed in points:
+        if not math.isnan(crossed[0]):
+            return np.array(crossed)
     middle: FloatArray = strip[:, 0].mean(axis=0)
     return middle

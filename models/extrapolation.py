@@ -141,7 +141,7 @@ class StripExtrapolation:
     time : float
         When they hold [s].
     position, velocity, acceleration : list of float
-        x, y, z of end A, then of end B: plain floats, faster than so short arrays.
+        x, y, z of end A, then of end B: plain floats, faster than so short arrays. The acceleration is 0 below order 2.
     """
 
     order: int = MAX_ORDER
@@ -161,7 +161,7 @@ class StripExtrapolation:
         known, before, velocity = self.position[0], self.velocity, self._take(strip)
         speed = velocity[0]
         holds = time + lead_of(self.position[0], known + speed * (time - self.time), speed, step)
-        if holds > self.time + 1e-12:
+        if self.order >= 2 and holds > self.time + 1e-12:
             elapsed = holds - self.time
             self.acceleration = [(new - old) / elapsed for new, old in zip(velocity, before, strict=True)]
         self.time = holds
@@ -171,11 +171,9 @@ class StripExtrapolation:
         tau = time - self.time
         position, velocity = self.position, self.velocity
         if self.order >= 1 and tau != 0.0:
-            position = [p + tau * v for p, v in zip(position, velocity, strict=True)]
-        if self.order >= 2 and tau != 0.0:
-            half = 0.5 * tau**2
-            position = [p + half * a for p, a in zip(position, self.acceleration, strict=True)]
-            velocity = [v + tau * a for v, a in zip(velocity, self.acceleration, strict=True)]
+            half, acceleration = 0.5 * tau**2, self.acceleration
+            position = [p + tau * v + half * a for p, v, a in zip(position, velocity, acceleration, strict=True)]
+            velocity = [v + tau * a for v, a in zip(velocity, acceleration, strict=True)]
         out[...] = (position[:3], velocity[:3]), (position[3:], velocity[3:])
         return out
 

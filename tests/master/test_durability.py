@@ -245,7 +245,7 @@ def test_no_room_for_the_summary_leaves_the_rows(toy, tmp_path, monkeypatch, cap
 class TestLineFile:
     def test_lines_that_still_fit_are_kept_and_no_piece_of_one(self, tmp_path, monkeypatch):
         file = LineFile(tmp_path / "a")
-        file.write("first\n")
+        file.write(b"first\n")
         room, write = [14], os.write
 
         def little(descriptor, data):
@@ -257,10 +257,10 @@ class TestLineFile:
 
         monkeypatch.setattr(durable.os, "write", little)
         with pytest.raises(MasterError, match="No space left on device"):
-            file.write("second\nthird\nfourth\n")
+            file.write(b"second\nthird\nfourth\n")
         monkeypatch.undo()
         assert (tmp_path / "a").read_text() == "first\nsecond\nthird\n"
-        file.write("fifth\n")
+        file.write(b"fifth\n")
         file.close()
         file.close()
         assert (tmp_path / "a").read_text() == "first\nsecond\nthird\nfifth\n"
@@ -268,7 +268,7 @@ class TestLineFile:
     def test_what_is_kept_is_gone_on_with(self, tmp_path):
         (tmp_path / "a").write_text("first\nsecond\nthi")
         file = LineFile(tmp_path / "a", keep=6)
-        file.write("2\n")
+        file.write(b"2\n")
         file.close()
         assert (tmp_path / "a").read_text() == "first\n2\n"
 

@@ -47,8 +47,8 @@ def parts(model: CatenaryModel) -> Parts:
     """Return part of a step -> class and methods that it is done in; what they call in another part counts there."""
     stepper = type(model._step(STEP).stepper)
     return {
-        f"free changes: products, band solution ({stepper.__name__})": (stepper, ("begin",)),
-        f"new motion: product ({stepper.__name__})": (stepper, ("finish",)),
+        f"products ({stepper.__name__})": (stepper, ("begin", "finish")),
+        f"band solution ({stepper.__name__})": (stepper, ("solve",)),
         "finding the contact": (CatenaryModel, ("_open_contacts",)),
         "contact force and slack droppers": (local_response.LocalProblem, ("solve",)),
         "pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of")),

@@ -159,8 +159,12 @@ class CompiledStepper(Stepper):
                 reaction.at_ends, element, xi, force, row, load, table, pressed,
             )  # fmt: skip
         self.kernels.load(*self._first, motion.attached, pressed, packed.pull, self._right)
+        self.solve()
+
+    def solve(self) -> None:
+        """Find the change of the attachments' displacements from the forces on them."""
         if self._band is None:  # a line that closes on itself, or is very short
-            self.attached[...] = self.factor.solve(self._right)
+            super().solve()
         else:
             self.kernels.solve(*self._band.parts, self._right, self._band.work, self.attached)
 

@@ -137,9 +137,13 @@ class Stepper:
         self._ends[...] = 0.0
         self._back[0].add(work, self._ends)
         self._back[1].add(self._ends, right)
-        self.attached[...] = self.factor.solve(right)
+        self.solve()
         for point, load in zip(points, known, strict=True):
             self.press(point.reaction.interval.modes, load.force * point.touch.modal)
+
+    def solve(self) -> None:
+        """Find the change of the attachments' displacements from the forces on them."""
+        self.attached[...] = self.factor.solve(self._right)
 
     def press(self, span: slice, force: FloatArray) -> None:
         """Add a force on the modes of an interval, its attachments held."""

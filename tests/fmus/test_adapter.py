@@ -306,6 +306,27 @@ def test_a_parameter_that_changes_the_ports_is_refused(instantiate):
     assert "mass[1].z and its like are 3 values, the FMU has 2" in failed_step(instance)
 
 
+@pytest.mark.parametrize("places", [slice(None), slice(None, None, -1), slice(None, None, 2), [1, 1, 0, 3]])
+def test_values_come_in_the_order_they_are_asked_for(instantiate, places):
+    instance = instantiate()
+    instance.initialise(**VALUES)
+    instance.run(5)
+    everything = sorted(instance.references.values())
+    asked = [everything[i] for i in places] if isinstance(places, list) else everything[places]
+    np.testing.assert_array_equal(instance.slave.getReal(asked), [instance.slave.getReal([r])[0] for r in asked])
+
+
+@pytest.mark.parametrize("count", [1, 2, 50])
+def test_references_that_run_beyond_the_last_one_are_refused(instantiate, count):
+    instance = instantiate()
+    instance.initialise()
+    last = max(instance.references.values())
+    values = instance.slave.getReal(list(range(last, last + 1 + count)))
+    assert len(values) == count + 1
+    assert all(map(math.isnan, values))
+    failed_step(instance)
+
+
 def test_wrong_references_are_refused(instantiate):
     instance = instantiate()
     instance.initialise()

@@ -149,7 +149,7 @@ def application_point(force: FloatArray, point: FloatArray, strip: FloatArray) -
     >>> application_point(np.array([100.0, 50.0]), point, np.zeros((2, 2, 3))).round(6).tolist()
     [10.0, 0.1, 5.1]
     """
-    forces, points = force.tolist(), point.tolist()  # plain floats: for so few wires several times as fast
+    forces, points = force.tolist(), point.tolist()  # plain floats: for so few wires faster than arrays
     total = sum(forces)
     if total > 0.0:
         moment_x = moment_y = moment_z = 0.0

@@ -60,8 +60,7 @@ class ForceExtrapolation:
     order : int
         0, 1 or 2; fewer as long as fewer values are known.
     times, values : list of float
-        When the last values hold [s], and they [N], the latest first: plain floats, several times as fast as so
-        short arrays.
+        When the last values hold [s], and they [N], the latest first: plain floats, faster than so short arrays.
     known : int
         How many of them have been received.
     """

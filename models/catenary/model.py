@@ -293,13 +293,14 @@ class CatenaryModel:
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
         """Return the force that every dropper carries [N], shape (n_droppers,): 0 where slack."""
-        force = self.static.elastic_force + self.dropper_stiffness * (self.B @ state.motion.attached[0])
+        force = self.static.elastic_force.copy()
+        self._tighten.add(state.motion.attached[0], force)
         force[state.slack] += state.compensation
         return force
 
     def uplift(self, state: CatenaryState) -> FloatArray:
         """Return the rise of the contact wire at the supports [m], shape (n_supports,)."""
-        return state.motion.attached[0, self.uplift_places]
+        return state.motion.attached[0].take(self.uplift_places)
 
     def energy(self, state: CatenaryState) -> float:
         """Return kinetic plus elastic energy from the static shape, droppers bilateral [J]."""

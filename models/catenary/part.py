@@ -222,9 +222,9 @@ class CatenaryPart:
 
     def _publish(self, strips: FloatArray, result: ContactResult) -> None:
         self.section_force[...] = result.force
-        np.sum(result.force, axis=1, out=self.contact_force)
-        for p, strip in enumerate(strips):
-            self.contact_point[p] = application_point(result.force[p], result.point[p], strip)
+        result.force.sum(axis=1, out=self.contact_force)
+        for place, *contact in zip(self.contact_point, result.force, result.point, strips, strict=True):
+            place[...] = application_point(*contact)
         self.support_uplift[...] = self.model.uplift(self.state)
 
 

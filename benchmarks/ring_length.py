@@ -56,7 +56,7 @@ def main() -> None:
     pantograph = load_lumped(options.pantograph).with_values({"start_position": START})
     spans = SETTLING + SHOWN + REACH
     reference = passage(long_line(2 * spans), pantograph, spans)
-    runs = {f"{n} spans": passage(ring(n), pantograph, max(spans, 3 * n)) for n in options.spans}
+    runs = {f"{n} spans": passage(ring(n), pantograph, max(spans, 2 * n)) for n in options.spans}
     rows = [run.row(name, reference) for name, run in {"open": reference, **runs}.items()]
     title = f"{options.pantograph} at {3.6 * pantograph.speed:.0f} km/h, contact force below 20 Hz"
     columns = ("line", "mean N", "deviation N", "least N", "most N", "off the open line N", "the same, not filtered N")

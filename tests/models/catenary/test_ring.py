@@ -237,6 +237,25 @@ def test_a_contact_at_the_seam_does_not_fade(ring):
     assert at == pytest.approx([at[3]] * 4, rel=1e-3)
 
 
+@pytest.mark.parametrize(("middle", "skew"), [(-0.05, 0.35), (0.05, -0.35), (0.05, 0.35), (-0.05, -0.35)])
+def test_a_skew_strip_finds_the_wire_on_the_other_side_of_the_seam(ring, middle, skew):
+    """Its middle is on one side, its crossing with the wire, 0.2 m beside it, 0.1 m further on or back."""
+    found = []
+    for support in (0.0, 200.0, 500.0, 1500.0):
+        strips = _still(support + middle, 5.10)
+        strips[0, :, 0, 0] += [skew, -skew]
+        state = ring.initial_state()
+        result = ring.contact_at_rest(state, strips)
+        assert result.point[0, 0, 0] == pytest.approx(support + middle + 0.2 / 0.7 * skew, abs=1e-3)
+        element = int(state.element[0, 0])
+        moving = ring.step(state, STEP, StripMotion(strips, np.zeros(1)))
+        assert int(state.element[0, 0]) == element
+        found.append([*result.force[0, 0:1], *moving.force[0, 0:1], *(moving.point[0, 0] - [support, 0.0, 0.0])])
+    assert found[1][0] > 100.0
+    for there in found:
+        assert there == pytest.approx(found[1], abs=1e-9)
+
+
 def test_a_snapshot_beyond_the_seam_comes_back(ring_maker):
     part = CatenaryPart(ring_maker(4))
     place = {"x": 199.0 + 5 * 200.0}

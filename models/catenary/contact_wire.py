@@ -7,6 +7,7 @@ Local coordinates of an interval are these, one after the other.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -244,7 +245,7 @@ class ContactWire:
         """Return where to begin walking; a guess that is far off (first step, reset) is replaced by a search."""
         if 0 <= guess < len(self._of_element) and abs(self._starts[guess] - x) < 5.0:
             return guess
-        found = int(np.searchsorted(self._starts, x)) - 1
+        found = bisect_left(self._starts, x) - 1
         return min(max(found, 0), len(self._of_element) - 1)
 
     def in_lap(self, strip: FloatArray) -> FloatArray:

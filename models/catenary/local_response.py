@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dgesv
 
 from models.catenary.compliance import Columns
 from models.catenary.reaction import Meeting, Point
@@ -141,7 +142,8 @@ class LocalProblem:
         coupling = _Coupling(self, contacts, strip_compliance)
         forces = np.array([_estimate(self, c) for c in contacts])
         compensation = np.zeros(slack.size)
-        previous: tuple[bytes, bytes] | None = None
+        # Without contacts one iteration is exact for its set, and the set to begin with may well be the one.
+        previous = None if contacts else (slack.tobytes(), b"")
         for _ in range(_MAX_ITERATIONS):
             laws = coupling.laws(forces, slack, compensation)
             new_forces, compensation = coupling.newton_step(free_force, laws, forces, slack, compensation)
@@ -152,12 +154,14 @@ class LocalProblem:
             now_slack = np.flatnonzero(elastic < 0.0)
             signature = (now_slack.tobytes(), (penetration > 0.0).tobytes())
             settled = change <= _TOLERANCE * (1.0 + forces.max(initial=0.0))
-            if settled and signature == previous and np.array_equal(now_slack, slack):
+            same = np.array_equal(now_slack, slack)
+            if settled and signature == previous and same:
                 closed = (penetration > 0.0).tolist()
                 return LocalForces(forces.tolist(), velocity.tolist(), closed, slack, compensation)
             previous = signature
-            compensation = _carried(now_slack, slack, compensation)
-            slack = now_slack
+            if not same:
+                compensation = _carried(now_slack, slack, compensation)
+                slack = now_slack
         raise LocalSolutionError(
             f"slack and contact forces have not settled after {_MAX_ITERATIONS} iterations "
             f"({slack.size} slack droppers, {len(contacts)} contacts); use a smaller time step"
@@ -230,7 +234,7 @@ class _Coupling:
         d(-e)/df : ndarray, shape (n_droppers, n_slack)
         d(delta)/df : ndarray, shape (n_contacts, n_slack)
         """
-        if self._slack is None or not np.array_equal(self._slack, slack):  # the set rarely changes
+        if slack is not self._slack:  # the set rarely changes
             self._slack = slack
             on_droppers = np.zeros((self.problem.unilateral.size, slack.size))
             on_contacts = np.zeros((len(self.contacts), slack.size))
@@ -291,8 +295,11 @@ class _Coupling:
             system[n:, :n] += share[:, None] * self.dropper_contact[slack]
             system[n:, n:] -= share[:, None] * self.by_slack(slack)[0][slack]
             right[n:] = -share * free[slack]
-        solution = np.asarray(np.linalg.solve(system, right) if n + m else right, dtype=np.float64)
-        return solution[:n], solution[n:]
+        if n + m:
+            _, _, right, failed = dgesv(system, right, overwrite_a=1, overwrite_b=1)
+            if failed:
+                raise LocalSolutionError("slack and contact forces have no solution: their compliances are singular")
+        return right[:n], right[n:]
 
 
 def _estimate(problem: LocalProblem, contact: OpenContact) -> float:

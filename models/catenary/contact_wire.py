@@ -212,7 +212,7 @@ class ContactWire:
         last = len(self._of_element) - 1
         interval: WireInterval | None = None
         at: Sequence[float] = ()
-        direction = 0
+        direction, round_trips = 0, 0
         while True:
             if interval is not self._of_element[element]:
                 interval = self._of_element[element]
@@ -228,7 +228,8 @@ class ContactWire:
             direction = step
             element += step
             if not 0 <= element <= last:
-                if not self.period:
+                round_trips += 1
+                if not self.period or round_trips > 1:  # a strip along the track may cross nowhere near
                     return None
                 element %= last + 1
                 self._shift(a, b, -step)

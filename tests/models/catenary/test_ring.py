@@ -256,6 +256,19 @@ def test_a_skew_strip_finds_the_wire_on_the_other_side_of_the_seam(ring, middle,
         assert there == pytest.approx(found[1], abs=1e-9)
 
 
+def test_a_strip_along_the_track_is_not_looked_for_for_ever(ring):
+    """It would cross a wire without any kink millions of laps further on."""
+    strip = _still(250.0)[0]
+    strip[:, 0, :2] = [[250.0 + 1e9, 0.7], [250.0 - 1e9, 0.6]]
+
+    def straight(interval):
+        return (interval.plan_static * np.resize([1.0, 0.0], len(interval.plan_static))).tolist()
+
+    assert ring.wires[0].find(strip, straight, -1) is None
+    strip[:, 0, :2] = [[250.0, 0.7], [250.0, -0.7]]
+    assert ring.wires[0].find(strip, straight, -1).share == pytest.approx(0.5)
+
+
 def test_a_snapshot_beyond_the_seam_comes_back(ring_maker):
     part = CatenaryPart(ring_maker(4))
     place = {"x": 199.0 + 5 * 200.0}

@@ -120,6 +120,9 @@ class Crossing(NamedTuple):
     engagement: float = 1.0
 
 
+#: A strip farther than this from the ends of a wire does not meet it, however the wire moves [m].
+_FAR = 1.0
+
 #: Positions in plan of an interval's nodes, x and y in turn [m], from wherever its motion is known.
 Positions = Callable[[WireInterval], Sequence[float]]
 
@@ -168,6 +171,17 @@ class ContactWire:
     def elements(self) -> int:
         """Return the number of its elements."""
         return len(self._of_element)
+
+    def is_near(self, strip: FloatArray) -> bool:
+        """Return whether a strip could meet the wire, which may end before it.
+
+        Parameters
+        ----------
+        strip : ndarray, shape (2, 2, 3)
+            Ends A and B; position and velocity.
+        """
+        a, b = float(strip[0, 0, 0]), float(strip[1, 0, 0])
+        return self.period > 0.0 or (max(a, b) > self._starts[0] - _FAR and min(a, b) < self._starts[-1] + _FAR)
 
     def locate(self, x: float) -> tuple[int, float]:
         """Return the element at a position of the track and the share of the way along it, in the static shape."""

@@ -43,6 +43,8 @@ class FreeMotion:
         strip : ndarray, shape (2, 2, 3)
             Ends A and B; position and velocity.
         """
+        if not self._wire.is_near(strip):
+            return None
         met = self._stepper.meet(self._wire, self._reaction, strip, guess, self._motion)
         return met or self._walk(strip, guess)
 

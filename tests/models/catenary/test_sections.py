@@ -6,6 +6,7 @@ import pytest
 from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.part import CatenaryPart
 from models.catenary.statics import arm_loads
+from models.catenary.stepping import local_motion
 from models.contact import STRIP_EDGE
 from models.definition import DefinitionError
 from models.library import load_line
@@ -166,3 +167,18 @@ def test_supports_and_droppers_of_two_sections_have_different_names(pair):
 
 def test_supports_of_one_section_are_plain_numbers(line_maker):
     assert [s.name for s in CatenaryPart(line_maker(spans=4)).supports] == ["1", "2", "3"]
+
+
+def test_a_wire_that_is_not_near_would_not_be_met_either(pair):
+    """What is told without looking, and what looking tells: strips before, at and beyond the ends of a wire."""
+    model = CatenaryModel(pair)
+    wire, state = model.wires[0], model.initial_state()
+    first, last = wire.ends
+    near = []
+    for x in (first - 3.0, first - 0.5, first + 5.0, last - 5.0, last + 0.5, last + 3.0):
+        strip = np.zeros((2, 2, 3))
+        strip[:, 0] = [[x, 0.7, 5.0], [x, -0.7, 5.0]]
+        met = wire.find(strip, lambda i: i.positions(local_motion(i, state.motion)[0]), -1) is not None
+        near.append(wire.is_near(strip))
+        assert near[-1] or not met
+    assert near == [False, True, True, True, True, False]

@@ -10,10 +10,11 @@ import scipy.sparse as sp
 from models.part import FloatArray
 
 try:  # The routine behind scipy's own product, which spends a third of a small product on looking at its operands.
+    from scipy.sparse._sparsetools import bsr_matvec as _bsr_matvec
     from scipy.sparse._sparsetools import csc_matvec as _csc_matvec
     from scipy.sparse._sparsetools import csr_matvec as _csr_matvec
 except ImportError:  # pragma: no cover - a scipy that has moved it
-    _csc_matvec = _csr_matvec = None
+    _bsr_matvec = _csc_matvec = _csr_matvec = None
 
 _Routine = Callable[..., None]
 
@@ -50,6 +51,40 @@ class Product:
         >>> Product(sp.csr_matrix([[1.0, 2.0], [0.0, 3.0]])).add(np.array([1.0, 1.0]), result)
         >>> result.tolist()
         [4.0, 4.0]
+        """
+        if self._routine is None:
+            result += self.matrix @ vector
+        else:
+            self._routine(*self._arguments, vector, result)
+
+
+class BlockProduct:
+    """A matrix of dense blocks of one size that is multiplied with vectors: without an index for every entry.
+
+    Parameters
+    ----------
+    matrix : sparse, shape (m, n)
+        By rows of blocks.
+    routine : callable, optional
+        scipy's compiled product; None takes the public operator.
+    """
+
+    def __init__(self, matrix: sp.bsr_matrix, routine: _Routine | None = _bsr_matvec) -> None:
+        self.matrix = matrix
+        rows, columns = matrix.blocksize
+        shape = matrix.shape[0] // rows, matrix.shape[1] // columns
+        self._arguments = (*shape, rows, columns, matrix.indptr, matrix.indices, matrix.data.ravel())
+        self._routine = routine
+
+    def add(self, vector: FloatArray, result: FloatArray) -> None:
+        """Add matrix @ vector to ``result``, shapes (n,) and (m,); ``result`` is contiguous.
+
+        Examples
+        --------
+        >>> result = np.zeros(2)
+        >>> BlockProduct(sp.bsr_matrix([[1.0, 2.0], [0.0, 3.0]], blocksize=(2, 2))).add(np.array([1.0, 1.0]), result)
+        >>> result.tolist()
+        [3.0, 3.0]
         """
         if self._routine is None:
             result += self.matrix @ vector

@@ -26,11 +26,13 @@ from models.catenary.band import Banded, Cyclic, Sparse, factorised
 from models.catenary.contact_wire import ContactWire, Crossing, WireInterval
 from models.catenary.interval_modes import IntervalModes
 from models.catenary.motion import LineMotion
-from models.catenary.product import Product, TransposedProduct
+from models.catenary.product import BlockProduct, Product, TransposedProduct
 from models.catenary.reaction import Meeting, Point, Reaction
 from models.part import FloatArray, IntArray
 from models.time_integration import Newmark
 
+#: Ends of an interval that its modes in one plane move with.
+_ENDS_IN_PLANE = 6
 #: How a wire gives way about an interval.
 ReactionOf = Callable[[WireInterval], Reaction]
 
@@ -95,8 +97,17 @@ class Stepper:
     def _set_up(self, coupling: sp.csr_matrix) -> None:
         """Lay out what the two halves of a step read, from mu G over the intervals' ends."""
         modes, newmark = self.modes, self.newmark
-        self._out = Product(coupling), Product(modes.turn)
-        self._back = TransposedProduct(self._out[0]), Product(modes.turn.T)
+        by_blocks = _by_blocks(modes, coupling)
+        self._out: tuple[BlockProduct | Product, Product]
+        self._back: tuple[BlockProduct | TransposedProduct, Product]
+        if by_blocks is None:
+            out = Product(coupling)
+            self._out, self._back = (out, Product(modes.turn)), (TransposedProduct(out), Product(modes.turn.T))
+        else:
+            blocks, turn = by_blocks
+            self._out = BlockProduct(blocks), Product(turn)
+            self._back = BlockProduct(blocks.T.tobsr(blocks.blocksize[::-1])), Product(turn.T)
+            self._ends = np.empty(turn.shape[0])
         self._own = Product(sp.hstack([-2.0 * modes.K, newmark.a2 * modes.M]))
         self._from_momentum = newmark.a2 * self.inverse
         # One number where all wires are damped alike, as a number is sooner read than a vector.
@@ -246,3 +257,25 @@ def _dense_rows(matrix: sp.csr_matrix, start: int, stop: int) -> tuple[FloatArra
     result = np.zeros((stop - start, int(columns.max()) - low + 1))
     result[np.repeat(np.arange(stop - start), np.diff(bounds)), columns - low] = matrix.data[bounds[0] : bounds[-1]]
     return result, low
+
+
+def _by_blocks(modes: IntervalModes, coupling: sp.csr_matrix) -> tuple[sp.bsr_matrix, sp.csr_matrix] | None:
+    """Return mu G by dense blocks and the turn to its ends, renumbered; None if intervals are of several sizes.
+
+    Every end belongs to one block of modes; a block with more than six of them takes several columns of blocks.
+    """
+    sizes = {block.modes.shape[1] for block in modes.blocks}
+    if len(sizes) != 1:
+        return None
+    size = sizes.pop()
+    entries = coupling.tocoo()
+    owner = np.zeros(coupling.shape[1], dtype=np.int64)
+    owner[entries.col] = entries.row // size
+    order = np.argsort(owner, kind="stable")
+    count = np.bincount(owner, minlength=coupling.shape[0] // size)
+    begin = np.cumsum(np.concatenate([[0], -(-count // _ENDS_IN_PLANE) * _ENDS_IN_PLANE]))
+    place = np.empty_like(order)
+    place[order] = begin[owner[order]] + np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+    ones, before = np.ones(len(place)), np.arange(len(place))
+    renumbered = sp.csr_matrix((ones, (place, before)), shape=(int(begin[-1]), len(place)))
+    return (coupling @ renumbered.T).tobsr((size, _ENDS_IN_PLANE)), (renumbered @ modes.turn).tocsr()

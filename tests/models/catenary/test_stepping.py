@@ -8,9 +8,10 @@ from scipy.sparse.linalg import splu
 from models.catenary.band import CUT, Banded, Sparse, factorised
 from models.catenary.compiled import CompiledStepper, KernelError, _cached, kernels, make_stepper
 from models.catenary.compliance import Compliance
+from models.catenary.interval_modes import slower_than
 from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.product import Product
-from models.catenary.stepping import Stepper
+from models.catenary.product import BlockProduct, Product, TransposedProduct
+from models.catenary.stepping import Stepper, _by_blocks
 from models.coupled import CoupledModel
 from models.library import load_line
 from models.time_integration import Newmark
@@ -172,6 +173,27 @@ def test_products_with_and_without_scipy_s_routine(routine):
     expected = result + matrix @ vector
     product.add(vector, result)
     assert result == pytest.approx(expected, rel=1e-14)
+    transposed = TransposedProduct(product, None) if routine is None else TransposedProduct(product)
+    expected = vector + matrix.T @ result
+    transposed.add(result, vector)
+    assert vector == pytest.approx(expected, rel=1e-14)
+    blocks = matrix.tobsr((5, 4))
+    by_blocks = BlockProduct(blocks, None) if routine is None else BlockProduct(blocks)
+    expected = result + matrix @ vector
+    by_blocks.add(vector, result)
+    assert result == pytest.approx(expected, rel=1e-14)
+
+
+def test_the_coupling_by_blocks_is_the_coupling(model):
+    """Some intervals move with more than six ends; with intervals of two sizes there are no blocks of one size."""
+    modes = model.modes
+    blocks, turn = _by_blocks(modes, modes.coupling)
+    difference = blocks.tocsr() @ turn - modes.coupling @ modes.turn
+    assert abs(difference).max() <= 1e-15 * abs(modes.coupling).max()
+    assert blocks.nnz < 1.2 * modes.coupling.nnz
+    slow = slower_than(modes, 200.0)
+    assert len({block.modes.shape[1] for block in slow.blocks}) > 1
+    assert _by_blocks(slow, slow.coupling) is None
 
 
 @pytest.fixture

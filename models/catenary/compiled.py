@@ -326,7 +326,10 @@ class _Units:
         more = np.zeros((len(pairs), width, lanes))
         more[of_pair.ravel(), entries.col[~own] - end[of_pair.ravel()], lane[entries.row[~own]]] = entries.data[~own]
         mu = newmark.a0 + newmark.a1 * modes.beta[first]
-        rates = np.stack([newmark.a1 / mu, np.full(n_units, newmark.a2), newmark.a2 / mu], axis=1)
+        # K_hat = lambda (1 + a1 alpha) + mu
+        stiff = -2.0 / (1.0 + newmark.a1 * modes.alpha[first])
+        a2 = np.full(n_units, newmark.a2)
+        rates = np.stack([newmark.a1 / mu, a2, newmark.a2 / mu, stiff, -stiff * mu], axis=1)
         at_more = np.stack([pairs[:, 0], end], axis=1).astype(np.uint64)
         self.layout = where.astype(np.uint64), rates, at_more, more
         begin = unit * kernels.ROWS * lanes + lane
@@ -335,7 +338,6 @@ class _Units:
         )
         self.table = table.ravel()
         self.table[begin + kernels.INVERSE * lanes] = stepper.inverse
-        self.table[begin + kernels.STIFFNESS * lanes] = -2.0 * modes.eigenvalue * stepper.inverse
 
 
 def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:

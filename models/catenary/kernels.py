@@ -13,15 +13,15 @@ from numba import njit
 
 #: Modes of a unit, and ends that it moves with: what the processor takes at once.
 LANES, ENDS = 8, 6
-#: Rows of a unit: the coupling mu G with its ends, 1 / K_hat, -2 lambda / K_hat, then the motion of its modes.
-INVERSE, STIFFNESS, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11, 12
+#: Rows of a unit: the coupling mu G with its ends, 1 / K_hat, then the motion of its modes.
+INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
 #: What `meet` returns where there is no crossing.
 NOWHERE, BEFORE, BEYOND = -1, -2, -3
 #: Sums may be reordered, not more: infinities and NaN stay what they are.
 _compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
 _0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
 _LANES, _UNIT = np.uint64(LANES), np.uint64(ROWS * LANES)
-_R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _STIFFNESS, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
+_R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
     np.uint64(LANES * row) for row in range(ROWS)
 )
 #: From the place of a mode's amplitude in the table to others of the same mode.
@@ -43,8 +43,9 @@ def prepare(where, rates, more, more_coupling, table, pull):
     for u in range(where.size):
         end, begin = where[u], np.uint64(u) * _UNIT
         for k in range(begin, begin + _LANES):
-            held = table[k + _STIFFNESS] * table[k + _AMPLITUDE]
-            held += rates[u, _1] * table[k + _INVERSE] * table[k + _MOMENTUM]
+            inverse = table[k + _INVERSE]
+            held = (rates[u, _3] + rates[u, _4] * inverse) * table[k + _AMPLITUDE]
+            held += rates[u, _1] * inverse * table[k + _MOMENTUM]
             table[k + _HELD] = held
             value = rates[u, _2] * table[k + _RATE] - held
             for j in range(_0, np.uint64(ENDS)):
@@ -96,8 +97,9 @@ def finish(
         Turn of the attachments' displacements to the axes of the intervals, compressed by rows.
     where : ndarray of unsigned int, shape (N,)
         First of the six ends that the modes of a unit move with.
-    rates : ndarray, shape (N, 3)
-        a1 / mu, a2 and a2 / mu of the modes.
+    rates : ndarray, shape (N, 5)
+        a1 / mu, a2 and a2 / mu of the modes, then c and d with -2 lambda / K_hat = c + d / K_hat: less to read than
+        these themselves.
     more : ndarray of unsigned int, shape (M, 2)
         Units that move with further ends: the unit, and the first of six such ends.
     more_coupling : ndarray, shape (M, 6, 8)
@@ -109,8 +111,8 @@ def finish(
         Work space.
     attached : ndarray, shape (2, n_attached)
         Motion of the attachments, replaced.
-    table : ndarray, shape (N * 12 * 8,)
-        Unit by unit twelve rows of eight modes, see the constants above: properties, and the motion, which is replaced.
+    table : ndarray, shape (N * 11 * 8,)
+        Unit by unit eleven rows of eight modes, see the constants above: properties, and the motion, which is replaced.
         The last row is the change of the amplitudes were the attachments held, of this step; for the next one
         afterwards.
     pull : ndarray, shape (n_ends,)
@@ -137,6 +139,7 @@ def advance(where, rates, a1, ends, table, pull):
     for u in range(where.size):
         end, begin = where[u], np.uint64(u) * _UNIT
         to_momentum, a2, from_rate = rates[u, _0], rates[u, _1], rates[u, _2]
+        stiff, less = rates[u, _3], rates[u, _4]
         e0, e1, e2 = ends[end], ends[end + _1], ends[end + _2]
         e3, e4, e5 = ends[end + _3], ends[end + _4], ends[end + _5]
         t0 = t1 = t2 = t3 = t4 = t5 = 0.0
@@ -149,7 +152,7 @@ def advance(where, rates, a1, ends, table, pull):
             amplitude = table[k + _AMPLITUDE] + change
             rate = a1 * change - table[k + _RATE]
             momentum = a1 * change + to_momentum * moved - table[k + _MOMENTUM]
-            held = a2 * inverse * momentum + table[k + _STIFFNESS] * amplitude
+            held = a2 * inverse * momentum + (stiff + less * inverse) * amplitude
             value = from_rate * rate - held
             table[k + _AMPLITUDE], table[k + _RATE] = amplitude, rate
             table[k + _MOMENTUM], table[k + _HELD] = momentum, held

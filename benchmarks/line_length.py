@@ -16,8 +16,9 @@ import time
 from collections.abc import Callable
 
 from lines import long_line
-from timing import by_turns, memory, on_one_thread, peak_memory, table
+from timing import by_turns, memory, on_one_thread, table
 
+from master.results import peak_memory
 from models.catenary.model import CatenaryModel
 from models.coupled import CoupledModel
 from models.library import load_lumped

@@ -52,12 +52,6 @@ def memory() -> float:
     return pages * resource.getpagesize() / 2**20
 
 
-def peak_memory() -> float:
-    """Return the most that the process has had in memory [MB]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (2**20 if sys.platform == "darwin" else 2**10)
-
-
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table: text in the first column, figures in the others."""
     result = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)

@@ -31,8 +31,6 @@ class LineMotion:
         q' + G x', which acts on the intervals.
     attached : ndarray, shape (2, n_attached)
         Displacements x of the attachments [m, rad] and their velocities.
-    prepared : ndarray, optional
-        What a stepper had found for the next step when the motion was saved.
 
     Attributes
     ----------
@@ -42,11 +40,9 @@ class LineMotion:
         The modal part, while a stepper keeps it in an order of its own.
     """
 
-    def __init__(
-        self, modal: FloatArray, momentum: FloatArray, attached: FloatArray, prepared: FloatArray | None = None
-    ) -> None:
+    def __init__(self, modal: FloatArray, momentum: FloatArray, attached: FloatArray) -> None:
         self._modal, self._momentum, self.attached = modal, momentum, attached
-        self._prepared = np.zeros(0) if prepared is None else prepared
+        self._prepared = np.zeros(0)
         self.packed: Packed | None = None
 
     @classmethod

@@ -19,22 +19,20 @@ except ImportError:  # pragma: no cover - a scipy that has moved it
 _Routine = Callable[..., None]
 
 
-class Product:
+class Multiplier:
     """A sparse matrix that is multiplied with vectors, without allocating anything.
 
     Parameters
     ----------
     matrix : sparse, shape (m, n)
-    routine : callable, optional
-        scipy's compiled product; None takes the public operator.
+    arguments : tuple
+        The matrix as the routine takes it.
+    routine : callable or None
+        scipy's compiled product for it; None takes the public operator.
     """
 
-    def __init__(self, matrix: sp.spmatrix, routine: _Routine | None = _csr_matvec) -> None:
-        self.matrix = sp.csr_matrix(matrix)
-        self.matrix.sort_indices()
-        m = self.matrix
-        self._arguments = (*m.shape, m.indptr, m.indices, m.data)
-        self._routine = routine
+    def __init__(self, matrix: sp.spmatrix, arguments: tuple[object, ...], routine: _Routine | None) -> None:
+        self.matrix, self._arguments, self._routine = matrix, arguments, routine
 
     def add(self, vector: FloatArray, result: FloatArray) -> None:
         """Add matrix @ vector to ``result``.
@@ -44,13 +42,6 @@ class Product:
         vector : ndarray, shape (n,)
         result : ndarray, shape (m,)
             Contiguous.
-
-        Examples
-        --------
-        >>> result = np.ones(2)
-        >>> Product(sp.csr_matrix([[1.0, 2.0], [0.0, 3.0]])).add(np.array([1.0, 1.0]), result)
-        >>> result.tolist()
-        [4.0, 4.0]
         """
         if self._routine is None:
             result += self.matrix @ vector
@@ -58,70 +49,67 @@ class Product:
             self._routine(*self._arguments, vector, result)
 
 
-class BlockProduct:
-    """A matrix of dense blocks of one size that is multiplied with vectors: without an index for every entry.
+class Product(Multiplier):
+    """A matrix compressed by rows.
+
+    Parameters
+    ----------
+    matrix : sparse, shape (m, n)
+
+    Examples
+    --------
+    >>> result = np.ones(2)
+    >>> Product(sp.csr_matrix([[1.0, 2.0], [0.0, 3.0]])).add(np.array([1.0, 1.0]), result)
+    >>> result.tolist()
+    [4.0, 4.0]
+    """
+
+    def __init__(self, matrix: sp.spmatrix, routine: _Routine | None = _csr_matvec) -> None:
+        rows = sp.csr_matrix(matrix)
+        rows.sort_indices()
+        super().__init__(rows, (*rows.shape, rows.indptr, rows.indices, rows.data), routine)
+
+
+class BlockProduct(Multiplier):
+    """A matrix of dense blocks of one size: without an index for every entry.
 
     Parameters
     ----------
     matrix : sparse, shape (m, n)
         By rows of blocks.
-    routine : callable, optional
-        scipy's compiled product; None takes the public operator.
+
+    Examples
+    --------
+    >>> result = np.zeros(2)
+    >>> BlockProduct(sp.bsr_matrix([[1.0, 2.0], [0.0, 3.0]], blocksize=(2, 2))).add(np.array([1.0, 1.0]), result)
+    >>> result.tolist()
+    [3.0, 3.0]
     """
 
     def __init__(self, matrix: sp.bsr_matrix, routine: _Routine | None = _bsr_matvec) -> None:
-        self.matrix = matrix
         rows, columns = matrix.blocksize
         shape = matrix.shape[0] // rows, matrix.shape[1] // columns
-        self._arguments = (*shape, rows, columns, matrix.indptr, matrix.indices, matrix.data.ravel())
-        self._routine = routine
-
-    def add(self, vector: FloatArray, result: FloatArray) -> None:
-        """Add matrix @ vector to ``result``, shapes (n,) and (m,); ``result`` is contiguous.
-
-        Examples
-        --------
-        >>> result = np.zeros(2)
-        >>> BlockProduct(sp.bsr_matrix([[1.0, 2.0], [0.0, 3.0]], blocksize=(2, 2))).add(np.array([1.0, 1.0]), result)
-        >>> result.tolist()
-        [3.0, 3.0]
-        """
-        if self._routine is None:
-            result += self.matrix @ vector
-        else:
-            self._routine(*self._arguments, vector, result)
+        super().__init__(matrix, (*shape, rows, columns, matrix.indptr, matrix.indices, matrix.data.ravel()), routine)
 
 
-class TransposedProduct:
+class TransposedProduct(Multiplier):
     """The transpose of a matrix that has a `Product`, without a second copy of it: there is less to read in a step.
 
     Parameters
     ----------
     product : Product
-    routine : callable, optional
-        scipy's compiled product of compressed columns; None takes the public operator.
+
+    Examples
+    --------
+    >>> result = np.zeros(2)
+    >>> TransposedProduct(Product(sp.csr_matrix([[1.0, 2.0], [0.0, 3.0]]))).add(np.array([1.0, 1.0]), result)
+    >>> result.tolist()
+    [1.0, 5.0]
     """
 
     def __init__(self, product: Product, routine: _Routine | None = _csc_matvec) -> None:
-        matrix = product.matrix
-        self._matrix = matrix.T
-        self._arguments = (matrix.shape[1], matrix.shape[0], matrix.indptr, matrix.indices, matrix.data)
-        self._routine = routine
-
-    def add(self, vector: FloatArray, result: FloatArray) -> None:
-        """Add matrix.T @ vector to ``result``, shapes (m,) and (n,); ``result`` is contiguous.
-
-        Examples
-        --------
-        >>> result = np.zeros(2)
-        >>> TransposedProduct(Product(sp.csr_matrix([[1.0, 2.0], [0.0, 3.0]]))).add(np.array([1.0, 1.0]), result)
-        >>> result.tolist()
-        [1.0, 5.0]
-        """
-        if self._routine is None:
-            result += self._matrix @ vector
-        else:
-            self._routine(*self._arguments, vector, result)
+        rows, columns = product.matrix, product.matrix.T
+        super().__init__(columns, (*columns.shape, rows.indptr, rows.indices, rows.data), routine)
 
 
 def inner(one: FloatArray, other: FloatArray) -> float:

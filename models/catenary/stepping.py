@@ -26,7 +26,7 @@ from models.catenary.band import Banded, Cyclic, Sparse, factorised
 from models.catenary.contact_wire import ContactWire, Crossing, WireInterval
 from models.catenary.interval_modes import IntervalModes
 from models.catenary.motion import LineMotion
-from models.catenary.product import BlockProduct, Product, TransposedProduct
+from models.catenary.product import BlockProduct, Multiplier, Product, TransposedProduct
 from models.catenary.reaction import Meeting, Point, Reaction
 from models.part import FloatArray, IntArray
 from models.time_integration import Newmark
@@ -89,7 +89,6 @@ class Stepper:
         self.factor: Banded | Cyclic | Sparse = factorised(
             modes.K + a0 * modes.M + a1 * modes.C - G.T @ sp.diags(self.inverse) @ G
         )
-        self._from_modal = -2.0 * modes.eigenvalue * self.inverse
         self.attached = np.empty(G.shape[1])
         self._ends, self._right = np.empty(coupling.shape[1]), np.empty(G.shape[1])
         self._set_up(coupling)
@@ -98,8 +97,8 @@ class Stepper:
         """Lay out what the two halves of a step read, from mu G over the intervals' ends."""
         modes, newmark = self.modes, self.newmark
         by_blocks = _by_blocks(modes, coupling)
-        self._out: tuple[BlockProduct | Product, Product]
-        self._back: tuple[BlockProduct | TransposedProduct, Product]
+        self._out: tuple[Multiplier, Multiplier]
+        self._back: tuple[Multiplier, Multiplier]
         if by_blocks is None:
             out = Product(coupling)
             self._out, self._back = (out, Product(modes.turn)), (TransposedProduct(out), Product(modes.turn.T))
@@ -109,6 +108,7 @@ class Stepper:
             self._back = BlockProduct(blocks.T.tobsr(blocks.blocksize[::-1])), Product(turn.T)
             self._ends = np.empty(turn.shape[0])
         self._own = Product(sp.hstack([-2.0 * modes.K, newmark.a2 * modes.M]))
+        self._from_modal = -2.0 * modes.eigenvalue * self.inverse
         self._from_momentum = newmark.a2 * self.inverse
         # One number where all wires are damped alike, as a number is sooner read than a vector.
         alike = np.all(self._mu == self._mu[:1])

@@ -1,0 +1,23 @@
+"""What holds for the whole suite: long checks on request, groups of tests that share one process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.effort import IS_LONG
+
+ROBUSTNESS = Path(__file__).parent / "robustness"
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the long checks out unless asked for; keep the robustness tests, which add up their inputs, together."""
+    for item in items:
+        if item.path.is_relative_to(ROBUSTNESS):
+            item.add_marker(pytest.mark.xdist_group("robustness"))
+    if not IS_LONG:
+        left_out = [item for item in items if item.get_closest_marker("long")]
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
+        config.hook.pytest_deselected(items=left_out)

@@ -119,3 +119,67 @@ def test_contact_is_lost_and_found_again(model):
     assert min(forces[5:20]) > 10.0
     assert max(forces[21:40]) == 0.0
     assert min(forces[45:]) > 1.0
+
+
+def _rolling(x, z, vz, axis, roll_rate):
+    """A level strip that rises with ``vz`` where y is ``axis`` and rolls about that point."""
+    return np.array([[[x, y, z], [80.0, 0.0, vz + roll_rate * (y - axis)]] for y in (0.7, -0.7)])
+
+
+@pytest.mark.parametrize("roll_rate", [-2.0, 1.5])
+def test_a_strip_that_rolls_about_the_contact_presses_like_one_that_does_not(short_line, roll_rate):
+    """The law's velocity is that of the strip where the wire lies on it, 0.2 m beside its middle, not of its ends."""
+    lossy = CatenaryModel(short_line.with_values({"contact.restitution": 0.6}))
+    forces = []
+    for rate in (0.0, roll_rate):
+        state, record = lossy.initial_state(), []
+        axis = float(lossy.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0, 1])
+        assert abs(axis) > 0.19
+        z0 = float(lossy.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0, 2])
+        for n in range(1, 16):
+            strip = _rolling(100.0, z0 + 0.1 * n * 1e-3, 0.1, axis, rate)
+            result = lossy.step(state, 1e-3, StripMotion(strip[None], np.zeros(1)))
+            record.append(float(result.force[0, 0]))
+            axis = float(result.point[0, 0, 1])
+        forces.append(np.array(record))
+    still, rolling = forces
+    assert still.min() > 0.0
+    assert np.abs(rolling - still).max() < 2e-3 * still.max()
+
+
+def test_contact_at_rest_knows_how_a_strip_rolls(short_line):
+    """A strip that leaves the wire at the contact, though one end rises, does not press against a lossy law."""
+    lossy = CatenaryModel(short_line.with_values({"contact.restitution": 0.6}))
+    state = lossy.initial_state()
+    at = lossy.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0]
+    pressed = float(at[2]) + 2e-3
+    law = lossy.definition.contact
+    for roll_rate in (-3.0, 3.0):
+        approaching = lossy.contact_at_rest(state, _rolling(100.0, pressed, 0.05, at[1], roll_rate)[None])
+        leaving = lossy.contact_at_rest(state, _rolling(100.0, pressed, -0.05, at[1], roll_rate)[None])
+        # At its first instant the velocity is that of the impact: 1 + 3/4 (1 - e^2) times the elastic force.
+        assert approaching.force[0, 0] == pytest.approx(law.stiffness * 2e-3 * (1.0 + 0.75 * 0.64), rel=1e-6)
+        assert leaving.force[0, 0] == 0.0
+
+
+def test_a_tilted_strip_presses_with_its_height_at_the_contact(model):
+    """Ends 2 cm apart in height: the penetration is that of the point on the strip where the wire crosses it."""
+    state = model.initial_state()
+    level = _strip(100.0, 6.0)
+    x, y, z = model.contact_at_rest(state, level[None]).point[0, 0]
+    tilted = level.copy()
+    tilted[:, 0, 2] = [z + 3e-3 + 0.01 / 0.7 * (end - y) for end in (0.7, -0.7)]
+    found = model.contact_at_rest(state, tilted[None])
+    assert found.force[0, 0] == pytest.approx(model.definition.contact.stiffness * 3e-3, rel=1e-6)
+    assert x == pytest.approx(100.0)
+
+
+def test_radii_of_wire_and_strip_keep_their_axes_apart(short_line):
+    """A round wire on a round strip: as much penetration as the plain one where the strip is lower by both radii."""
+    plain = CatenaryModel(short_line)
+    thick = CatenaryModel(short_line.with_values({"contact.wire_radius": 6e-3, "contact.strip_radius": 0.1}))
+    z = float(plain.contact_at_rest(plain.initial_state(), _strip(100.0, 6.0)[None]).point[0, 0, 2])
+    bare = plain.contact_at_rest(plain.initial_state(), _strip(100.0, z + 4e-3)[None]).force[0, 0]
+    round_one = thick.contact_at_rest(thick.initial_state(), _strip(100.0, z + 4e-3 - 0.106)[None]).force[0, 0]
+    assert bare > 50.0
+    assert round_one == pytest.approx(bare, rel=1e-6)

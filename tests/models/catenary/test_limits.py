@@ -46,6 +46,25 @@ def test_a_wire_takes_up_waves_like_the_damper_of_the_criterion(ln2):
     assert power == pytest.approx(2.0 * math.sqrt(wire.tension * wire.mass) * v**2)
 
 
+@pytest.mark.parametrize("stiffness", [2e4, 5e4])
+def test_the_longest_step_is_a_quarter_of_the_time_in_which_a_pressed_string_gives_way(ln2, stiffness):
+    """A strip pressed into a long string, which runs away to both sides in d'Alembert's exact differences."""
+    wire, dt, n = ln2.contact_wire, 2.5e-5, 2001
+    cell = math.sqrt(wire.tension / wire.mass) * dt
+    before, now = np.zeros(n), np.zeros(n)
+    depth, time, force = 1e-3, 0.0, stiffness * 1e-3
+    while force > stiffness * depth / math.e:
+        new = np.zeros(n)
+        new[1:-1] = now[2:] + now[:-2] - before[1:-1]
+        new[n // 2] += force * dt**2 / (wire.mass * cell)
+        before, now, time = now, new, time + dt
+        force = stiffness * (depth - now[n // 2])
+    line = ln2.with_values({"contact.stiffness": stiffness})
+    assert longest_step(line) == pytest.approx(0.25 * time, rel=0.02)
+    assert step_warning(line, 0.24 * time) == ""
+    assert step_warning(line, 0.26 * time)
+
+
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
 def test_the_stiffness_is_the_slope_of_the_law(exponent):
     contact = Contact(stiffness=30000.0, exponent=exponent)

@@ -108,6 +108,48 @@ def test_iterative_releases_every_state_it_saves_also_on_failure(fake_slave):
         assert slave.calls.count("save") == slave.calls.count("release") == 1
 
 
+def _settling(fake_slave):
+    """An oscillation that has been large and is dying out, iterated to a share of how large it has been."""
+    network = oscillator(fake_slave)
+    initialise(network, 0.0, 1.0)
+    scheme = Iterative(1e-3)
+    for n in range(5):
+        scheme.step(network, 0.02 * n, 0.02)
+    for slave in network.slaves:
+        slave.state = 1e-4 * slave.state
+    network.read()
+    return network, scheme
+
+
+def test_an_iterative_scheme_that_recalls_its_memory_repeats_as_often_as_one_that_was_not_interrupted(fake_slave):
+    """What counts as settled is relative to the largest values so far, so it has to come along."""
+    (network, scheme), (other, before) = _settling(fake_slave), _settling(fake_slave)
+    resumed, forgetful = Iterative(1e-3), Iterative(1e-3)
+    resumed.recall(before.memory())
+    started = scheme.iterations
+    for each, net in ((scheme, network), (resumed, other)):
+        for n in range(5, 10):
+            each.step(net, 0.02 * n, 0.02)
+    assert resumed.iterations == scheme.iterations - started
+    assert other.outputs.tolist() == network.outputs.tolist()
+    assert resumed.memory().tolist() == scheme.memory().tolist()
+    third, _ = _settling(fake_slave)
+    for n in range(5, 10):
+        forgetful.step(third, 0.02 * n, 0.02)
+    assert forgetful.iterations > resumed.iterations  # so that the above is not so by itself
+
+
+def test_memory_that_is_handed_out_is_not_changed_by_further_steps(fake_slave):
+    network, scheme = _settling(fake_slave)
+    taken = scheme.memory()
+    kept = taken.copy()
+    for slave in network.slaves:
+        slave.state = 1e6 * slave.state
+    scheme.step(network, 0.1, 0.02)
+    assert taken.tolist() == kept.tolist()
+    assert scheme.memory().max() > 10.0 * kept.max()
+
+
 def test_wires_convert(fake_slave):
     source = fake_slave("a", (), ("y",), np.array([36.0]), lambda s, u, t, h: s)
     sink = fake_slave("b", ("u",), (), np.zeros(1), lambda s, u, t, h: s, lambda s, u: u[:0])

@@ -281,7 +281,7 @@ def test_droppers_slacken_far_from_the_contact_as_well(short_line):
     assert (alone[:, far] < 1e-9).any(axis=1).sum() > 10
     assert alone.min() > -1e-9
     assert beside.min() > -1e-9
-    assert np.abs(beside[:, far] - alone[:, far]).max() < 1e-6
+    assert np.abs(beside[:, far] - alone[:, far]).max() < 1e-2
 
 
 def test_stiffness_in_compression_is_the_given_share(line_maker):

@@ -75,6 +75,24 @@ def test_gauss_seidel_order_of_slaves_matters_and_is_honoured(fake_slave):
     assert network.outputs[0] == pytest.approx(1.0 - 0.1 * 0.1 * OMEGA**2)
 
 
+def test_after_a_step_the_inputs_are_what_the_slaves_were_told(fake_slave):
+    """Also what the first was told, though its source has gone on since."""
+    network = oscillator(fake_slave)
+    initialise(network, 0.0, 1.0)
+    x, v = network.outputs
+    GaussSeidel().step(network, 0.0, 0.1)
+    assert network.inputs.tolist() == [v, x + 0.1 * v]
+    GaussSeidel(["velocity", "position"]).step(network, 0.1, 0.1)
+    assert network.inputs.tolist() == [network.outputs[1], x + 0.1 * v]
+
+
+def test_slaves_may_start_at_times_of_their_own(fake_slave, monkeypatch):
+    seen = {}
+    monkeypatch.setattr(fake_slave, "start", lambda slave, start, stop: seen.update({slave.name: (start, stop)}))
+    initialise(oscillator(fake_slave), 1.0, 5.0, {"velocity": 3.0})
+    assert seen == {"position": (1.0, 5.0), "velocity": (3.0, 5.0)}
+
+
 def test_jacobi_does_not_depend_on_the_order_of_slaves(fake_slave):
     a = oscillator(fake_slave)
     b = Network(

@@ -249,6 +249,16 @@ def test_raw_extremes_are_of_the_raw_force_and_statistical_ones_three_sigma_away
     assert found.statistical_minimum == pytest.approx(found.mean - 3.0 * found.sigma)
 
 
+def test_figures_of_an_interval_are_those_of_the_whole_filtered_record_there():
+    """A filter that saw the interval alone would end with it."""
+    force = 150.0 + 30.0 * np.random.default_rng(5).normal(size=len(TIME))
+    found = assess(force, 80.0 * TIME, STEP, (200.0, 280.0))
+    inside = (80.0 * TIME > 200.0 + 1e-6) & (80.0 * TIME <= 280.0 + 1e-6)
+    filtered = low_pass(force, STEP)[inside]
+    figures = (found.mean, found.sigma, found.minimum, found.maximum)
+    assert figures == pytest.approx((filtered.mean(), filtered.std(), filtered.min(), filtered.max()))
+
+
 def test_arcing_fails():
     force = 157.5 + sine(2.0, 30.0)
     force[4000:4020] = 0.0

@@ -75,7 +75,7 @@ def test_a_line_that_moves_as_one_has_the_mass_of_its_parts(built, axis):
 
 
 def test_the_wires_are_as_long_as_the_line(built):
-    """The polygons that the mass is counted along: each from anchor to anchor, longer than straight by its sag alone."""
+    """The polygons that the mass is counted along: each from anchor to anchor, and longer by its sag alone."""
     line, mesh, _ = built
     straight = sum(section.spans[-1].end - section.spans[0].start for section in line.sections)
     lengths = _wire_lengths(mesh)

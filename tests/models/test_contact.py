@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.parameters import Contact
+from models.catenary.stepping import local_motion
 from models.contact import continuous_contact, crossing
 
 
@@ -62,6 +64,22 @@ def test_rebound_velocity_is_that_of_the_coefficient_of_restitution(restitution)
             break
     assert v < 0.0
     assert -v / impact == pytest.approx(restitution, abs=0.4 * (1.0 - restitution))
+
+
+@pytest.mark.parametrize("restitution", [0.999, 0.99])
+def test_what_a_rebound_lacks_is_what_the_coefficient_says_the_nearer_to_1_the_better(restitution):
+    """(1 - v'/v) / (1 - e) tends to 1: that is what 3/4 (1 - e^2) is chosen for."""
+    law, mass, impact = Contact(stiffness=1e5, restitution=restitution), 5.0, 0.4
+
+    def rate(_, state):
+        return [state[1], -continuous_contact(max(state[0], 1e-300), state[1], impact, law).force / mass]
+
+    def apart(_, state):
+        return state[0]
+
+    apart.terminal, apart.direction = True, -1.0
+    found = solve_ivp(rate, (0.0, 0.1), [1e-12, impact], events=apart, rtol=1e-10, atol=1e-14)
+    assert (1.0 + found.y[1, -1] / impact) / (1.0 - restitution) == pytest.approx(1.0, abs=2.0 * (1.0 - restitution))
 
 
 @pytest.fixture(scope="module")
@@ -183,3 +201,37 @@ def test_radii_of_wire_and_strip_keep_their_axes_apart(short_line):
     round_one = thick.contact_at_rest(thick.initial_state(), _strip(100.0, z + 4e-3 - 0.106)[None]).force[0, 0]
     assert bare > 50.0
     assert round_one == pytest.approx(bare, rel=1e-6)
+
+
+def test_a_contact_keeps_the_velocity_of_its_impact_until_it_opens(short_line):
+    """Two strokes against the wire, the second twice as fast; each is lossy by its own first velocity [2.47]."""
+    lossy = CatenaryModel(short_line.with_values({"contact.restitution": 0.6}))
+    law, state, dt = lossy.definition.contact, lossy.initial_state(), 1e-3
+    z0 = float(lossy.contact_at_rest(state, _strip(120.0, 6.0)[None]).point[0, 0, 2])
+    z, impact, impacts, closed = z0 - 2e-4, None, [], 0
+    for n in range(60):
+        speed = 0.2 * np.cos(2.0 * np.pi * n / 30.0) * (1.0 if n < 30 else 2.0)
+        z += speed * dt
+        result = lossy.step(state, dt, StripMotion(_strip(120.0, z, vz=speed)[None], np.zeros(1)))
+        force = float(result.force[0, 0])
+        if not state.impact_velocity[0, 0]:
+            impact = None
+            continue
+        depth, rate = _penetration(lossy, state, z, speed)
+        if impact is None:
+            impact = rate
+            impacts.append(rate)
+        closed += 1
+        factor = 1.0 + 0.75 * (1.0 - 0.36) * rate / impact
+        assert force == pytest.approx(law.stiffness * depth * max(factor, 0.0), rel=1e-4, abs=1e-6)
+    assert closed > 15
+    assert len(impacts) == 2
+    assert impacts[1] > 1.3 * impacts[0]
+
+
+def _penetration(model, state, z, speed):
+    """Depth and velocity of the only contact, from where the wire is and how it moves."""
+    ((_, element),), ((xi, _),) = state.loaded.tolist(), state.load.tolist()
+    touch = model.wires[0].touch(element, xi)
+    rise, rate = (float(row @ touch.row) for row in local_motion(touch.interval, state.motion))
+    return z - (touch.height + rise), speed - rate

@@ -73,6 +73,30 @@ def test_when_a_run_begins_is_of_no_account(cx):
     assert late.observation_values() == pytest.approx(early.observation_values(), abs=1e-7)
 
 
+@pytest.mark.parametrize("start", [0.0, 0.3])
+def test_the_uplift_grows_evenly_from_its_beginning_to_its_end(cx, start):
+    definition = cx.with_values({"raise_start": start, "raise_duration": 0.2})
+    share = [definition.raised(start + t) for t in (-0.01, 0.0, 0.05, 0.1, 0.2, 5.0)]
+    assert share == pytest.approx([0.0, 0.0, 0.25, 0.5, 1.0, 1.0])
+    at_once = cx.with_values({"raise_start": start, "raise_duration": 0.0})
+    assert [at_once.raised(start + t) for t in (-1e-9, 0.0, 1.0)] == [0.0, 1.0, 1.0]
+
+
+def test_a_snapshot_knows_when_its_run_began(cx):
+    """In the midst of the ramp, of a run that began at 50 s."""
+    definition = cx.with_values({"raise_start": 0.05, "raise_duration": 0.1})
+    first, second = LumpedPantographPart(definition), LumpedPantographPart(definition)
+    first.initialise(50.0, 0.0, POINT, BASE)
+    for _ in range(80):
+        first.step(0.0, POINT, BASE, 1e-3)
+    second.restore(first.snapshot())
+    for _ in range(40):
+        for part in (first, second):
+            part.step(0.0, POINT, BASE, 1e-3)
+    assert np.array_equal(first.strip, second.strip)
+    assert np.array_equal(first.observation_values(), second.observation_values())
+
+
 def test_observed_heights_velocities_and_accelerations_belong_together(cx):
     """By the trapezoidal rule, name by name: z' is vz and vz' is az of the same mass, and the strip is the highest."""
     h = 1e-3

@@ -188,6 +188,30 @@ def test_hangers_weigh_what_hangers_weigh():
     assert moved.tolist() == ends.tolist()
 
 
+def test_a_dropper_swings_about_an_end_that_stands_still_with_a_third_of_its_mass(line_maker):
+    """A bar whose velocity falls evenly to 0 along its length: the kinetic energy of m / 3."""
+    line = line_maker(spans=4)
+    mesh = build_mesh(line)
+    heavier = dataclasses.replace(line, dropper=dataclasses.replace(line.dropper, mass=line.dropper.mass + 1.0))
+    added = assemble(heavier, mesh, mesh.points).M - assemble(line, mesh, mesh.points).M
+    whole = sum(_dropper_lengths(mesh, False))
+    for ends in (mesh.droppers[:, 0], mesh.droppers[:, 1]):
+        for axis in range(3):
+            move = np.zeros((len(mesh.points), NODE_DOFS))
+            move[ends, axis] = 1.0
+            assert move.ravel() @ (added @ move.ravel()) == pytest.approx(whole / 3.0)
+
+
+@pytest.mark.parametrize(("name", "end"), [("dropper_lower", 0), ("dropper_upper", 1)])
+def test_the_claws_of_a_dropper_sit_on_the_wires_that_they_grip(line_maker, name, end):
+    line = line_maker(spans=4)
+    heavier = dataclasses.replace(line, clamps=dataclasses.replace(line.clamps, **{name: 1.0}))
+    added = build_mesh(heavier).clamp_mass - build_mesh(line).clamp_mass
+    expected = np.zeros_like(added)
+    expected[build_mesh(line).droppers[:, end]] = 1.0 - getattr(line.clamps, name)
+    assert added == pytest.approx(expected)
+
+
 def test_hangers_are_as_stiff_as_hangers_are():
     hanger = Dropper(stiffness=3e5, mass=0.1, compression_ratio=0.25)
     line = dataclasses.replace(load_line("Shinkansen"), hanger=hanger)

@@ -235,3 +235,27 @@ def _penetration(model, state, z, speed):
     touch = model.wires[0].touch(element, xi)
     rise, rate = (float(row @ touch.row) for row in local_motion(touch.interval, state.motion))
     return z - (touch.height + rise), speed - rate
+
+
+def test_uplift_and_point_of_contact_move_with_the_wire(model):
+    """A force at a support for a while: the rise there by the nodes' own displacement, and a strip that finds it."""
+    state = model.initial_state()
+    for _ in range(30):
+        model.push(state, 1e-3, [(0, 100.0, 200.0)])
+    nodal = model.displacement(state)[model.mesh.support_nodes]
+    lifted = model.uplift(state)
+    assert lifted == pytest.approx(nodal[:, 2])
+    assert int(np.argmax(lifted)) == int(np.argmin(np.abs(model.mesh.points[model.mesh.support_nodes, 0] - 100.0)))
+    assert lifted.max() > 0.01
+    assert abs(nodal[:, 1]).max() > 1e-6
+    rest = model.contact_at_rest(model.initial_state(), _strip(100.0, 6.0)[None]).point[0, 0]
+    moved = model.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0]
+    assert moved[2] - rest[2] == pytest.approx(lifted.max(), abs=1e-5)
+
+
+def test_a_strip_at_rest_presses_with_a_share_where_the_wire_lies_near_its_end(model):
+    """2 cm from the end of the strip: two fifths of the law, whose edge is 5 cm wide."""
+    state = model.initial_state()
+    at = model.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0]
+    found = model.contact_at_rest(state, _strip(100.0, at[2] + 4e-3, y=at[1] - 0.7 + 0.02)[None])
+    assert found.force[0, 0] == pytest.approx(0.4 * model.definition.contact.stiffness * 4e-3, rel=1e-6)

@@ -76,14 +76,17 @@ def test_gauss_seidel_order_of_slaves_matters_and_is_honoured(fake_slave):
 
 
 def test_after_a_step_the_inputs_are_what_the_slaves_were_told(fake_slave):
-    """Also what the first was told, though its source has gone on since."""
-    network = oscillator(fake_slave)
+    """Also what the first of three was told, though its source, the second, has gone on before the third steps."""
+    slaves = [
+        fake_slave(f"s{i}", ("u",), ("y",), np.array([float(i + 1)]), lambda s, u, t, h: s + h * u, lambda s, u: s)
+        for i in range(3)
+    ]
+    network = Network(slaves, [Connection(f"s{(i + 1) % 3}", "y", f"s{i}", "u") for i in range(3)])
     initialise(network, 0.0, 1.0)
-    x, v = network.outputs
-    GaussSeidel().step(network, 0.0, 0.1)
-    assert network.inputs.tolist() == [v, x + 0.1 * v]
-    GaussSeidel(["velocity", "position"]).step(network, 0.1, 0.1)
-    assert network.inputs.tolist() == [network.outputs[1], x + 0.1 * v]
+    GaussSeidel().step(network, 0.0, 0.5)
+    first = 1.0 + 0.5 * 2.0
+    assert network.inputs.tolist() == [2.0, 3.0, first]
+    assert network.outputs.tolist() == [first, 2.0 + 0.5 * 3.0, 3.0 + 0.5 * first]
 
 
 def test_slaves_may_start_at_times_of_their_own(fake_slave, monkeypatch):

@@ -242,6 +242,10 @@ def test_a_sprung_support_is_a_spring_and_a_damper_under_the_messenger_wire(stif
         expected = value * vertical.ravel()
         assert added.diagonal() == pytest.approx(expected, abs=1e-6 * max(value, 1.0))
         assert abs(added).sum() == pytest.approx(expected.sum(), abs=1e-3)
+    sunk = mesh.points.copy()
+    sunk[mesh.sprung, 2] = mesh.seat - 0.01
+    pushed = assemble(line, mesh, sunk).load - assemble(without, mesh, sunk).load
+    assert pushed == pytest.approx(0.01 * stiffness * vertical.ravel(), abs=1e-6)
 
 
 def test_damping_of_the_whole_is_that_of_its_components(line_maker):

@@ -8,7 +8,7 @@ import pytest
 from models.catenary.limits import longest_step, slack_warning, speed_warning, step_warning, tangent_stiffness
 from models.catenary.parameters import Contact
 from models.catenary.part import CatenaryPart
-from models.catenary.statics import wave_speed
+from models.catenary.statics import contact_wire_wave_speed, wave_speed
 from models.commands import main
 
 
@@ -18,6 +18,13 @@ def test_the_speed_is_compared_with_the_waves_of_the_longest_span(ln2):
     assert "0.71 of the contact wire's wave speed" in speed_warning(ln2, 0.71 * C)
     assert "operated up to 0.7" in speed_warning(ln2, -0.99 * C)
     assert "no wave runs ahead" in speed_warning(ln2, 1.01 * C)
+
+
+def test_waves_are_taken_where_they_are_slowest(ln2):
+    """Bending speeds up waves of short spans: the speed that a train is compared with is that of the longest."""
+    speeds = [wave_speed(ln2.contact_wire, span.length) for span in ln2.sections[0].spans]
+    assert len(set(speeds)) > 1
+    assert contact_wire_wave_speed(ln2) == min(speeds)
 
 
 def test_usual_steps_are_short_enough(ln2):

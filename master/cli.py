@@ -21,6 +21,8 @@ from master import calibrate, checkpoint, export, limits, report, results
 from master.caution import CautionObserver
 from master.checkpoint import Continuation
 from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import EvaluationSettings
 from master.isolation import Isolation
 from master.progress import ProgressObserver
 from master.report import commands
@@ -292,17 +294,27 @@ def _show(done: Results) -> None:
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
-        console.print(report.figures_table([a.quality for a in assessments], heads))
+        console.print(report.figures_table(assessments, heads, done.evaluation.filter))
     for assessment in assessments:
-        console.print(report.verdict_table(assessment))
+        _show_verdict(console, assessment, done.evaluation)
     if not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
-    if line := report.uplift_line(done):
-        console.print(line)
+    for line in filter(None, (report.calibration_line(done), report.uplift_line(done))):
+        console.print(line, markup=False, soft_wrap=True)
     for following in done.followings:
         console.print(following.sentence, markup=False, soft_wrap=True)
     for line in _closing_lines(done):
         console.print(line, markup=False, soft_wrap=True)
+
+
+def _show_verdict(console: Console, assessment: Assessment, settings: EvaluationSettings) -> None:
+    """Print the verdict of a contact, and what makes it less than certain."""
+    console.print(report.verdict_table(assessment, settings.limits))
+    if rows := report.filter_rows(assessment.quality, settings.filter):
+        console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
+        console.print(report.plain_table(report.FILTER_HEADS, rows))
+    if assessment.drift:
+        console.print(f"warning: {assessment.contact.pantograph}: {assessment.drift}", markup=False, soft_wrap=True)
 
 
 def _closing_lines(done: Results) -> list[str]:

@@ -14,7 +14,7 @@ from master import results
 from master.calibrate import Found, find_values
 from master.caution import CautionObserver
 from master.errors import MasterError, UsageError
-from master.results import Results, assess_contacts
+from master.results import Results
 from master.run import run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.simulation import Observer
@@ -162,7 +162,7 @@ def _with_values(system: System, values: dict[str, float]) -> System:
 def _means(system: System, interval: Interval, pantographs: Sequence[str], runner: Runner) -> tuple[float, ...]:
     with tempfile.TemporaryDirectory(prefix="calibrate-") as folder:
         done = runner.run(system, Path(folder))
-        found = assess_contacts(done.recordings, done.contacts, (interval.start, interval.end), ())
+        found = done.assessments_in((interval.start, interval.end))
     means = {a.contact.pantograph: a.quality.mean for a in found}
     missing = [p for p in pantographs if p not in means]
     if missing:

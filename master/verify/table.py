@@ -29,7 +29,7 @@ def show_case(console: Console, outcome: CaseOutcome) -> None:
     """Print a case: its rows, and why runs failed."""
     console.print(case_table(outcome, console.width))
     for line in filter_lines(outcome):
-        console.print(line, style="dim", markup=False, soft_wrap=True)
+        console.print(line, style="dim", markup=False)
     for name, text in outcome.failures.items():
         console.print(f"run '{name}' failed: {text}", style="red", markup=False, soft_wrap=True)
     console.print()

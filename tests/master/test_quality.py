@@ -10,7 +10,6 @@ from master.evaluation.contact_quality import find_losses
 from master.evaluation.en50367_limits import LimitChoice, judge, limits_at
 from master.evaluation.filters import ForceFilter, interval_mask, settled
 
-
 #: The wall is what most of these statements are sharp for; tests/master/evaluation has those of the other filters.
 WALL = ForceFilter("fft")
 STEP = 1e-3

@@ -294,7 +294,7 @@ def _show(done: Results) -> None:
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
-        console.print(report.figures_table(assessments, heads, done.evaluation.filter))
+        console.print(report.figures_table(assessments, heads, [done.evaluation.filter]))
     for assessment in assessments:
         _show_verdict(console, assessment, done.evaluation)
     if not assessments:
@@ -387,17 +387,21 @@ def _calibrate(options: argparse.Namespace) -> int:
         )
         print(
             f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
-            f"({len(found.trials)} runs)"
+            f"({len(found.trials)} runs; filter {_filter_of(system)})"
         )
         if place is not None:
             note = (
-                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) with "
+                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) after {_filter_of(system)}, with "
                 f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
                 f"in {len(found.trials)} runs of 'python -m master calibrate'"
             )
             calibrate.store_value(*place, found.value, note)
             print(f"stored in {place[0]}")
     return 0
+
+
+def _filter_of(system: System) -> str:
+    return results.filter_of(system.settings.filter.model_dump()).short
 
 
 def _task(options: argparse.Namespace, system: System) -> Calibration:

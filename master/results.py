@@ -85,7 +85,7 @@ class Results:
         chosen, limits = settings.get("interval", {}), dict(settings.get("limits", {}))
         supply = limits.pop("supply", "AC")
         return EvaluationSettings(
-            _filter(settings.get("filter")),
+            filter_of(settings.get("filter")),
             (chosen.get("start"), chosen.get("end")),
             LimitChoice(supply, OwnLimits(**limits)),
             settings.get("start"),
@@ -300,8 +300,8 @@ def filter_data(chosen: ForceFilter) -> dict[str, Any]:
     return known if chosen.kind == "butterworth" else {**known, "order": None, "phase": None}
 
 
-def _filter(told: Mapping[str, Any] | None) -> ForceFilter:
-    """Return the filter that a run was made with, from its summary."""
+def filter_of(told: Mapping[str, Any] | None) -> ForceFilter:
+    """Return the filter that a run was made with, from its settings."""
     if told is None:
         return BEFORE_CHOICE
     return ForceFilter(**{name: value for name, value in told.items() if value is not None})

@@ -113,7 +113,7 @@ def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]]
     console = Console(width=_WIDTH, highlight=False)
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
-    console.print(report.figures_table([c.assessment for c in found], heads, runs[0].evaluation.filter))
+    console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
     if note := compare.filter_note(runs):
         console.print(f"warning: {note}", markup=False, soft_wrap=True)
     for folder, differences in zip(options.others, pairs, strict=True):

@@ -134,9 +134,10 @@ def verdict_table(assessment: Assessment, limits: LimitChoice) -> Table:
 _COLOURS: Final = {"passed": "green", "at the limit": "yellow", "failed": "red"}
 
 
-def figures_table(assessments: Sequence[Assessment], heads: Sequence[str], chosen: ForceFilter) -> Table:
+def figures_table(assessments: Sequence[Assessment], heads: Sequence[str], filters: Sequence[ForceFilter]) -> Table:
     """Return the figures of several contacts or runs side by side for a terminal of 80 columns."""
-    table = Table(title=f"Figures, {chosen.band} ({chosen.short})", title_justify="left", width=78)
+    told = "; ".join(dict.fromkeys(f"{f.band}, {f.short}" for f in filters))
+    table = Table(title=escape(f"Figures ({told})"), title_justify="left", width=78)
     table.add_column("figure", no_wrap=True)
     for head in heads:
         table.add_column(escape(head), justify="right", overflow="fold")

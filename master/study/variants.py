@@ -137,6 +137,7 @@ def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[
             runner.tell(", ".join(f"{n} = {v:.5g}: {m:.2f} N" for n, v, m in zip(names, values, found, strict=True)))
             return found
 
+        runner.tell(f"filter: {results.filter_of(system.settings.filter.model_dump()).sentence}")
         return dict(zip(names, find_values(means, wanted.mean_force, starts, wanted.tolerance), strict=True))
 
 

@@ -103,16 +103,19 @@ class Results:
 
     def assessments(self) -> tuple[Assessment, ...]:
         """Return figures and verdict of every contact that has samples in the interval."""
-        return self._assessments
+        return self.assessments_in(self.interval)
+
+    def assessments_in(self, interval: tuple[float | None, float | None]) -> tuple[Assessment, ...]:
+        """Return figures and verdict of every contact that has samples in another interval [m]."""
+        if interval not in self._assessed:
+            chosen = replace(self.evaluation, interval=interval)
+            self._assessed[interval] = assess_contacts(self.recordings, self.contacts, self.geometry, chosen)
+        return self._assessed[interval]
 
     @cached_property
-    def _assessments(self) -> tuple[Assessment, ...]:
-        return assess_contacts(self.recordings, self.contacts, self.geometry, self.evaluation)
-
-    def assessments_in(self, interval: tuple[float, float]) -> tuple[Assessment, ...]:
-        """Return figures and verdict of every contact that has samples in another interval [m]."""
-        chosen = replace(self.evaluation, interval=interval)
-        return assess_contacts(self.recordings, self.contacts, self.geometry, chosen)
+    def _assessed(self) -> dict[tuple[float | None, float | None], tuple[Assessment, ...]]:
+        """What was assessed once, by interval: pages and tables ask again and again."""
+        return {}
 
     @property
     def events(self) -> tuple[Event, ...]:

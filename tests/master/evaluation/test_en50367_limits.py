@@ -93,6 +93,10 @@ def test_a_verdict_that_another_filter_would_turn_says_so():
     found = row(judge(near, LimitChoice()), "maximum force")
     assert found.passed
     assert found.remark == "the filter decides: failed at 352.0 N with fft 20 Hz"
+    turned = dataclasses.replace(base, maximum=352.0, others=(dataclasses.replace(other, maximum=349.0),))
+    assert row(judge(turned, LimitChoice()), "maximum force").remark.startswith("the filter decides: passed at 349.0 N")
+    both = dataclasses.replace(base, maximum=352.0, others=(dataclasses.replace(other, maximum=353.0),))
+    assert row(judge(both, LimitChoice()), "maximum force").remark == ""
     far = dataclasses.replace(base, maximum=300.0, others=(dataclasses.replace(other, maximum=310.0),))
     assert row(judge(far, LimitChoice()), "maximum force").remark == ""
 

@@ -217,6 +217,9 @@ def test_couple_and_master_tell_the_same_figures_of_the_same_record(coupled, tmp
     line, pantograph, record = coupled
     ours = Evaluated.of(record, line, pantograph.strip_offset, interval, chosen)
     write_timeseries(tmp_path / "timeseries.csv", ours)
+    touches = record.contact_force[:, 0] > 0.0
+    assert ours.sampled.position[touches] == pytest.approx(record.contact_point[touches, 0, 0], abs=1e-12)
+    assert ours.sampled.position == pytest.approx(300.0 + pantograph.speed * record.time, abs=1e-6)
     recording = load(tmp_path / "timeseries.csv")
     geometry = {"catenary": {f"support[{i}].x": float(x) for i, x in enumerate(ours.supports, 1)}}
     settings = EvaluationSettings(chosen, interval, begin=0.0)

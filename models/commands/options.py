@@ -48,6 +48,9 @@ def chosen_filter(arguments: argparse.Namespace) -> ForceFilter:
         raise ParameterError("--filter fft: has neither order nor phase; leave --filter-order and --filter-phase out")
     if order is not None and not 1 <= order <= _HIGHEST_ORDER:
         raise ParameterError(f"--filter-order {order}: must lie between 1 and {_HIGHEST_ORDER}")
+    if 2.0 * arguments.cutoff * arguments.step >= 1.0:
+        half = f"half the sampling frequency, {0.5 / arguments.step:g} Hz at --step {arguments.step:g}"
+        raise ParameterError(f"--cutoff {arguments.cutoff:g}: must lie below {half}, or nothing is filtered")
     return ForceFilter(arguments.filter, order or DEFAULT.order, arguments.cutoff, phase or DEFAULT.phase)
 
 

@@ -25,6 +25,7 @@ from master.study.family import Interval
 from master.study.figures import entries
 from master.verify.quantities import QUANTITIES, Choice
 from models.catenary.model import CatenaryModel
+from models.commands import main as physics
 from models.commands.couple import Evaluated, write_timeseries
 from models.coupled import CoupledModel
 from models.library import load_line, load_lumped
@@ -77,6 +78,7 @@ def test_the_filter_is_in_the_summary_and_changes_the_figures(toy, toy_text, tmp
         ('<panto:Filter kind="fft" order="6"/>', "the filter fft has no order"),
         ('<panto:Filter kind="fft" phase="causal"/>', "the filter fft has no phase"),
         ('<panto:Filter/><panto:Filter kind="fft"/>', "Filter is given 2 times"),
+        ('<panto:Filter cutoff="500"/>', "is not below half the sampling frequency, 500 Hz"),
         ('<panto:Limits supply="3kV"/>', "Limits supply"),
         ('<panto:Limits maximum="0"/>', "Limits maximum"),
         ('<panto:Limits meanUpper="100" meanLower="120"/>', "must lie below"),
@@ -209,6 +211,19 @@ def coupled():
     line = CatenaryModel(load_line("generic_simple"))
     pantograph = load_lumped("CX").with_values({"start_position": 300.0, "raise_duration": 0.1, "static_force": 170.0})
     return line, pantograph, CoupledModel(line, [pantograph]).run(3.0, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--filter", "fft", "--filter-order", "6"], "has neither order nor phase"),
+        (["--filter-order", "0"], "--filter-order 0: must lie between 1 and 20"),
+        (["--cutoff", "500"], "must lie below half the sampling frequency, 500 Hz"),
+    ],
+)
+def test_a_filter_that_cannot_be_meant_ends_couple_before_its_run(capsys, options, said):
+    assert physics(["couple", "generic_simple", "CX", *options]) != 0
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("interval", [(None, None), (420.0, 520.0)])

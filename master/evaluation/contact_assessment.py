@@ -89,13 +89,14 @@ class Assessment:
 
     @property
     def drift(self) -> str:
-        """A warning if sigma drifts along the spans of the interval, else empty."""
-        inside = [s for s in self.spans if s.is_inside]
-        if not drifts([s.sigma for s in inside]):
+        """A warning if sigma drifts along the spans that are passed, else empty: then the run has not settled."""
+        if not drifts([s.sigma for s in self.spans]):
             return ""
+        first, last = self.spans[0], self.spans[-1]
         return (
-            f"sigma still drifts along the line: {inside[0].sigma:.1f} N in the first span of the interval, "
-            f"{inside[-1].sigma:.1f} N in the last one of {len(inside)}; begin the interval later, on a longer line"
+            f"sigma still drifts along the line, over {len(self.spans)} spans: {first.sigma:.1f} N in the one from "
+            f"{first.start:.0f} m, {last.sigma:.1f} N in the one from {last.start:.0f} m; its figures are those of this "
+            "interval, not of the pair on a long line"
         )
 
 

@@ -89,13 +89,13 @@ class Assessment:
 
     @property
     def drift(self) -> str:
-        """A warning if sigma drifts along the spans that are passed, else empty: then the run has not settled."""
+        """A warning if sigma drifts along the spans that are passed, for the run has not settled then; else empty."""
         if not drifts([s.sigma for s in self.spans]):
             return ""
         first, last = self.spans[0], self.spans[-1]
         return (
             f"sigma still drifts along the line, over {len(self.spans)} spans: {first.sigma:.1f} N in the one from "
-            f"{first.start:.0f} m, {last.sigma:.1f} N in the one from {last.start:.0f} m; its figures are those of this "
+            f"{first.start:.0f} m, {last.sigma:.1f} N in the one from {last.start:.0f} m; figures are those of this "
             "interval, not of the pair on a long line"
         )
 

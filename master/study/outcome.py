@@ -147,11 +147,13 @@ def as_csv(outcome: Outcome) -> str:
     writer = csv.writer(text, lineterminator="\n")
     heads = [f"{title} [{unit}]" for title, unit, _, _ in FIGURES]
     sharing = ["both wires from [m]", "both wires to [m]", "both wires [s]", "least total force [N]", "losses per wire"]
-    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", *sharing])
+    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", "filter", *sharing])
+    told = {d.name: d.results.evaluation.filter.short for d in outcome.done}
     for interval in outcome.family.settings.interval:
         for e in outcome.entries(interval):
             values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
-            writer.writerow([e.variant, interval.name, e.pantograph, *values, verdict(e), *_sharing_cells(e)])
+            cells = [*values, verdict(e), told[e.variant], *_sharing_cells(e)]
+            writer.writerow([e.variant, interval.name, e.pantograph, *cells])
     return text.getvalue()
 
 

@@ -365,7 +365,7 @@ def unpack(data: bytes) -> Checkpoint:
 def _foreign(data: bytes) -> str:
     """Return what is wrong with bytes that do not begin as a checkpoint of this version does."""
     if not data.startswith(_FAMILY):
-        return "is no checkpoint"
+        return "is not a checkpoint"
     found, own = (raw.partition(b"\n")[0].removeprefix(_FAMILY).decode("ascii", "replace") for raw in (data, MAGIC))
     return f"is a checkpoint of format {one_line(found[:20])}, this version reads {own}: begin the run anew"
 

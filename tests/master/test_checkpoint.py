@@ -166,5 +166,5 @@ def test_a_checkpoint_of_another_version_is_refused_in_one_sentence(tmp_path):
     with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 1: begin the run anew"):
         checkpoint.read(path)
     path.write_bytes(b"something else")
-    with pytest.raises(MasterError, match="is no checkpoint"):
+    with pytest.raises(MasterError, match="is not a checkpoint"):
         checkpoint.read(path)

@@ -166,7 +166,7 @@ def _figure(rows: int, height: float) -> tuple[Figure, Sequence[Any]]:
 
 def _mark_line(axes: Any, results: Results, catenary: str, shown: tuple[float, float]) -> None:
     """Mark interval of interest, supports (dashed) and droppers (ticks at the bottom)."""
-    start, end = results.interval
+    start, end = results.evaluated_interval
     if start is not None or end is not None:
         first, last = shown[0] if start is None else start, shown[1] if end is None else end
         axes.axvspan(first, last, color=_INTERVAL, alpha=0.6, linewidth=0, label="interval of interest")

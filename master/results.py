@@ -24,7 +24,7 @@ from master.contacts import Contact
 from master.durable import PART, write_whole
 from master.energy import Balance, drift_events, find_balances
 from master.errors import MasterError
-from master.evaluation.contact_assessment import Assessment, assess_contacts
+from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, force_table
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits
 from master.evaluation.filters import BEFORE_CHOICE, ForceFilter
@@ -77,6 +77,14 @@ class Results:
     def interval(self) -> tuple[float | None, float | None]:
         """The interval of interest [m]; None where it is open."""
         return self.evaluation.interval
+
+    @property
+    def evaluated_interval(self) -> tuple[float | None, float | None]:
+        """Where along the track the figures come from [m]; an open bound is that of the contact with most of it."""
+        found = [interval_of(a.quality, self.interval) for a in self.assessments()]
+        if not found or None not in self.interval:
+            return self.interval
+        return min(low for low, _ in found), max(high for _, high in found)
 
     @cached_property
     def evaluation(self) -> EvaluationSettings:

@@ -183,8 +183,8 @@ def _ticks(x: FloatArray, name: str, dash: str, width: float, span: tuple[float,
 
 
 def interval_shape(results: Results, limits: tuple[float, float]) -> list[Figure]:
-    """Return the interval of interest as a shaded band, if there is one."""
-    start, end = results.interval
+    """Return the interval that the figures come from as a shaded band, if there is one."""
+    start, end = results.evaluated_interval
     if start is None and end is None:
         return []
     x0, x1 = limits[0] if start is None else start, limits[1] if end is None else end

@@ -18,6 +18,7 @@ from master.evaluation.contact_signals import EvaluationSettings, contact_signal
 from master.evaluation.filters import BEFORE_CHOICE, DEFAULT, SETTLING, ForceFilter
 from master.recorder import Recording, load
 from master.report import figure_rows
+from master.report.charts import interval_shape
 from master.results import Results
 from master.run import run
 from master.scenario import Overrides, open_scenario
@@ -110,6 +111,8 @@ def test_without_an_interval_figures_begin_after_the_raising(toy, toy_text, tmp_
     assert begin == pytest.approx(signals.time[first] + SETTLING, abs=1.5e-3)
     quality = done.assessments()[0].quality
     assert (quality.start, quality.end) == pytest.approx((50.0 * begin, 125.0), abs=0.1)
+    (band,) = interval_shape(done, (0.0, 125.0))  # drawn as it was evaluated
+    assert (band["x0"], band["x1"]) == pytest.approx((quality.start, quality.end))
 
 
 def made_up(bump=0.05, where=(50.0, 100.0, 150.0), moment=0.3):

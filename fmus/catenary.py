@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from fmus.adapter import Adapter
 from fmus.ports import Port, Ports, Signal, energy_ports, vector
-from models.catenary.limits import slack_warning, speed_warning, step_warning
+from models.catenary.limits import slack_law_warning, slack_warning, speed_warning, step_warning
 from models.catenary.parameters import CatenaryDefinition, load
 from models.catenary.part import CatenaryPart
 from models.part import FloatArray
@@ -35,6 +35,8 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Displacements are small against the spans: geometry is linearised about the static shape.",
+        "Droppers and steady arms are held back across their axes by their tension at rest (dynamics.geometric_stiffness, "
+        "0 to do without); a dropper that goes slack in the run keeps that, an error of second order in a lateral force.",
         "The contact is unilateral, without friction along the strip.",
         "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
@@ -68,6 +70,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     def _doubts(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
         along_track = inputs.reshape(self.pantographs, 2, 2, 3)[:, :, 1, 0]
         yield slack_warning(part.droppers, part.model.static.dropper_force)
+        yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 
     def _step_doubt(self, part: CatenaryPart, step: float) -> str:

@@ -86,6 +86,7 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     warn([
         limits.speed_warning(definition, arguments.speed / 3.6),
         limits.slack_warning(part.droppers, model.static.dropper_force),
+        limits.slack_law_warning(definition),
     ])
     return LineStatics(
         model=model,

@@ -56,7 +56,8 @@ class LineBalance:
         """Advance the line by one time step; see `CatenaryModel.step`."""
         np.copyto(self._modal, state.motion.modal[0])
         np.copyto(self._attached, state.motion.attached[0])
-        loads, slack, released = [(state.loaded, state.load)], [(state.slack, state.compensation)], self._released(state)
+        loads, slack = [(state.loaded, state.load)], [(state.slack, state.compensation)]
+        released = self._released(state)
         result = self._model.step(state, step, motion)
         np.subtract(state.motion.modal[0], self._modal, out=self._modal)
         np.subtract(state.motion.attached[0], self._attached, out=self._attached)

@@ -325,7 +325,7 @@ class CatenaryModel:
         return force
 
     def spring_force(self, state: CatenaryState) -> FloatArray:
-        """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where it is too long."""
+        """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""
         force = self.static.elastic_force.copy()
         self._tighten.add(state.motion.attached[0], force)
         return force

@@ -175,8 +175,8 @@ class Dynamics:
         default=0.0, minimum=0.0, maximum=1e9,
     )  # fmt: skip
     geometric_stiffness: int = count(
-        "whether the tension of droppers and steady arms holds them back as pendulums, by N/L across them: 1 yes, 0 no, "
-        "as in the 2012 thesis",
+        "whether the tension of droppers and steady arms holds them back as pendulums, by N/L across them: 1 yes, "
+        "0 no, as in the 2012 thesis",
         default=1, minimum=0, maximum=1,
     )  # fmt: skip
 

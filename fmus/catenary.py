@@ -36,8 +36,10 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     limits: ClassVar[tuple[str, ...]] = (
         "Displacements are small against the spans: geometry is linearised about the static shape.",
         "Droppers and steady arms are held back across their axes by their tension at rest, unless "
-        "dynamics.geometric_stiffness is 0; a dropper that goes slack in the run keeps that, an error of second order in "
-        "a lateral force.",
+        "dynamics.geometric_stiffness is 0; a dropper that goes slack in the run keeps that, an error of second order "
+        "in a lateral force.",
+        "What a slack dropper does is the definition's slack_law: with tension it carries nothing, with elastic_only, "
+        "the form of the 2012 thesis, its damper goes on acting, beside the elastic force that dropper[...].force is.",
         "The contact is unilateral, without friction along the strip.",
         "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "

@@ -169,9 +169,10 @@ class CatenaryModel:
             self.modes = self._modes([part for parts in by_wire for part in parts])
         self.B = self._dropper_rows()
         self._rest_load = self.B.T @ self.rest_compensation
-        #: Elastic forces of the droppers from the attachments' displacements; those of their dampers from velocities.
+        #: Elastic forces of the droppers from the attachments' displacements; from velocities what counts beside them.
         self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
-        self._damp = Product(definition.damping.of("dropper").alpha * sp.diags(self.dropper_stiffness) @ self.B)
+        self._damp = Product(sp.diags(self.slack_delay * self.dropper_stiffness) @ self.B)
+        self._delayed = bool(self.slack_delay.any())
         #: Their pulls at the end of a step from the attachments' motion at its beginning; `_Step.pull` finds the rest.
         self._pull = self._pulls()
         #: What each of them pulls at.
@@ -310,18 +311,17 @@ class CatenaryModel:
         return self._in_lap(result, strips)
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
-        """Return the force that every dropper carries under its law [N], shape (n_droppers,).
+        """Return the tension of every dropper under its law [N], shape (n_droppers,): 0 where it is slack.
 
-        That is 0 where a dropper is slack, by the law "tension"; by "elastic_only" what its damper then goes on
-        carrying, and pushing is not excluded.
+        By the law "tension" that is all that the dropper carries, its damper's part included. By "elastic_only" it is
+        the elastic force; the damper, which knows no slack there, belongs to the proportional damping of the line and
+        comes on top, as it does in the wires.
         """
-        force, damper = self.spring_force(state), np.zeros(len(self.dropper_stiffness))
-        self._damp.add(state.motion.attached[1], damper)
-        together = self.slack_delay > 0.0
-        force[together] += damper[together]
+        force = self.spring_force(state)
+        if self._delayed:
+            self._damp.add(state.motion.attached[1], force)
         slack = state.slack
         force[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, force[slack] + state.compensation)
-        force[~together] += damper[~together]
         return force
 
     def spring_force(self, state: CatenaryState) -> FloatArray:

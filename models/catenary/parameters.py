@@ -66,8 +66,8 @@ class Dropper:
     """A dropper: carries tension only.
 
     With k its stiffness, e its elongation and c = alpha k what its damping makes of that, ``slack_law`` says what it
-    carries: with "tension" N = max(0, k e + c e'), nothing where it is slack; with "elastic_only" max(0, k e) + c e',
-    its damper being left to it where its spring is slack, as the 2012 thesis has it [2.11].
+    carries: with "tension" N = max(0, k e + c e'), nothing where it is slack; with "elastic_only" N = max(0, k e), and
+    c e' beside it whether it is slack or not, as the 2012 thesis has it [2.11].
     """
 
     stiffness: float | None = quantity(

@@ -31,14 +31,6 @@ def pulls(model, elongation, rate):
     return model.static.elastic_force + model.dropper_stiffness * (elongation + together * alpha * rate)
 
 
-def carried(model, elongation, rate):
-    """Return what droppers carry [N]: max(0, k e + c e') or max(0, k e) + c e'."""
-    alpha = model.definition.damping.of("dropper").alpha
-    together = np.array([_dropper(model, hanger).slack_law == "tension" for hanger in model.mesh.is_hanger])
-    damper = alpha * model.dropper_stiffness * rate
-    return np.maximum(pulls(model, elongation, rate), 0.0) + ~together * damper
-
-
 def _dropper(model, is_hanger):
     return model.definition.hanger if is_hanger else model.definition.dropper
 

@@ -57,7 +57,7 @@ def go(catenary, pantograph, stop, step=1e-3):
 @pytest.mark.parametrize("alpha", [0.0, 1e-3])
 def test_a_line_left_to_itself_loses_what_its_dampers_take(line_maker, kernel, alpha, law):
     """Droppers slacken; what they then do not carry belongs to the line."""
-    part, given = shaken(with_law(line_maker(spans=4, alpha=alpha), law), 0.05)
+    part, given = shaken(with_law(line_maker(spans=4, alpha=alpha), law), 0.2 if law == "tension" else 0.05)
     slack = 0
     for _ in range(300):
         part.step(NOWHERE, 1e-3)
@@ -98,9 +98,10 @@ def test_slack_droppers_take_energy_as_their_law_has_it(line_maker):
     }  # fmt: skip
     lost = {}
     for law in ("tension", "elastic_only"):
-        part, _ = shaken(with_law(line_maker(spans=4, damping=damping), law), 0.05)
+        part, _ = shaken(with_law(line_maker(spans=4, damping=damping), law), 0.2)
+        part.step(NOWHERE, 2.5e-4)  # the velocities came out of nothing, and with them what dampers carry
         model, state = part.model, part.state
-        lost[law], absorbed, slack = [], 0.0, 0
+        lost[law], absorbed, slack = [part.energy[1]], 0.0, 0
         before = _absorbed(model, state)
         for _ in range(200):
             part.step(NOWHERE, 2.5e-4)
@@ -109,8 +110,8 @@ def test_slack_droppers_take_energy_as_their_law_has_it(line_maker):
             before = now
             lost[law].append(part.energy[1])
             slack = max(slack, state.slack.size)
-        assert slack > 0
-        assert lost[law][-1] == pytest.approx(absorbed, rel=1e-9)
+        assert slack >= 3
+        assert lost[law][-1] - lost[law][0] == pytest.approx(absorbed, rel=1e-9)
         assert np.diff(lost[law]).min() > -1e-9 * lost[law][-1]
     assert lost["tension"][-1] != pytest.approx(lost["elastic_only"][-1], rel=1e-3)
 

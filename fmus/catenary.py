@@ -61,7 +61,9 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
             local=(_dropper_port(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
-            calculated=(*_geometry_ports(part), *_section_ports(part), *_period_ports(part), _wave_port()),
+            calculated=(
+                *_geometry_ports(part), *_section_ports(part), *_period_ports(part), _wave_port(), _elasticity_port(),
+            ),  # fmt: skip
         )
 
     def _initialise(self, part: CatenaryPart, time: float, inputs: FloatArray) -> None:
@@ -174,6 +176,15 @@ def _period_ports(part: CatenaryPart) -> tuple[Port, ...]:
 def _wave_port() -> Port:
     signal = Signal("contact_wire.wave_speed", "m/s", "speed of transverse waves in the contact wire, longest span")
     return Port((signal,), attrgetter("contact_wire_wave_speed"))
+
+
+def _elasticity_port() -> Port:
+    text = "static uplift per force under 100 N in the middle span"
+    signals = (
+        Signal("elasticity.mid_span", "m/N", f"{text}, at its middle"),
+        Signal("elasticity.support", "m/N", f"{text}, at its first support"),
+    )
+    return Port(signals, attrgetter("elasticity"))
 
 
 def _length_port(thing: str, count: int, name: str, attribute: str, text: str) -> Port:

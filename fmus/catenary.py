@@ -62,8 +62,12 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
             local=(_dropper_port(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
             calculated=(
-                *_geometry_ports(part), *_section_ports(part), *_period_ports(part), _wave_port(), _elasticity_port(),
-            ),  # fmt: skip
+                *_geometry_ports(part),
+                *_section_ports(part),
+                *_period_ports(part),
+                _wave_port(),
+                _elasticity_port(),
+            ),
         )
 
     def _initialise(self, part: CatenaryPart, time: float, inputs: FloatArray) -> None:

@@ -105,11 +105,14 @@ class ArmLoads:
         Lateral force of the contact wire on the arm [N], positive where the arm is in tension.
     lift : ndarray
         Vertical force of the arm's tension on the contact wire [N], positive up; its weight comes on top.
+    pendulum : ndarray
+        What the arm resists motion across its axis with, N/l [N/m].
     """
 
     x: FloatArray
     lateral: FloatArray
     lift: FloatArray
+    pendulum: FloatArray
 
 
 @dataclass(frozen=True)
@@ -210,12 +213,14 @@ def arm_loads(model: CatenaryModel, section: int = 0) -> ArmLoads:
     chosen = mesh.section[mesh.arms[:, 1]] == section
     end, node = mesh.arms[chosen].T
     along = static.points[node] - static.points[end]
-    along /= np.linalg.norm(along, axis=1)[:, None]
+    length = np.linalg.norm(along, axis=1)
+    along /= length[:, None]
     tension = static.arm_force[chosen]
     return ArmLoads(
         static.positions[node, 0],
         tension * np.linalg.norm(along[:, :2], axis=1),
         -tension * along[:, 2],
+        np.maximum(tension, 0.0) / length,
     )
 
 

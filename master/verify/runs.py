@@ -93,7 +93,7 @@ class Runs:
     def _make(self, wanted: _Wanted) -> str:
         """Make a run, unless there is one, and return the key under which it is kept."""
         try:
-            overrides = Overrides(parameters={name: repr(value) for name, value in wanted.values})
+            overrides = Overrides(parameters={name: f"{value:.17g}" for name, value in wanted.values})
             with open_scenario(wanted.path, overrides, self.tell, self.build) as scenario:
                 return self._run(scenario.system, wanted.start_only)
         except InterruptedRunError:

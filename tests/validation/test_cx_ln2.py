@@ -63,7 +63,7 @@ def _uplift(run, x):
     [("mean", 157.5, 0.5), ("sigma", 39.5, 6.5), ("maximum", 252.0, 23.0), ("minimum", 82.5, 26.5)],
 )
 def test_contact_force_of_table_5_7(cx_ln2, figure, middle, band):
-    """The mean is set; of the rest the source leaves open so much that untuned readings of the pair span these bands."""
+    """The mean is set; the source leaves so much open that untuned readings span these bands in the rest."""
     assert cx_ln2.quality[figure] == pytest.approx(middle, abs=band)
 
 

@@ -30,6 +30,7 @@ class UnitChecks:
             self._of_fmus = {**fmu.units, **self._of_fmus}
         self._problems = problems
         self._unknown: set[str] = set()
+        self._unlike: set[tuple[str, int, str, str]] = set()
 
     def convert(
         self,
@@ -65,7 +66,10 @@ class UnitChecks:
             return Conversion()
         found = conversion(known[source], known[target])
         if found is None:
-            self._report(line, f"{where}: '{source}' and '{target}' do not measure the same thing", file)
+            # A connection that many components are reached by is told once.
+            if (file, line, source, target) not in self._unlike:
+                self._report(line, f"{where}: '{source}' and '{target}' do not measure the same thing", file)
+            self._unlike.add((file, line, source, target))
             return Conversion()
         return found
 

@@ -256,11 +256,13 @@ class Checker:
 
     def _check_counts(self, connections: tuple[SystemConnection, ...]) -> None:
         counts = Counter((c.target, c.input) for c in connections)
-        for component, connector in self._inputs():
-            count = counts[component.name, connector.name]
-            if count > 1:
-                text = f"input '{component.name}.{connector.name}' has {count} connections; one is allowed"
-                self._report(connector.line, "connection", text)
+        counts.update((f.element, f.connector) for f in self._structure.feeds if not f.is_fed)
+        for component in self._structure.components:
+            for connector in component.connectors:
+                count = counts[component.name, connector.name]
+                if count > 1:
+                    what = f"{connector.kind} '{component.name}.{connector.name}'"
+                    self._report(connector.line, "connection", f"{what} has {count} connections; one is allowed")
 
     def _inputs(self) -> Iterator[tuple[Component, Connector]]:
         for component in self._structure.components:

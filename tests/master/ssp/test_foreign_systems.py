@@ -191,6 +191,23 @@ def test_conversions_on_the_way_are_applied_in_turn(scenario):
         assert opened(scenario(told)).components[0].parameters["k"] == pytest.approx(0.5 * (millinewton / scale) + 1, rel=1e-12)
 
 
+@pytest.mark.parametrize(("kind", "end"), [("parameter", "k"), ("input", "u")])
+def test_two_connectors_of_systems_do_not_lead_to_one_place(scenario, kind, end):
+    own = connectors(connector("v", kind), connector("w", kind))
+    bound = values(("v", 'Real value="2"'), ("w", 'Real value="3"'))
+    wires = wire(".v", f"a.{end}") + wire(".w", f"a.{end}")
+    found = problems(scenario(ssd(system(component("a", U, K), wires, own, bound))))
+    assert [f"{kind} 'a.{end}' has 2 connections; one is allowed" in p for p in found] == [True]
+
+
+def test_a_unit_that_does_not_fit_is_told_once(scenario):
+    inner = system(component("a", U) + component("b", U), wire(".v", "a.u") + wire(".v", "b.u"),
+                   connectors(connector("v", "input", 'Real unit="m"')), name="inner")  # fmt: skip
+    outer = system(component("c", connector("y", "output", 'Real unit="N"')) + inner, wire("c.y", "inner.v"))
+    found = problems(scenario(ssd(outer)))
+    assert ["'N' and 'm' do not measure the same thing" in p for p in found] == [True]
+
+
 def test_values_that_reach_nothing_are_told(scenario):
     own = connectors(connector("idle", "parameter"), connector("out", "output"))
     bound = values(("idle", 'Real value="1"'), ("out", 'Real value="1"'))

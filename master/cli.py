@@ -205,7 +205,7 @@ def _overrides(options: argparse.Namespace) -> Overrides:
     outside = tuple(options.allow_outside)
     for folder in outside:
         if not folder.is_dir():
-            raise UsageError(f"--allow-outside {folder}: there is no such folder")
+            raise MasterError(f"--allow-outside {folder}: there is no such folder")
     return Overrides(
         options.stop,
         options.step,
@@ -350,7 +350,7 @@ def _closing_lines(done: Results) -> list[str]:
     ]
     lines += _energy_lines(done.summary["energy"])
     if tolerance := _told_tolerance({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
-        lines.append(f"FMUs were told{tolerance.removeprefix(',')}")
+        lines.append(tolerance.removeprefix(", "))
     return [*lines, *_punctuality_lines(performance.get("real_time")), f"results in {done.folder}"]
 
 

@@ -73,10 +73,11 @@ def _outputs(done: Results, charts: list[Chart]) -> list[str]:
     return ["<section id='outputs'><h2>Outputs</h2>", table, *map(markup.chart, charts), "</section>"]
 
 
-def _head(summary: dict[str, Any], assessments: tuple[Assessment, ...], is_coupling: bool) -> str:
+def _head(summary: dict[str, Any], assessments: tuple[Assessment, ...], is_coupling: bool = True) -> str:
     complete = summary.get("status") == "complete"
     name = markup.text(summary.get("scenario", ""))
-    parts = [f"<section id='verdict'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
+    key = "verdict" if is_coupling else "run"
+    parts = [f"<section id='{key}'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
     parts.append(_cautions(summary))
     parts += [markup.verdict(a, a.contact.pantograph, complete) for a in assessments]
     if not assessments and is_coupling:

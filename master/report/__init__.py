@@ -6,6 +6,7 @@ from pathlib import Path
 
 from master import plots, results
 from master.report.measured import Comparison, comparison_rows
+from master.report.output_charts import has_contacts, output_plots, outputs_table
 from master.report.page import page
 from master.report.tables import (
     FILTER_HEADS,
@@ -27,7 +28,9 @@ __all__ = [
     "figure_rows",
     "figures_table",
     "filter_rows",
+    "has_contacts",
     "headlines",
+    "outputs_table",
     "page",
     "plain_table",
     "uplift_line",
@@ -40,7 +43,8 @@ def write(done: Results, measured: Comparison | None = None) -> Path:
     """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
     path = done.folder / results.REPORT
     path.write_text(page(done, measured), encoding="utf-8")
-    for name, figure in plots.all_plots(done).items():
+    figures = plots.all_plots(done) if has_contacts(done) else output_plots(done)
+    for name, figure in figures.items():
         figure.savefig(done.folder / f"{name}.svg", metadata={"Date": None})
         figure.savefig(done.folder / f"{name}.png", dpi=130)
     return path

@@ -121,7 +121,7 @@ def verdict_table(assessment: Assessment, limits: LimitChoice) -> Table:
     q = assessment.quality
     where = f"{q.start:.0f}-{q.end:.0f} m, {3.6 * q.speed:.0f} km/h"
     table = Table(title=escape(f"{limits.title}, {assessment.contact.pantograph}, {where}"), title_justify="left")
-    table.width = 78
+    table.width, table.pad_edge = 78, False  # the longest verdict and limit fit in
     for head in ("figure", "value", "limit", "origin", "verdict"):
         table.add_column(head, justify="left" if head in ("figure", "origin") else "right", no_wrap=True)
     for c in assessment.criteria:
@@ -173,5 +173,6 @@ def calibration_line(done: Results) -> str:
     found = [a for a in done.assessments() if wanted and a.quality.contact == wanted.get("contact", 1)]
     if not found:
         return ""
-    target, mean = wanted["mean_force"], found[0].quality.mean
-    return f"target of the calibration (no limit): mean force {target:g} N; it is {mean - target:+.1f} N off"
+    target = wanted["mean_force"]
+    off = round(found[0].quality.mean - target, 1) + 0.0  # not minus nothing
+    return f"target of the calibration (no limit): mean force {target:g} N; it is {off:+.1f} N off"

@@ -1,13 +1,18 @@
 """Limits by supply system and speed, at their limits, and where the filter decides."""
 
 import dataclasses
+import io
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from master.contacts import Contact
+from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_quality import Filtered, assess
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits, judge, limits_at
 from master.evaluation.filters import DEFAULT
+from master.report import verdict_table
 
 STEP = 1e-3
 TIME = np.arange(8001) * STEP
@@ -16,7 +21,7 @@ TIME = np.arange(8001) * STEP
 def quality(mean, spread=20.0, speed=300.0):
     """Figures of a sine of 2 Hz about a mean."""
     v = speed / 3.6
-    return assess(mean + spread * np.sin(4 * np.pi * TIME), v * TIME, STEP, DEFAULT, (v, 7.0 * v))
+    return assess(mean + spread * np.sin(4 * np.pi * TIME), v * TIME, STEP, DEFAULT, (v, 7.0 * v), 5.0 + 0.0 * TIME)
 
 
 def row(found, name):
@@ -60,6 +65,15 @@ def test_the_mean_lies_between_two_limits(mean, word):
     found = row(judge(quality(mean), LimitChoice()), "mean force")
     assert (found.word, found.passed) == (word, word != "failed")
     assert found.limit == "102.3 to 157.3 N"
+
+
+def test_the_longest_words_fit_into_80_columns():
+    figures = quality(157.5)
+    found = Assessment(Contact(1, "line", "train", "line.contact"), figures, judge(figures, LimitChoice(), [0.05]))
+    console = Console(width=80, file=io.StringIO())
+    console.print(verdict_table(found, LimitChoice()))
+    assert "at the limit" in console.file.getvalue()
+    assert "\N{HORIZONTAL ELLIPSIS}" not in console.file.getvalue()
 
 
 def test_a_pair_that_fails_under_ac_may_pass_under_dc():

@@ -232,7 +232,7 @@ def _notes(row: Row, quantity: Quantity, measured: Measured) -> Iterator[str]:
     if row.recalled:
         yield "reference recalled, not read"
     if row.band is not None:
-        yield f"untuned readings of the source's data span {row.band[0]:g} to {row.band[1]:g} {quantity.unit}".rstrip()
+        yield f"untuned readings span {row.band[0]:g} to {row.band[1]:g} {quantity.unit}".rstrip()
     if measured.others and (row.recalled or measured.is_told):
         yield "with other filters " + ", ".join(f"{quantity.show(v)} ({name})" for name, v in measured.others)
 

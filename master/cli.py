@@ -21,7 +21,7 @@ from master import calibrate, checkpoint, export, limits, report, results
 from master.caution import CautionObserver
 from master.checkpoint import Continuation
 from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
-from master.isolation import Isolation
+from master.isolation import INIT_TIMEOUT, Isolation
 from master.progress import ProgressObserver
 from master.report import commands
 from master.results import Results
@@ -124,6 +124,12 @@ def _add_run(verbs: Any) -> None:
     parser.add_argument("--isolate", action="store_true", help="each FMU in a process of its own: it may crash")
     parser.add_argument(
         "--step-timeout", type=_positive, metavar="S", help="with --isolate: a step of more than S seconds has failed"
+    )
+    parser.add_argument(
+        "--init-timeout",
+        type=_positive,
+        metavar="S",
+        help=f"with --isolate: loading or initialising for more than S seconds has failed, default {INIT_TIMEOUT:g}",
     )
     parser.add_argument(
         "--real-time",
@@ -229,13 +235,14 @@ def _run(options: argparse.Namespace) -> int:
         folder = _folder(options, scenario.system)
         _protect(folder, scenario.package)
         _tell_warnings(scenario.system, tell)
-        try:
-            done = _run_shown(scenario.system, folder, options.quiet, manner)
-        except RunError:
-            if not options.no_report:
-                _report_what_there_is(folder)
-            raise
-    _tell_results(done, options)
+        with results.claimed(folder):  # until the report is written too
+            try:
+                done = _run_shown(scenario.system, folder, options.quiet, manner)
+            except RunError:
+                if not options.no_report:
+                    _report_what_there_is(folder)
+                raise
+            _tell_results(done, options)
     return 0
 
 
@@ -282,7 +289,12 @@ def _manner(options: argparse.Namespace) -> Manner:
         raise UsageError(
             "--step-timeout needs --isolate: only a process of its own can be ended when it does not return"
         )
-    isolation = Isolation(options.step_timeout, options.real_time is not None) if options.isolate else None
+    if options.init_timeout is not None and not options.isolate:
+        raise UsageError(
+            "--init-timeout needs --isolate: only a process of its own can be ended when it does not return"
+        )
+    limits = (options.step_timeout, options.real_time is not None, options.init_timeout or INIT_TIMEOUT)
+    isolation = Isolation(*limits) if options.isolate else None
     every = options.checkpoint_every
     return Manner(options.checkpoint, every, _continuation(options), isolation, options.real_time)
 

@@ -11,6 +11,7 @@ import os
 import select
 import socket
 import struct
+from contextlib import suppress
 from enum import IntEnum
 from time import perf_counter
 from typing import Final
@@ -137,6 +138,11 @@ class Channel:
     def rest(self, length: int) -> bytes:
         """Return what followed the header of the last frame."""
         return bytes(self._frame[HEADER.size : HEADER.size + length])
+
+    def shut(self) -> None:
+        """Let nothing more come in, so that nobody waits for it; what has come is still there."""
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RD)
 
     def close(self) -> None:
         """Close the connection."""

@@ -1,15 +1,18 @@
 """Who works in a folder: one process at a time, known by name to those that have to wait.
 
 The lock is the kernel's, on the file `LOCK` in the folder, so it is gone with the process that holds it, however that
-ends; the file itself stays. Who it is stands in a second file, for a locked one cannot be read everywhere.
+ends; the file itself then stays, and means nothing. Who it is stands in a second file, for a locked one cannot be read
+everywhere.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -17,14 +20,17 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from filelock import FileLock, Timeout
+from filelock import lock_descriptor
 
 from master.errors import MasterError, one_line
 
 LOCK: Final = ".lock"
 OWNER: Final = ".owner.json"
-#: Seconds for which a folder is asked for again: one that is only looked at, or whose owner is just dying, is free soon.
+#: Seconds for which a folder is asked for again: if it is only looked at, or its owner is just dying, it is free soon.
 _PATIENCE: Final = 1.0
+_POLL: Final = 0.02
+#: What a file system says that knows no locks.
+_NO_LOCKS: Final = tuple(getattr(errno, n) for n in ("ENOSYS", "ENOTSUP", "EOPNOTSUPP", "ENOLCK") if hasattr(errno, n))
 
 #: How often this process, and which thread of it, has claimed a folder; a forked child has claimed none.
 _Key = tuple[int, int, str]
@@ -77,15 +83,14 @@ def claimed(folder: Path, remedy: str = "choose another with --out") -> Iterator
     lock = _locked(folder, remedy)
     try:
         _held[key] = 1
-        if lock is not None:
-            _sign(folder)
+        _sign(folder)
         yield
     finally:
         del _held[key]
-        if lock is not None:
-            with suppress(OSError):  # the folder is gone
-                (folder / OWNER).unlink()
-            lock.release()
+        with suppress(OSError):  # the folder is gone, or (Windows) the file is open
+            (folder / OWNER).unlink()
+            (folder / LOCK).unlink()
+        os.close(lock)
 
 
 def check_free(folder: Path, remedy: str = "wait for it to end") -> None:
@@ -99,22 +104,39 @@ def check_free(folder: Path, remedy: str = "wait for it to end") -> None:
     if _key(folder) in _held or not (folder / LOCK).is_file():
         return
     with suppress(OSError):  # a folder of somebody else's: not to be locked, and so not to be known
-        lock = _locked(folder, remedy)
-        if lock is not None:
-            lock.release()
+        os.close(_locked(folder, remedy))
 
 
-def _locked(folder: Path, remedy: str) -> FileLock | None:
-    """Return the lock, held; None where the file system has none."""
-    # A lock that is only a file would outlive its owner.
-    lock = FileLock(folder / LOCK, timeout=_PATIENCE, fallback_to_soft=False)
+def _locked(folder: Path, remedy: str) -> int:
+    """Return a descriptor of the lock's file, locked; closing it gives the lock back."""
+    deadline = time.monotonic() + _PATIENCE
+    while True:
+        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            if _is_got(lock, folder / LOCK):
+                return lock
+        except BaseException:
+            os.close(lock)
+            raise
+        os.close(lock)
+        if time.monotonic() > deadline:
+            raise FolderInUseError(f"{folder} is in use ({_owner(folder)}); {remedy}")
+        time.sleep(_POLL)
+
+
+def _is_got(lock: int, path: Path) -> bool:
+    """Lock a file, and say whether that locks the folder: its owner may just have removed it."""
     try:
-        lock.acquire()
-    except Timeout as error:
-        raise FolderInUseError(f"{folder} is in use ({_owner(folder)}); {remedy}") from error
-    except NotImplementedError:
-        return None
-    return lock
+        if not lock_descriptor(lock, blocking=False):
+            return False
+    except OSError as error:
+        if error.errno in _NO_LOCKS:
+            return True
+        raise
+    try:
+        return os.path.samestat(os.fstat(lock), path.stat())
+    except FileNotFoundError:
+        return False
 
 
 def _sign(folder: Path) -> None:

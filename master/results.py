@@ -8,7 +8,7 @@ import platform
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -21,7 +21,7 @@ from master.checkpoint import NAME as CHECKPOINT
 from master.contacts import Contact, lateral_position, track_position
 from master.durable import PART, write_whole
 from master.energy import Balance, drift_events, find_balances
-from master.errors import MasterError
+from master.errors import MasterError, UsageError
 from master.events import MOST_EVENTS, Event, find_events
 from master.line import Geometry, Uplift, support_uplifts
 from master.quality import FILTER_NOTE, Criterion, Quality, assess, judge
@@ -37,7 +37,7 @@ _OURS: Final = ("timeseries*.csv", "timeseries*.parquet", SUMMARY, GEOMETRY, REP
 #: What a run, a study or a verification that was killed may leave half written, and what is no result.
 _PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, CHECKPOINT)), f".*{PART}")
 _LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)
-_NOT_OURS: Final = "exists and is no {kind} of this tool; it is left alone, choose another with --out"
+_NOT_OURS: Final = "exists and is {kind} of this tool; it is left alone, choose another with --out"
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ def claimed(folder: Path) -> Iterator[None]:
     if folder.exists() and not folder.is_dir():
         raise MasterError(f"{folder} is a file, not a results folder; choose another with --out")
     if not (is_ours(folder) or _holds_nothing(folder)):
-        raise MasterError(f"{folder} {_NOT_OURS.format(kind='results folder')}")
+        raise MasterError(f"{folder} {_NOT_OURS.format(kind='not a results folder')}")
     with _alone_in(folder, "results folder"):
         yield
 
@@ -182,7 +182,7 @@ def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator
         If it is there and is no ``kind`` of ours, or cannot be made.
     """
     if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
-        raise MasterError(f"{folder} {_NOT_OURS.format(kind=kind)}")
+        raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
     with _alone_in(folder, "folder"):
         _remove(folder, _PARTS)
         yield
@@ -190,23 +190,23 @@ def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator
 
 @contextmanager
 def _alone_in(folder: Path, kind: str) -> Iterator[None]:
-    """Make a folder and lock it; one that was made and in which nothing was written goes away again."""
+    """Make a folder and lock it; it goes away again if the command line turns out to be wrong."""
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        claim = folder_lock.claimed(folder)
-        claim.__enter__()
+        claim = ExitStack()
+        claim.enter_context(folder_lock.claimed(folder))
     except OSError as error:
         text = f"the {kind} {folder} cannot be written ({error.strerror}); choose another with --out"
         raise MasterError(text) from error
     try:
-        yield
-    finally:
-        claim.__exit__(None, None, None)
-        if is_new and folder.is_dir() and _holds_nothing(folder):
-            with suppress(OSError):
-                _remove(folder, _LOCKS)
+        with claim:
+            yield
+    except UsageError:
+        if is_new:
+            with suppress(OSError):  # there is something in it
                 folder.rmdir()
+        raise
 
 
 def prepare(folder: Path, keep: Path | None = None) -> None:

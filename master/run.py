@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from master import results
 from master.algorithm import make_algorithm
-from master.caution import CautionObserver
+from master.caution import Caution, CautionObserver
 from master.checkpoint import NAME as CHECKPOINT
 from master.checkpoint import (
     Checkpoint,
@@ -133,16 +133,21 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
 def _run(
     system: System, folder: Path, observers: Sequence[Observer], manner: Manner, occasions: Occasions, identity: str
 ) -> Results:
+    farewells: list[Caution] = []
     with (
         interruptible() as stop_wanted,
         _failure_noted(system, folder, identity, stop_wanted),
-        loaded(system, manner.isolation) as network,
+        loaded(system, manner.isolation, farewells) as network,
     ):
         session = _Session(system, network, folder, manner, identity)
         watchers = [*session.observers, *observers, *session.last_observers(occasions)]
         continuation = manner.continuation
         way_in = {} if continuation is None else {"prepare": continuation.prepare}
         outcome = simulate(network, session.algorithm, session.grid, watchers, stop_wanted, **way_in)
+    for observer in watchers:
+        if isinstance(observer, CautionObserver):
+            for farewell in farewells:
+                observer.add(farewell)
     return _concluded(session, outcome, folder)
 
 
@@ -200,8 +205,19 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
 
 
 @contextmanager
-def loaded(system: System, isolation: Isolation | None = None) -> Iterator[Network]:
-    """Load the FMUs of a system, each into a process of its own if wanted, and connect them; they are freed at last."""
+def loaded(
+    system: System, isolation: Isolation | None = None, farewells: list[Caution] | None = None
+) -> Iterator[Network]:
+    """Load the FMUs of a system and connect them; they are freed at last.
+
+    Parameters
+    ----------
+    system : System
+    isolation : Isolation, optional
+        Given if each is to have a process of its own.
+    farewells : list of Caution, optional
+        Takes what goes wrong when they are freed.
+    """
     instances: list[Instance | IsolatedInstance] = []
     try:
         with phase("loading"), heeded_at_once():
@@ -213,7 +229,9 @@ def loaded(system: System, isolation: Isolation | None = None) -> Iterator[Netwo
     finally:
         with phase("closing"), heeded_at_once():
             for instance in reversed(instances):
-                instance.close()
+                said = instance.close()
+                if said and farewells is not None:
+                    farewells.append(Caution(instance.name, said, is_own=False))
 
 
 def _is_still(folder: Path, identity: str) -> bool:
@@ -357,7 +375,7 @@ class _Session:
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
-            "warnings": [asdict(w) for w in self._cautions.warnings],
+            "warnings": [{"component": w.component, "text": w.text} for w in self._cautions.warnings],
             "scenario_warnings": list(self._system.warnings),
         }
         results.write_json(self._folder / results.SUMMARY, summary)

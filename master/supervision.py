@@ -38,7 +38,7 @@ def supervised(work: Callable[[], int]) -> int:
 
     Returns in both processes: the caller is to end with the code that it gets.
     """
-    global _reports  # noqa: PLW0603
+    global _reports
     if not hasattr(os, "fork"):
         return work()
     reports, _reports = os.pipe()
@@ -54,7 +54,7 @@ def supervised(work: Callable[[], int]) -> int:
 
 
 def die_with(parent: int) -> None:
-    """End this process when its parent ends, even in an endless loop; elsewhere than on Linux if it has ended already."""
+    """End this process when its parent ends, even in an endless loop; elsewhere than on Linux only if it has ended."""
     if sys.platform == "linux":
         import ctypes
 

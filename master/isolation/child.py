@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 
 from master.errors import MasterError
-from master.instance import Group, Instance
+from master.instance import LONGEST_STATE, Group, Instance
 from master.isolation.wire import (
     HEADER,
-    LONGEST_STATE,
     LONGEST_TEXT,
     NUMBER,
     STEP,
@@ -181,8 +180,7 @@ class Child:
         return text.encode("utf-8", "replace")[:LONGEST_TEXT]
 
     def _close(self, _argument: int, _length: int) -> bytes:
-        self._instance.close()
-        return b""
+        return self._instance.close().encode("utf-8", "replace")[:LONGEST_TEXT]
 
 
 def describe(component: Component, is_paced: bool) -> bytes:

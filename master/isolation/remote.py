@@ -11,12 +11,12 @@ import numpy as np
 
 from master.arrays import FloatArray
 from master.errors import SlaveError, one_line
+from master.instance import LONGEST_STATE
 from master.interruption import heeded_at_once, is_wished
 from master.isolation.child import describe
 from master.isolation.process import Process
 from master.isolation.wire import (
     HEADER,
-    LONGEST_STATE,
     LONGEST_TEXT,
     MOST_PREFETCHED,
     NUMBER,
@@ -249,25 +249,35 @@ class IsolatedInstance:
         said = self._ask(_Owed("a request for its warnings", LONGEST_TEXT, is_exact=False), Ask.REMARK, 1)
         return tuple(one_line(text) for text in said.decode("utf-8", "replace").split("\n") if text)
 
-    def close(self) -> None:
-        """Free the instance, end its process and remove its files; one that hangs or has died is only ended."""
+    def close(self) -> str:
+        """Free the instance, end its process and remove its files; one that hangs or has died is only ended.
+
+        Returns
+        -------
+        str
+            What went wrong, empty if nothing did: what was computed is not touched by how an FMU ends.
+        """
         if self._dead:
             self._process.end()
-            return
+            return ""
         self._dead = True
         if self._owed is not None and is_wished():  # nobody waits for what is not wanted any more
             self._process.end(grace=0.0)
-            return
+            return ""
         self._channel.limit(_CLOSING_SECONDS)
         try:
             if self._owed is not None:
                 self._channel.receive(LONGEST_STATE)
             self._channel.send(Ask.CLOSE)
-            self._channel.receive(LONGEST_TEXT)
-        except (EndedError, ProtocolError, TimeoutError):
-            self._process.end(grace=0.0)  # what was computed is not touched by how an FMU ends
-        else:
-            self._process.end()
+            _, _, length = self._channel.receive(LONGEST_TEXT)
+        except (EndedError, ProtocolError, TimeoutError) as error:
+            self._limit_text = f"{_CLOSING_SECONDS:g} s"
+            said = str(self._lost(_Owed("its termination"), error))
+            self._process.end(grace=0.0)
+            return said
+        said = one_line(self._channel.rest(length).decode("utf-8", "replace"))
+        self._process.end()
+        return said
 
     def _limit(self, seconds: float | None, option: str) -> None:
         self._channel.limit(seconds)

@@ -28,9 +28,8 @@ NUMBER: Final = 8
 MOST_PREFETCHED: Final = 64
 #: Time for which an awaited frame is looked out for before the process sleeps [s].
 _WATCHFUL: Final = 1e-4
-#: Longest text, and longest serialised state, that is accepted from a child [bytes].
+#: Longest text that is accepted from a child [bytes].
 LONGEST_TEXT: Final = 1 << 16
-LONGEST_STATE: Final = 1 << 30
 
 
 class Ask(IntEnum):

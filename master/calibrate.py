@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from master import folder_lock
+from master.durable import write_whole
 from master.errors import MasterError
 
 MAX_RUNS: Final = 12
@@ -155,6 +158,35 @@ def _bracket(trials: list[Trial], target: float) -> tuple[float, float] | None:
     return min(lower.value, upper.value), max(lower.value, upper.value)
 
 
+@contextmanager
+def unchanged(files: Sequence[Path], folder: Path) -> Iterator[Callable[[], None]]:
+    """Work on a scenario of which files are to be changed at the end; gives what checks that nobody else has.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Those that decide about what is computed.
+    folder : Path
+        The scenario's folder, in which one calibration at a time may work.
+
+    Raises
+    ------
+    FolderInUseError
+        If another calibration is at work there.
+    MasterError
+        By the check, naming a file that was changed meanwhile.
+    """
+    with folder_lock.claimed(folder, "wait for it to end, or try with --dry-run"):
+        before = [path.read_bytes() for path in files]
+
+        def check() -> None:
+            for path, content in zip(files, before, strict=True):
+                if not path.is_file() or path.read_bytes() != content:
+                    raise MasterError(f"{path} was changed during the calibration: nothing is stored, run it again")
+
+        yield check
+
+
 def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     """Write a Real parameter's value into an ``.ssv`` file, leaving the rest of its text as it is.
 
@@ -179,4 +211,4 @@ def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     m = found[0]
     comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
     new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"
-    path.write_text(text[: m.start()] + new + text[m.end() :], encoding="utf-8")
+    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode())

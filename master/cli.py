@@ -431,26 +431,32 @@ def _calibrate(options: argparse.Namespace) -> int:
         system = scenario.system
         _tell_warnings(system, _tell)
         task = _task(options, system)
-        place = None if options.dry_run or options.set else _place(scenario.package, task.parameter)
-        found = calibrate.find_value(
-            lambda value: _trial(system, task, value),
-            task.mean_force,
-            _start_value(system, task.parameter),
-            task.tolerance,
-        )
-        print(
-            f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
-            f"({len(found.trials)} runs)"
-        )
-        if place is not None:
+        if options.dry_run or options.set:
+            _tell_found(task, _found(system, task))
+            return 0
+        place = _place(scenario.package, task.parameter)
+        with calibrate.unchanged([scenario.package.root / SSD_NAME, place[0]], scenario.package.root) as check:
+            found = _found(system, task)
+            _tell_found(task, found)
             note = (
                 f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) with "
                 f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
                 f"in {len(found.trials)} runs of 'python -m master calibrate'"
             )
+            check()
             calibrate.store_value(*place, found.value, note)
             print(f"stored in {place[0]}")
     return 0
+
+
+def _found(system: System, task: Calibration) -> calibrate.Found:
+    start = _start_value(system, task.parameter)
+    return calibrate.find_value(lambda value: _trial(system, task, value), task.mean_force, start, task.tolerance)
+
+
+def _tell_found(task: Calibration, found: calibrate.Found) -> None:
+    runs = f"({len(found.trials)} runs)"
+    print(f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N {runs}")
 
 
 def _task(options: argparse.Namespace, system: System) -> Calibration:

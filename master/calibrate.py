@@ -15,6 +15,8 @@ from master.durable import write_whole
 from master.errors import MasterError
 
 MAX_RUNS: Final = 12
+#: Files of a scenario in which values stand.
+_TEXTS: Final = (".ssd", ".ssv", ".ssm", ".csv", ".toml")
 #: First change tried, as a share of the start value, and how much a step may exceed the bracket's secant.
 _FIRST_CHANGE: Final = 0.03
 
@@ -159,13 +161,13 @@ def _bracket(trials: list[Trial], target: float) -> tuple[float, float] | None:
 
 
 @contextmanager
-def unchanged(files: Sequence[Path], folder: Path) -> Iterator[Callable[[], None]]:
-    """Work on a scenario of which files are to be changed at the end; gives what checks that nobody else has.
+def unchanged(folder: Path) -> Iterator[Callable[[], None]]:
+    """Work on a scenario in which a value is to be stored at the end; gives what checks that nobody else did so.
+
+    To be entered before the scenario is read.
 
     Parameters
     ----------
-    files : sequence of Path
-        Those that decide about what is computed.
     folder : Path
         The scenario's folder, in which one calibration at a time may work.
 
@@ -177,14 +179,20 @@ def unchanged(files: Sequence[Path], folder: Path) -> Iterator[Callable[[], None
         By the check, naming a file that was changed meanwhile.
     """
     with folder_lock.claimed(folder, "wait for it to end, or try with --dry-run"):
-        before = [path.read_bytes() for path in files]
+        before = _texts(folder)
 
         def check() -> None:
-            for path, content in zip(files, before, strict=True):
-                if not path.is_file() or path.read_bytes() != content:
+            now = _texts(folder)
+            for path in sorted({*before, *now}):
+                if before.get(path) != now.get(path):
                     raise MasterError(f"{path} was changed during the calibration: nothing is stored, run it again")
 
         yield check
+
+
+def _texts(folder: Path) -> dict[Path, bytes]:
+    """Return the files that say what is computed; FMUs may be built meanwhile."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.suffix in _TEXTS and path.is_file()}
 
 
 def store_value(path: Path, parameter: str, value: float, note: str) -> None:

@@ -1,6 +1,6 @@
 """The command line: ``python -m master [VERB] ...``.
 
-Exit codes: 0 done, 1 the run failed or the scenario is invalid, 2 the command line is wrong.
+Exit codes: docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -427,17 +427,24 @@ def _pack(options: argparse.Namespace) -> int:
 
 
 def _calibrate(options: argparse.Namespace) -> int:
+    is_stored = not (options.dry_run or options.set)
+    is_folder = options.scenario.is_dir()
+    with calibrate.unchanged(options.scenario) if is_stored and is_folder else nullcontext(lambda: None) as check:
+        return _calibrated(options, is_stored, check)
+
+
+def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[], None]) -> int:
     with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
         system = scenario.system
         _tell_warnings(system, _tell)
         task = _task(options, system)
-        if options.dry_run or options.set:
-            _tell_found(task, _found(system, task))
-            return 0
-        place = _place(scenario.package, task.parameter)
-        with calibrate.unchanged([scenario.package.root / SSD_NAME, place[0]], scenario.package.root) as check:
-            found = _found(system, task)
-            _tell_found(task, found)
+        place = _place(scenario.package, task.parameter) if is_stored else None
+        found = _found(system, task)
+        print(
+            f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
+            f"({len(found.trials)} runs)"
+        )
+        if place is not None:
             note = (
                 f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) with "
                 f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
@@ -452,11 +459,6 @@ def _calibrate(options: argparse.Namespace) -> int:
 def _found(system: System, task: Calibration) -> calibrate.Found:
     start = _start_value(system, task.parameter)
     return calibrate.find_value(lambda value: _trial(system, task, value), task.mean_force, start, task.tolerance)
-
-
-def _tell_found(task: Calibration, found: calibrate.Found) -> None:
-    runs = f"({len(found.trials)} runs)"
-    print(f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N {runs}")
 
 
 def _task(options: argparse.Namespace, system: System) -> Calibration:

@@ -14,7 +14,7 @@ from master.calibrate import unchanged
 from master.errors import UsageError
 from master.progress import ProgressObserver
 from master.simulation import Observer
-from master.study.family import STUDY, VARIANTS, Family, Variant, family_names, load_family, store_values
+from master.study.family import Family, Variant, family_names, load_family, store_values
 from master.study.outcome import Done
 from master.study.session import CSV, JSON, PAGE, study
 from master.study.table import list_table, show
@@ -76,7 +76,7 @@ def _calibrated(
 ) -> tuple[Family, tuple[Variant, ...]]:
     """Find and store the forces of variants, one after the other; return the family as it is then."""
     for variant in chosen:
-        with unchanged([family.folder / VARIANTS, family.folder / STUDY], family.folder) as check:
+        with unchanged(family.folder) as check:
             found = calibrate_variant(family, variant, runner)
             check()
             store_values(family, variant.name, {name: f.value for name, f in found.items()})

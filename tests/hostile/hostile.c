@@ -50,6 +50,13 @@ static void leave_a_child(int in_a_session_of_its_own)
     }
 }
 
+static void mark(void) /* the file that a test waits for */
+{
+    const char *path = getenv("HOSTILE_MARK");
+    FILE *file = path == NULL ? NULL : fopen(path, "w");
+    if (file != NULL) fclose(file);
+}
+
 static int is_due(Text name) { return strcmp(name, function_name) == 0 && now >= due - 1e-9; }
 
 static Status deed(Text name)
@@ -58,12 +65,7 @@ static Status deed(Text name)
     if (strcmp(kind, "crash") == 0) raise(SIGSEGV);
     if (strcmp(kind, "exit") == 0) exit(0);
     if (strcmp(kind, "_exit") == 0) _exit(0);
-    if (strcmp(kind, "hang") == 0) for (;;) {}
-    if (strcmp(kind, "deaf") == 0) {
-        signal(SIGTERM, SIG_IGN);
-        signal(SIGINT, SIG_IGN);
-        for (;;) pause();
-    }
+    if (strcmp(kind, "hang") == 0) { mark(); for (;;) {} }
     if (strcmp(kind, "fork") == 0) leave_a_child(0);
     if (strcmp(kind, "daemon") == 0) leave_a_child(1);
     if (strcmp(kind, "orphan") == 0) { leave_a_child(0); raise(SIGSEGV); }

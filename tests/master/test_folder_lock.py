@@ -230,6 +230,7 @@ def test_one_calibration_at_a_time_stores_its_value(toy, capsys, holder):
     before = (toy / "parameters.ssv").read_text()
     running = start(*command)
     wait_for(lambda: (toy / OWNER).read_text() not in ("", owner))
+    time.sleep(0.5)  # it is reading
     (toy / "parameters.ssv").write_text(before + " ")
     _, text = running.communicate(timeout=120)
     assert running.returncode == 1

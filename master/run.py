@@ -227,11 +227,24 @@ def loaded(
                 instances.append(instance)
         yield Network(instances, system.connections, system.discrete)
     finally:
-        with phase("closing"), heeded_at_once():
-            for instance in reversed(instances):
+        with phase("closing"):
+            _free(instances, [] if farewells is None else farewells)
+
+
+def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caution]) -> None:
+    """Free all, also after one at which the user lost patience."""
+    interruption = None
+    for instance in reversed(instances):
+        try:
+            with heeded_at_once():
                 said = instance.close()
-                if said and farewells is not None:
-                    farewells.append(Caution(instance.name, said, is_own=False))
+        except KeyboardInterrupt as error:
+            interruption = error
+            continue
+        if said:
+            farewells.append(Caution(instance.name, said, is_own=False))
+    if interruption is not None:
+        raise interruption
 
 
 def _is_still(folder: Path, identity: str) -> bool:

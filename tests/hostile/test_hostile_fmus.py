@@ -154,7 +154,7 @@ def test_one_signal_ends_the_loading_of_an_isolated_fmu(pair, tmp_path, started,
     _, said = process.communicate(timeout=20)
     assert time.monotonic() - began < 10.0
     assert (process.returncode, summary(folder)["status"]) == (1, "interrupted")
-    assert said.startswith("error: interrupted. ")
+    assert said.startswith("error: interrupted. What was computed")  # the master itself: nobody had to end it
 
 
 def test_a_second_signal_ends_a_step_at_once(pair, tmp_path, started):
@@ -222,3 +222,11 @@ def test_what_an_isolated_fmu_has_started_ends_with_it(pair, tmp_path, monkeypat
     assert process.returncode == (kind == "orphan")
     if kind == "orphan":
         assert "crashed in a step at t = 0.05 s" in " ".join(said.split())
+
+
+def test_its_group_ends_with_it_where_processes_cannot_be_looked_through(pair, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("master.isolation.process.marked_processes", lambda _: ())
+    assert main([str(pair("fmi2DoStep", "fork", 0.05)), *options(tmp_path / "out"), "--isolate"]) == 0
+    time.sleep(0.2)
+    assert alive(str(tmp_path)) == []

@@ -30,6 +30,7 @@ enum { OK = 0, ERROR = 3 };
 static char function_name[64], kind[32];
 static double due = -1e300;
 static double now = 0.0, sum = 0.0, input = 0.0;
+static const Callbacks *known = NULL;
 
 static void read_deed(Text resources)
 {
@@ -59,6 +60,17 @@ static void mark(void) /* the file that a test waits for */
 
 static int is_due(Text name) { return strcmp(name, function_name) == 0 && now >= due - 1e-9; }
 
+static Status huge_message(void) /* 64 MB */
+{
+    size_t length = (size_t)1 << 26;
+    char *text = malloc(length + 1);
+    memset(text, 'x', length);
+    text[length] = 0;
+    known->logger(known->environment, "bad", ERROR, "huge", "%s", text);
+    free(text);
+    return ERROR;
+}
+
 static Status deed(Text name)
 {
     if (!is_due(name)) return OK;
@@ -71,6 +83,7 @@ static Status deed(Text name)
     if (strcmp(kind, "orphan") == 0) { leave_a_child(0); raise(SIGSEGV); }
     if (strcmp(kind, "error") == 0) return ERROR;
     if (strcmp(kind, "negative") == 0) return -7;
+    if (strcmp(kind, "claim") == 0 && strcmp(name, "fmi2SerializedFMUstateSize") != 0) return huge_message();
     return OK;
 }
 
@@ -84,16 +97,8 @@ EXPORT Component fmi2Instantiate(Text name, int type, Text guid, Text resources,
                                  int visible, int logging)
 {
     read_deed(resources);
+    known = callbacks;
     if (deed("fmi2Instantiate") != OK) return NULL;
-    if (claims("fmi2Instantiate")) {
-        size_t length = (size_t)1 << 26;
-        char *text = malloc(length + 1);
-        memset(text, 'x', length);
-        text[length] = 0;
-        callbacks->logger(callbacks->environment, name, ERROR, "huge", "%s", text);
-        free(text);
-        return NULL;
-    }
     return calloc(1, 16);
 }
 EXPORT void fmi2FreeInstance(Component c) { deed("fmi2FreeInstance"); free(c); }
@@ -109,7 +114,7 @@ EXPORT Status fmi2Reset(Component c) { return OK; }
 
 EXPORT Status fmi2GetReal(Component c, const Reference *r, size_t n, double *values)
 {
-    for (size_t i = 0; i < n; i++) values[i] = r[i] == 0 ? input : claims("fmi2GetReal") ? 1.0e308 * 1.0e308 : sum;
+    for (size_t i = 0; i < n; i++) values[i] = r[i] == 0 ? input : sum;
     return deed("fmi2GetReal");
 }
 EXPORT Status fmi2SetReal(Component c, const Reference *r, size_t n, const double *values)

@@ -43,6 +43,8 @@ def supervised(work: Callable[[], int]) -> int:
         return work()
     reports, _reports = os.pipe()
     parent = os.getpid()
+    # None may come before somebody is there to take it.
+    signal.pthread_sigmask(signal.SIG_BLOCK, end_signals())
     child = os.fork()
     if child == 0:
         os.close(reports)
@@ -91,9 +93,10 @@ def _tell(**report: Any) -> None:
 
 
 def _worked(work: Callable[[], int]) -> int:
-    raise_on_signals()
     code = 1
     try:
+        raise_on_signals()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, end_signals())
         code = work()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
@@ -227,6 +230,7 @@ def _wake_up(handle: Callable[[int, object], None]) -> int:
     signal.set_wakeup_fd(theirs, warn_on_full_buffer=False)
     for number in (*end_signals(), signal.SIGTSTP, signal.SIGCHLD):
         signal.signal(number, handle)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, end_signals())
     return ours
 
 

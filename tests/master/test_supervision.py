@@ -82,6 +82,14 @@ def test_output_goes_where_it_would_and_the_working_process_dies_with_its_parent
     assert not Path(f"/proc/{worker}").exists()
 
 
+def test_a_signal_that_comes_before_anybody_waits_is_heeded():
+    """The child has begun to work before its parent has got to waiting for it."""
+    slow = "import master.supervision as s\nwake = s._wake_up\ns._wake_up = lambda h: (time.sleep(1), wake(h))[1]\n"
+    code = script("os.kill(os.getppid(), signal.SIGTERM); time.sleep(30)").replace("def work", slow + "def work")
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (1, "error: interrupted\n")
+
+
 def test_a_program_that_is_to_outlive_its_terminal_does(tmp_path):
     work = "os.kill(os.getppid(), signal.SIGHUP); time.sleep(0.5); return 0"
     assert go(work, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)).returncode == 0

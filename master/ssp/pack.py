@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from pathlib import Path
 from typing import Final
@@ -25,7 +26,7 @@ def pack(root: Path, archive: Path) -> Path:
         If the archive cannot be written, or ``root`` holds symbolic links.
     """
     members = _members(root)
-    temporary = archive.with_name(archive.name + ".part")
+    temporary = archive.with_name(f".{archive.name}.{os.getpid()}.part")  # two that pack do not mix
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file:

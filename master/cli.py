@@ -1,6 +1,7 @@
 """The command line: ``python -m master [VERB] ...``.
 
-Exit codes: 0 done, 1 the run failed or the scenario is invalid, 2 the command line is wrong.
+Exit codes: 0 done; 1 failed, invalid or incomplete (scenario, definition, FMU, results, limits that must hold in
+``verify``); 2 only a command line that was not understood.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from rich.console import Console
 from master import calibrate, checkpoint, export, limits, report, results
 from master.caution import CautionObserver
 from master.checkpoint import Continuation
-from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
+from master.errors import MasterError, Problem, RequestError, RunError, ScenarioError, UsageError
 from master.isolation import Isolation
 from master.progress import ProgressObserver
 from master.report import commands
@@ -242,7 +243,7 @@ def _folder(options: argparse.Namespace, system: System) -> Path:
 
 def _protect(folder: Path, package: Package) -> None:
     if folder.resolve().is_relative_to(package.root) or package.root.is_relative_to(folder.resolve()):
-        raise UsageError(
+        raise RequestError(
             f"the results folder {folder} and the scenario lie inside each other; choose another with --out"
         )
 
@@ -265,7 +266,7 @@ def _continuation(options: argparse.Namespace) -> Continuation | None:
     is_same_run = options.resume.is_dir()
     file = options.resume / checkpoint.NAME if is_same_run else options.resume
     if is_same_run and not file.is_file():
-        raise UsageError(
+        raise RequestError(
             f"{options.resume} holds no {checkpoint.NAME} to go on from: the run was started without "
             "--checkpoint-every, or ended before the first one; run it again"
         )
@@ -357,7 +358,7 @@ def _pack(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, tell=_tell, build=not options.no_build) as scenario:
         archive = options.out or Path("dist") / f"{scenario.system.name}.ssp"
         if archive.is_dir():
-            raise UsageError(f"{archive} is a folder; choose another name with --out")
+            raise RequestError(f"{archive} is a folder; choose another name with --out")
         print(pack(scenario.package.root, archive))
     return 0
 
@@ -393,7 +394,7 @@ def _task(options: argparse.Namespace, system: System) -> Calibration:
     parameter = options.parameter or (known.parameter if known else None)
     mean = options.mean or (known.mean_force if known else None)
     if parameter is None or mean is None:
-        raise UsageError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
+        raise RequestError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
     tolerance = options.tolerance or (known.tolerance if known else 0.1)
     return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
 
@@ -402,7 +403,7 @@ def _start_value(system: System, parameter: str) -> float:
     index, variable = find_parameter(system.components, parameter)
     component = system.components[index]
     if variable.type != "Real":
-        raise UsageError(f"parameter '{parameter}' is not Real and cannot be calibrated")
+        raise RequestError(f"parameter '{parameter}' is not Real and cannot be calibrated")
     return float(component.parameters.get(variable.name, variable.start or 0.0))
 
 
@@ -423,7 +424,7 @@ def _trial(system: System, task: Calibration, value: float) -> float:
 def _place(package: Package, parameter: str) -> tuple[Path, str]:
     """Return the ``.ssv`` file that holds a parameter, and its name there."""
     if not package.writable:
-        raise UsageError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
+        raise RequestError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
     structure = read_structure(package.root, Reader(SSD_NAME))
     for c in structure.components:
         for binding in c.bindings:

@@ -26,7 +26,7 @@ from master.checkpoint import (
     take,
 )
 from master.contacts import find_contacts
-from master.errors import InterruptedRunError, MasterError, RunError, UsageError
+from master.errors import InterruptedRunError, MasterError, RequestError, RunError
 from master.instance import Instance, Recordable
 from master.interface import PowerObserver
 from master.isolation import IsolatedInstance, Isolation
@@ -113,7 +113,7 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
     ------
     RunError
         If the run stops before its end; what was computed is in the folder then.
-    UsageError
+    RequestError
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
@@ -159,7 +159,7 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
         if continuation.is_same_run:
             known = results.identity(folder)
             if not known or known != continuation.checkpoint.run:
-                raise UsageError(f"{continuation.file} comes from another run than the results beside it")
+                raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
     results.prepare(folder)
     return uuid.uuid4().hex

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from master.errors import MasterError, Problem, ScenarioError, UsageError
+from master.errors import MasterError, Problem, RequestError, ScenarioError
 from master.results import write_text
 
 STUDY: Final = "study.toml"
@@ -112,13 +112,13 @@ class Family(_Model):
 
         Raises
         ------
-        UsageError
+        RequestError
             If there is none of a name.
         """
         known = [v.name for v in self.variants]
         for name in names:
             if name not in known:
-                raise UsageError(f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}")
+                raise RequestError(f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}")
         return tuple(v for v in self.variants if v.name in names or not names)
 
 
@@ -132,7 +132,7 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
 
     Raises
     ------
-    UsageError
+    RequestError
         If there is none.
     ScenarioError
         With the mistakes in its files.
@@ -140,7 +140,7 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
     folder = Path(name) if (Path(name) / STUDY).is_file() else root / f"{name}.ssp"
     if not (folder / STUDY).is_file():
         known = ", ".join(family_names(root)) or "none"
-        raise UsageError(f"there is no study '{name}'; known: {known} (or give a scenario's folder with a {STUDY})")
+        raise RequestError(f"there is no study '{name}'; known: {known} (or give a scenario's folder with a {STUDY})")
     settings = _read_settings(folder / STUDY)
     variants = _read_variants(folder / VARIANTS)
     _check_names(folder / STUDY, settings, variants)

@@ -13,7 +13,7 @@ from typing import Any
 from master import results
 from master.calibrate import Found, find_values
 from master.caution import CautionObserver
-from master.errors import MasterError, UsageError
+from master.errors import MasterError, RequestError
 from master.results import Results, assess_contacts
 from master.run import run
 from master.scenario import Overrides, find_parameter, open_scenario
@@ -61,7 +61,7 @@ class Runner:
 
         Raises
         ------
-        ScenarioError, UsageError
+        ScenarioError, RequestError
             If scenario and table do not go together.
         """
         overrides = Overrides(stop=variant.stop, step=variant.step, parameters=variant.values)
@@ -75,12 +75,12 @@ def without(system: System, names: Sequence[str]) -> System:
 
     Raises
     ------
-    UsageError
+    RequestError
         If there is no such component.
     """
     for name in names:
         if name not in {c.name for c in system.components}:
-            raise UsageError(f"the scenario has no component '{name}', which a column of the table names")
+            raise RequestError(f"the scenario has no component '{name}', which a column of the table names")
     coupling = system.settings.coupling
     order = tuple(name for name in coupling.order if name not in names)
     settings = system.settings.model_copy(update={"coupling": coupling.model_copy(update={"order": order})})
@@ -125,7 +125,7 @@ def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[
     """
     wanted = family.settings.calibration
     if wanted is None:
-        raise UsageError(f"study '{family.name}' has no [calibration]")
+        raise RequestError(f"study '{family.name}' has no [calibration]")
     interval = next(i for i in family.settings.interval if i.name == wanted.interval)
     with runner.opened(family, variant) as system:
         names = _calibrated(system, wanted)

@@ -189,6 +189,11 @@ def _overrides(options: argparse.Namespace) -> Overrides:
     return Overrides(options.stop, options.step, options.scheme, dict(options.set))
 
 
+def _run_overrides(options: argparse.Namespace) -> Overrides:
+    """Return the changes of a run: one that is told when to stop may stop before it can be judged."""
+    return replace(_overrides(options), energy=options.energy, may_stop_early=options.stop is not None)
+
+
 def _tell(text: str, console: Console | None = None) -> None:
     (console or Console(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
 
@@ -196,8 +201,7 @@ def _tell(text: str, console: Console | None = None) -> None:
 def _run(options: argparse.Namespace) -> int:
     tell = (lambda _: None) if options.quiet else _tell
     manner = _manner(options)
-    overrides = replace(_overrides(options), energy=options.energy)
-    with open_scenario(options.scenario, overrides, tell, not options.no_build) as scenario:
+    with open_scenario(options.scenario, _run_overrides(options), tell, not options.no_build) as scenario:
         folder = _folder(options, scenario.system)
         _protect(folder, scenario.package)
         try:
@@ -295,8 +299,14 @@ def _show(done: Results) -> None:
         heads = [a.contact.pantograph for a in assessments]
         console.print(report.figures_table([a.quality for a in assessments], heads))
     for assessment in assessments:
-        console.print(report.verdict_table(assessment))
-    if not assessments:
+        if assessment.withheld:
+            text = f"{assessment.contact.pantograph}: not judged: {assessment.withheld}"
+            console.print(text, style="yellow", markup=False, soft_wrap=True)
+        else:
+            console.print(report.verdict_table(assessment))
+    if done.not_judged:
+        console.print(f"not judged: {done.not_judged}", style="yellow", markup=False, soft_wrap=True)
+    elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
     if line := report.uplift_line(done):
         console.print(line)

@@ -9,7 +9,7 @@ import re
 import resource
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -40,16 +40,17 @@ _PARTS: Final = tuple(name + PART for name in (SUMMARY, GEOMETRY, CHECKPOINT))
 
 @dataclass(frozen=True)
 class Assessment:
-    """Figures and verdict of one contact."""
+    """Figures and verdict of one contact; ``withheld`` says why there is no verdict, and there are no criteria then."""
 
     contact: Contact
     quality: Quality
     criteria: tuple[Criterion, ...]
+    withheld: str = ""
 
     @property
     def passed(self) -> bool:
-        """Whether every limit is kept."""
-        return all(c.passed for c in self.criteria)
+        """Whether every limit is kept, and nothing speaks against saying so."""
+        return not self.withheld and all(c.passed for c in self.criteria)
 
 
 @dataclass(frozen=True)
@@ -89,9 +90,24 @@ class Results:
         """Largest uplift of every support."""
         return support_uplifts(self.recordings, self.geometry)
 
+    @property
+    def not_judged(self) -> str:
+        """Why a run that is complete has no figures, empty if it has."""
+        return str(self.summary.get("not_judged", ""))
+
     def assessments(self) -> tuple[Assessment, ...]:
-        """Return figures and verdict of every contact that has samples in the interval."""
-        return assess_contacts(self.recordings, self.contacts, self.interval, self.uplifts)
+        """Return figures and verdict of every contact that has samples in the interval; none if it was not passed."""
+        if self.not_judged:
+            return ()
+        found = assess_contacts(self.recordings, self.contacts, self.interval, self.uplifts)
+        reason = self.verdict_withheld
+        return tuple(replace(a, criteria=(), withheld=reason) for a in found) if reason else found
+
+    @property
+    def verdict_withheld(self) -> str:
+        """Why figures are given without a verdict, empty if they are given with one."""
+        beyond = [b.what for b in self.balances if b.exceeded is not None]
+        return f"the energy of {', '.join(beyond)} does not balance; try a smaller --step" if beyond else ""
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -271,7 +287,13 @@ def figures(
     return {
         "filter": FILTER_NOTE,
         "quality": [
-            {**asdict(a.quality), "criteria": [asdict(c) for c in a.criteria], "passed": a.passed} for a in assessments
+            {
+                **asdict(a.quality),
+                "criteria": [asdict(c) for c in a.criteria],
+                "passed": None if a.withheld else a.passed,
+                "withheld": a.withheld,
+            }
+            for a in assessments
         ],
         "following": [asdict(f) for f in following],
         "uplift": [asdict(u) for u in uplifts],

@@ -27,6 +27,7 @@ from master.checkpoint import (
 )
 from master.contacts import find_contacts
 from master.errors import InterruptedRunError, MasterError, RequestError, RunError
+from master.evaluation.interval_coverage import never_touched, shortfall
 from master.instance import Instance, Recordable
 from master.interface import PowerObserver
 from master.isolation import IsolatedInstance, Isolation
@@ -34,7 +35,7 @@ from master.line import GeometryObserver
 from master.network import Network
 from master.pattern import matcher
 from master.realtime import Pacer
-from master.recorder import Recorder, Source
+from master.recorder import Recorder, Recording, Source
 from master.results import Results
 from master.simulation import Observer, Outcome, TimeGrid, interruptible, simulate
 from master.ssp.annotation import Record
@@ -133,6 +134,7 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
 
 
 def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
+    outcome = session.checked(outcome)
     try:
         done = session.conclude(outcome)
     except MasterError as error:  # no room for the summary, say
@@ -309,7 +311,7 @@ class _Session:
     def conclude(self, outcome: Outcome) -> Results:
         """Write the summary and return the results, of what is in the files."""
         recordings = tuple(r.recording for r in self._recorders)
-        description = _description(self._system, self._identity)
+        description = {**_description(self._system, self._identity), **self._not_judged(outcome, recordings[0])}
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
             **description,
@@ -323,6 +325,32 @@ class _Session:
         }
         results.write_json(self._folder / results.SUMMARY, summary)
         return replace(done, summary=summary)
+
+    def checked(self, outcome: Outcome) -> Outcome:
+        """Return how the run ended once it is seen whether it has covered what it was to cover."""
+        reason = self._lacking(self._recorders[0].recording) if outcome.status == "complete" else ""
+        if not reason or self._may_lack:
+            return outcome
+        error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")
+        return replace(outcome, status="incomplete", error=error)
+
+    @property
+    def _may_lack(self) -> bool:
+        """Whether the user has asked for less than the interval of interest."""
+        continuation = self._manner.continuation
+        begins_anew = continuation is not None and not continuation.is_same_run
+        return self._system.may_stop_early or begins_anew
+
+    def _lacking(self, recording: Recording) -> str:
+        interval = self._system.settings.interval
+        if reason := shortfall(recording, self._contacts, (interval.start, interval.end)):
+            return reason
+        silent = never_touched(recording, self._contacts)
+        return f"'{silent}' never touches the wire" if silent else ""
+
+    def _not_judged(self, outcome: Outcome, recording: Recording) -> dict[str, str]:
+        reason = self._lacking(recording) if outcome.status == "complete" else ""
+        return {"not_judged": reason} if reason else {}
 
     def _performance(self, outcome: Outcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from master import energy, store
+from master import energy, scenario_checks, store
 from master.errors import Problem, RequestError, ScenarioError
 from master.fmu_file import read_fmu
 from master.pattern import matcher
@@ -20,7 +20,7 @@ from master.ssp.ssd import Structure, read_structure
 from master.ssp.units import COMMON, conversion, split_quantity
 from master.ssp.validation import Checker, out_of_range, settable
 from master.ssp.xml import Reader
-from master.system import Component, Fmu, System, Variable
+from master.system import Component, Fmu, System, Variable, without
 
 DEFAULT_STEP = 1e-3
 #: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
@@ -45,6 +45,10 @@ class Overrides:
         Values as text by ``component.parameter``, with a unit (``12 kN``) or in the FMU's own.
     energy : bool
         Whether every FMU that can is to keep its energy balance, and that is to be recorded.
+    absent : tuple of str
+        Components that take no part.
+    may_stop_early : bool
+        Whether the stop time may lie before the end of the interval of interest.
     """
 
     stop: float | None = None
@@ -52,6 +56,8 @@ class Overrides:
     scheme: Scheme | None = None
     parameters: Mapping[str, str] = field(default_factory=dict)
     energy: bool = False
+    absent: tuple[str, ...] = ()
+    may_stop_early: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,30 @@ def load_system(package: Package, overrides: Overrides, tell: Callable[[str], No
     components = _override(components, overrides.parameters)
     if overrides.energy:
         components, settings = _with_energy(components, settings)
-    return System(package.name, components, connections, *times, settings)
+    system = System(package.name, components, connections, *times, settings, overrides.may_stop_early)
+    system = without(system, overrides.absent)
+    if overrides.stop is None and _goes_on_until_end(structure):
+        system = _until_end(system)
+    found = list(scenario_checks.problems(system, system.may_stop_early))
+    if found:
+        raise ScenarioError([Problem(SSD_NAME, 0, "interval", text) for text in found])
+    return system
+
+
+def _goes_on_until_end(structure: Structure) -> bool:
+    """Whether the end of the interval of interest ends the run, and not a stop time."""
+    interval = structure.annotations.settings.interval
+    if interval.until is None:
+        return structure.stop is None and interval.end is not None
+    return interval.until == "end"
+
+
+def _until_end(system: System) -> System:
+    stop = scenario_checks.stop_after_interval(system)
+    text = stop if isinstance(stop, str) else _step_problem(system.start, stop, system.step)
+    if text or isinstance(stop, str):
+        raise ScenarioError([Problem(SSD_NAME, 0, "stop", text)])
+    return replace(system, stop=stop)
 
 
 def _sorted(problems: Iterable[Problem]) -> list[Problem]:
@@ -152,8 +181,11 @@ def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) 
     start = structure.start
     stop = overrides.stop if overrides.stop is not None else structure.stop
     step = overrides.step if overrides.step is not None else structure.annotations.step or DEFAULT_STEP
+    if stop is None and _goes_on_until_end(structure):
+        return start, start + step, step  # until the system is known
     if stop is None:
-        problems.append(Problem(SSD_NAME, 0, "stop", "no stopTime in ssd:DefaultExperiment; give --stop"))
+        text = "no stopTime in ssd:DefaultExperiment, nor an end in Interval to go on until; give --stop"
+        problems.append(Problem(SSD_NAME, 0, "stop", text))
         stop = start + step
     if not (math.isfinite(start) and start < stop < math.inf):
         problems.append(Problem(SSD_NAME, 0, "stop", f"stop time {stop:g} s must lie after start time {start:g} s"))

@@ -18,7 +18,7 @@ from master.arrays import FloatArray
 from master.errors import MasterError, RunError
 from master.network import Network
 
-Status = Literal["complete", "interrupted", "failed"]
+Status = Literal["complete", "interrupted", "failed", "incomplete"]
 
 
 class Observer(Protocol):
@@ -65,7 +65,7 @@ class Outcome:
     Attributes
     ----------
     status : str
-        complete, interrupted or failed.
+        complete, interrupted, failed, or incomplete: it came to its end, and that is not enough to judge it.
     steps : int
         Completed macro steps.
     time : float

@@ -89,6 +89,10 @@ def chart(found: Chart) -> str:
     return f"<figure><figcaption><h3>{text(found.title)}</h3>{note}</figcaption>{place}</figure>"
 
 
+#: In the place of a verdict where there is none.
+NO_BADGE: Final = "<span class='badge'>EN 50367 not judged</span>"
+
+
 def mark(passed: bool) -> str:
     """Return a verdict in a word and a sign, not in colour alone."""
     kind, sign, word = ("pass", "\u2713", "passed") if passed else ("fail", "\u2717", "failed")
@@ -105,7 +109,7 @@ def verdict(assessment: Assessment, name: str, complete: bool = True) -> str:
     """Return the first screen of one contact: verdict and headline figures."""
     q = assessment.quality
     where = f"{q.start:.1f} m to {q.end:.1f} m at {3.6 * q.speed:.1f} km/h"
-    word = badge(assessment.passed, complete)
+    word = NO_BADGE if assessment.withheld else badge(assessment.passed, complete)
     aside = f"<span class='note'>{where}</span>{_broken(assessment)}"
     head = f"<div class='verdict'><b>{text(name)}</b> {word} {aside}</div>"
     tiles = "".join(
@@ -118,6 +122,8 @@ def verdict(assessment: Assessment, name: str, complete: bool = True) -> str:
 
 
 def _broken(assessment: Assessment) -> str:
+    if assessment.withheld:
+        return f" <span class='warning'>no verdict: {text(assessment.withheld)}</span>"
     names = ", ".join(c.name for c in assessment.criteria if not c.passed)
     return f" <span class='fail'>not kept: {text(names)}</span>" if names else ""
 
@@ -130,6 +136,8 @@ def _sign(passed: bool | None) -> str:
 
 def criteria(assessment: Assessment) -> str:
     """Return the verdict row by row."""
+    if assessment.withheld:
+        return f"<p class='warning'>No verdict: {text(assessment.withheld)}.</p>"
     rows = "".join(
         f"<tr><td>{text(c.name)}<div class='note'>{text(CLAUSES.get(c.name, ''))}</div></td>"
         f"<td class='n'>{text(c.value)}</td><td class='n'>{signs(c.limit)}</td><td>{mark(c.passed)}</td></tr>"

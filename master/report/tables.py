@@ -89,7 +89,9 @@ def headlines(assessment: Assessment) -> tuple[Headline, ...]:
     if (uplift := kept.get("uplift at supports")) is not None:
         found.append(_of_criterion("uplift", uplift))
     lost = f"{q.losses.percentage:.2f}"
-    found.append(Headline("loss", lost, "%", f"NQ {kept['NQ (estimate)'].limit}", _kept(kept, "NQ (estimate)")))
+    nq = kept.get("NQ (estimate)")
+    limit = "" if nq is None else f"NQ {nq.limit}"
+    found.append(Headline("loss", lost, "%", limit, _kept(kept, "NQ (estimate)")))
     return tuple(found)
 
 

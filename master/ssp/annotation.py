@@ -5,7 +5,7 @@ The annotation stands in the ``ssd:Annotations`` of the system structure descrip
     <ssc:Annotation type="urn:openpanto:ssp">
       <panto:Run xmlns:panto="urn:openpanto:ssp">
         <panto:Coupling scheme="jacobi"/>
-        <panto:Interval start="551" end="798"/>
+        <panto:Interval start="551" end="798" until="end"/>
         <panto:Calibration parameter="pantograph.static_force" meanForce="157.5" tolerance="0.1"/>
         <panto:Record variables="catenary.dropper[*].force" every="0.005"/>
       </panto:Run>
@@ -60,10 +60,15 @@ class Coupling(_Settings):
 
 
 class Interval(_Settings):
-    """Interval of interest along the track [m]; a missing end means the run's own."""
+    """Interval of interest along the track [m]; a missing end means the run's own.
+
+    ``until="end"`` lets the run go on until the last pantograph has left the interval, whatever stop time the scenario
+    has for other tools; ``until="stop"`` until the stop time. Not given, it is the stop time if there is one.
+    """
 
     start: float | None = None
     end: float | None = None
+    until: Literal["stop", "end"] | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> Interval:
@@ -111,7 +116,7 @@ _SECTIONS: Final[dict[str, type[_Settings]]] = {
     "Record": Record,
 }
 _LISTS: Final = ("order", "variables")
-_TEXTS: Final = (*_LISTS, "scheme", "parameter")
+_TEXTS: Final = (*_LISTS, "scheme", "parameter", "until")
 #: What an ``osp:Algorithm`` may hold.
 _ALGORITHMS: Final = ("FixedStepAlgorithm", "VariableStepAlgorithm")
 

@@ -82,6 +82,8 @@ def verdict(entry: Entry) -> str:
 
     A mean force off its target is named even where the study wants another mean.
     """
+    if entry.assessment.withheld:
+        return "not judged"
     failed = [c.name for c in entry.assessment.criteria if not c.passed]
     return f"fails: {', '.join(failed)}" if failed else "passes"
 

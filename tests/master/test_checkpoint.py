@@ -12,7 +12,7 @@ from master import checkpoint
 from master.algorithm import Iterative, Jacobi
 from master.checkpoint import Continuation, index_at, pack, unpack
 from master.cli import main
-from master.errors import MasterError, RunError, RequestError
+from master.errors import MasterError, RequestError, RunError
 from master.recorder import load
 from master.run import loaded
 from master.scenario import Overrides, open_scenario

@@ -2,7 +2,7 @@
 
 import pytest
 
-from master.errors import MasterError, ScenarioError, RequestError
+from master.errors import MasterError, RequestError, ScenarioError
 from master.study.family import family_names, load_family, store_values
 
 

@@ -9,7 +9,8 @@ from master.errors import InterruptedRunError, MasterError, RequestError
 from master.results import is_ours
 from master.study.family import load_family
 from master.study.session import study
-from master.study.variants import Runner, calibrate_variant, without
+from master.study.variants import Runner, calibrate_variant
+from master.system import without
 
 
 @pytest.fixture

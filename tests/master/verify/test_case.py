@@ -2,7 +2,7 @@
 
 import pytest
 
-from master.errors import ScenarioError, RequestError
+from master.errors import RequestError, ScenarioError
 from master.verify.case import CASES, find_cases, load_case, load_cases
 
 GOOD = """

@@ -40,6 +40,7 @@ from master.results import Results
 from master.simulation import Observer, Outcome, TimeGrid, interruptible, simulate
 from master.ssp.annotation import Record
 from master.system import Component, System, Variable
+from master.track_watch import TrackWatch
 from master.watch import ContactWatch
 
 _MEASURED: Final = ("output", "local")
@@ -267,6 +268,7 @@ class _Session:
         self._geometry = GeometryObserver(system, lambda g: results.write_json(folder / results.GEOMETRY, g))
         self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
+        self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
         self._cautions = CautionObserver()
         self._remembering: tuple[Remembering, ...] = (self._power, self._contact_watch)
         self._stopwatch = Stopwatch()
@@ -294,6 +296,7 @@ class _Session:
             self._power,
             self._stopwatch,
             self._contact_watch,
+            self._track_watch,
             self._cautions,
         ]
 

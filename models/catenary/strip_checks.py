@@ -72,7 +72,7 @@ def _beside_wire(wires: Sequence[WireAtRest], strip: FloatArray) -> str:
         missed = wire.points[_missed(wire, x, right, left)]
         missed = missed[[not _is_met(wires, point, right, left) for point in missed]]
         if len(missed):
-            x, y = missed[np.argmax(np.abs(missed[:, 1])), :2].tolist()
+            x, y = missed[0, :2].tolist()
             return (
                 f"reaches from y = {right:.3f} m to {left:.3f} m, and the contact wire lies at y = {y:.3f} m at "
                 f"x = {x:.6g} m: make strip_length longer than the stagger, or mend strip_offset"

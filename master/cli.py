@@ -30,7 +30,7 @@ from master.run import Manner, run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.ssp.annotation import SCHEMES, Calibration
 from master.ssp.archive import SSD_NAME, Package
-from master.ssp.pack import pack
+from master.ssp.pack import left_out, pack
 from master.ssp.ssd import read_structure
 from master.ssp.xml import Reader
 from master.study import command as study_command
@@ -369,7 +369,10 @@ def _pack(options: argparse.Namespace) -> int:
         archive = options.out or Path("dist") / f"{scenario.system.name}.ssp"
         if archive.is_dir():
             raise RequestError(f"{archive} is a folder; choose another name with --out")
-        print(pack(scenario.package.root, archive))
+        root = scenario.package.root
+        print(pack(root, archive))
+        if names := left_out(root):
+            _tell(f"left out, for {SSD_NAME} does not name it: {', '.join(names)}")
     return 0
 
 

@@ -47,6 +47,8 @@ class Overrides:
         Whether every FMU that can is to keep its energy balance, and that is to be recorded.
     absent : tuple of str
         Components that take no part.
+    empty : tuple of str
+        Parameters, ``component.parameter``, of a table that has no value for them; a line's must have one.
     may_stop_early : bool
         Whether the stop time may lie before the end of the interval of interest.
     """
@@ -57,6 +59,7 @@ class Overrides:
     parameters: Mapping[str, str] = field(default_factory=dict)
     energy: bool = False
     absent: tuple[str, ...] = ()
+    empty: tuple[str, ...] = ()
     may_stop_early: bool = False
 
 
@@ -113,6 +116,8 @@ def load_system(package: Package, overrides: Overrides, tell: Callable[[str], No
     if overrides.energy:
         components, settings = _with_energy(components, settings)
     system = System(package.name, components, connections, *times, settings, overrides.may_stop_early)
+    if text := scenario_checks.empty_cells(system, overrides.empty):
+        raise RequestError(text)
     system = without(system, overrides.absent)
     if overrides.stop is None and _goes_on_until_end(structure):
         system = _until_end(system)

@@ -9,7 +9,7 @@ is seen at its end (`master.evaluation.interval_coverage`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from master.contacts import find_contacts
@@ -60,6 +60,16 @@ def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
         yield from _idle(pantograph)
         if not may_stop_early:
             yield from _uncovered(system, pantograph)
+
+
+def empty_cells(system: System, names: Sequence[str]) -> str:
+    """Return what is wrong with parameters that a table has no value for, empty if they are not the line's.
+
+    A pantograph without values takes no part in a variant; without its line nothing is left to run.
+    """
+    lines = {c.catenary for c in find_contacts(system.connections)}
+    found = [name for name in names if any(name.startswith(f"{line}.") for line in lines)]
+    return f"the table has no value for {', '.join(found)}: write one into every row" if found else ""
 
 
 def stop_after_interval(system: System) -> float | str:

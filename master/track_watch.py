@@ -117,6 +117,6 @@ class TrackWatch:
         heights = [float(network.outputs[p]) for p in strip if p is not None]
         where = f" (its strip is at z = {sum(heights) / len(heights):.3f} m)" if heights else ""
         return (
-            f"'{contact.pantograph}' has not touched the wire by t = {time:.6g} s, though its uplift acts fully{where}: "
+            f"'{contact.pantograph}' has not touched the wire by t = {time:.6g} s, though its uplift acts{where}: "
             "check static force, reference_height, strip_length and strip_offset against the wire's height and stagger"
         )

@@ -1,7 +1,8 @@
 """A family as it lies in its scenario's folder: ``study.toml`` says what is reported, ``variants.csv`` what is varied.
 
 The table has a row for each variant. Its columns are ``component.parameter``, in the FMU's units, and the columns of
-the run itself (``stop``, ``step``). A component that has columns, but no value in a row, takes no part in that variant.
+the run itself (``stop``, ``step``). A value may have a unit (``12 kN``). A component that has columns, but no value in a
+row, takes no part in that variant; the line's cells must all have one.
 """
 
 from __future__ import annotations
@@ -88,6 +89,8 @@ class Variant(_Model):
         Text by ``component.parameter``.
     absent : tuple of str
         Components that take no part.
+    empty : tuple of str
+        Columns without a value.
     stop, step : float, optional
         Of the run [s].
     """
@@ -95,6 +98,7 @@ class Variant(_Model):
     name: str = Field(min_length=1)
     values: dict[str, str]
     absent: tuple[str, ...] = ()
+    empty: tuple[str, ...] = ()
     stop: float | None = Field(None, gt=0)
     step: float | None = Field(None, gt=0)
 
@@ -245,7 +249,8 @@ def _read_row(
     values = {h: c for h, c in cells.items() if "." in h and c}
     data: dict[str, Any] = {h: cells[h] for h in _RUN if cells.get(h)}
     try:
-        return [Variant(name=cells[_NAME], values=values, absent=_absent(heads, values), **data)]
+        empty = tuple(h for h, c in cells.items() if "." in h and not c)
+        return [Variant(name=cells[_NAME], values=values, absent=_absent(heads, values), empty=empty, **data)]
     except ValidationError as error:
         problems += _problems(path, line, error)
         return []

@@ -64,7 +64,8 @@ class Runner:
         ScenarioError, RequestError
             If scenario and table do not go together.
         """
-        overrides = Overrides(variant.stop, variant.step, parameters=variant.values, absent=variant.absent)
+        v = variant
+        overrides = Overrides(v.stop, v.step, parameters=v.values, absent=v.absent, empty=v.empty)
         with open_scenario(family.folder, overrides, self.tell, self.build) as scenario:
             yield replace(scenario.system, name=f"{family.name}: {variant.name}")
 

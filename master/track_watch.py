@@ -97,11 +97,10 @@ class TrackWatch:
         pantograph = self._system.component(contact.pantograph)
         x, speed = final_position(self._system, pantograph), parameter_value(pantograph, "speed")
         if x is not None and speed and x > extent[1]:
-            latest = self._system.stop - (x - extent[1]) / speed
+            latest = math.floor(100.0 * (self._system.stop - (x - extent[1]) / speed)) / 100.0
             raise RunError(
                 f"'{contact.pantograph}' would be at {x:g} m by the end of the run, beyond the contact wire of "
-                f"'{contact.catenary}', which ends at {extent[1]:g} m: stop at {math.floor(100.0 * latest) / 100.0:g} s "
-                "or earlier"
+                f"'{contact.catenary}', which ends at {extent[1]:g} m: stop at {latest:g} s or earlier"
             )
 
     def _check_extent(self, contact: Contact, extent: tuple[float, float], network: Network) -> None:

@@ -1,4 +1,4 @@
-"""Writing a scenario folder as a ``.ssp`` archive: what its description names, and the same files give the same bytes."""
+"""Writing a scenario folder as a ``.ssp`` archive: what its description names; the same files give the same bytes."""
 
 from __future__ import annotations
 

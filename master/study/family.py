@@ -1,8 +1,8 @@
 """A family as it lies in its scenario's folder: ``study.toml`` says what is reported, ``variants.csv`` what is varied.
 
 The table has a row for each variant. Its columns are ``component.parameter``, in the FMU's units, and the columns of
-the run itself (``stop``, ``step``). A value may have a unit (``12 kN``). A component that has columns, but no value in a
-row, takes no part in that variant; the line's cells must all have one.
+the run itself (``stop``, ``step``). A value may have a unit (``12 kN``). A component that has columns, but no value in
+a row, takes no part in that variant; the line's cells must all have one.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
             local=(_dropper_port(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
-            calculated=(*_geometry_ports(part), *_section_ports(part), *_period_ports(part), _wave_port()),
+            calculated=(*_geometry_ports(part), *_section_ports(part), *_extent_ports(part), _wave_port()),
         )
 
     def _initialise(self, part: CatenaryPart, time: float, inputs: FloatArray) -> None:
@@ -66,7 +66,9 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         part.step(inputs.reshape(self.pantographs, 2, 2, 3), step)
 
     def _doubts(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
-        along_track = inputs.reshape(self.pantographs, 2, 2, 3)[:, :, 1, 0]
+        strips = inputs.reshape(self.pantographs, 2, 2, 3)
+        along_track = strips[:, :, 1, 0]
+        part.check_strips(strips)
         yield slack_warning(part.droppers, part.model.static.dropper_force)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 
@@ -157,10 +159,12 @@ def _section_ports(part: CatenaryPart) -> tuple[Port, ...]:
     )
 
 
-def _period_ports(part: CatenaryPart) -> tuple[Port, ...]:
-    """Say after which length a line repeats that closes on itself."""
+def _extent_ports(part: CatenaryPart) -> tuple[Port, ...]:
+    """Say where the wire begins and ends, or after which length a line repeats that closes on itself."""
     if not part.period.any():
-        return ()
+        ends = ("begin", "end")
+        signals = tuple(Signal(f"contact_wire.{e}", "m", f"{e} of the contact wire along the track") for e in ends)
+        return (Port(signals, attrgetter("contact_wire_ends")),)
     text = "length after which the line repeats: its last span ends where its first one begins"
     return (Port((Signal("period", "m", text),), attrgetter("period")),)
 

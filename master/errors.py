@@ -81,5 +81,12 @@ class InterruptedRunError(RunError):
     """A run that the user stopped."""
 
 
+class RequestError(MasterError):
+    """A command line that asks for what cannot be had: a name that is nowhere, a value out of range.
+
+    The command has failed (exit code 1), as it has for a scenario or a file that cannot be used.
+    """
+
+
 class UsageError(MasterError):
-    """A wrong command line."""
+    """A command line that was not understood: options that lack or exclude one another (exit code 2)."""

@@ -26,7 +26,8 @@ from master.checkpoint import (
     take,
 )
 from master.contacts import find_contacts
-from master.errors import InterruptedRunError, MasterError, RunError, UsageError
+from master.errors import InterruptedRunError, MasterError, RequestError, RunError
+from master.evaluation.interval_coverage import never_touched, shortfall
 from master.instance import Instance, Recordable
 from master.interface import PowerObserver
 from master.isolation import IsolatedInstance, Isolation
@@ -34,11 +35,12 @@ from master.line import GeometryObserver
 from master.network import Network
 from master.pattern import matcher
 from master.realtime import Pacer
-from master.recorder import Recorder, Source
+from master.recorder import Recorder, Recording, Source
 from master.results import Results
 from master.simulation import Observer, Outcome, TimeGrid, interruptible, simulate
 from master.ssp.annotation import Record
 from master.system import Component, System, Variable
+from master.track_watch import TrackWatch
 from master.watch import ContactWatch
 
 _MEASURED: Final = ("output", "local")
@@ -113,7 +115,7 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
     ------
     RunError
         If the run stops before its end; what was computed is in the folder then.
-    UsageError
+    RequestError
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
@@ -133,6 +135,7 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
 
 
 def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
+    outcome = session.checked(outcome)
     try:
         done = session.conclude(outcome)
     except MasterError as error:  # no room for the summary, say
@@ -159,7 +162,7 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
         if continuation.is_same_run:
             known = results.identity(folder)
             if not known or known != continuation.checkpoint.run:
-                raise UsageError(f"{continuation.file} comes from another run than the results beside it")
+                raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
     results.prepare(folder)
     return uuid.uuid4().hex
@@ -265,6 +268,7 @@ class _Session:
         self._geometry = GeometryObserver(system, lambda g: results.write_json(folder / results.GEOMETRY, g))
         self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
+        self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
         self._cautions = CautionObserver()
         self._remembering: tuple[Remembering, ...] = (self._power, self._contact_watch)
         self._stopwatch = Stopwatch()
@@ -292,6 +296,7 @@ class _Session:
             self._power,
             self._stopwatch,
             self._contact_watch,
+            self._track_watch,
             self._cautions,
         ]
 
@@ -309,7 +314,7 @@ class _Session:
     def conclude(self, outcome: Outcome) -> Results:
         """Write the summary and return the results, of what is in the files."""
         recordings = tuple(r.recording for r in self._recorders)
-        description = _description(self._system, self._identity)
+        description = {**_description(self._system, self._identity), **self._not_judged(outcome, recordings[0])}
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
             **description,
@@ -324,6 +329,32 @@ class _Session:
         results.write_forces(done)
         results.write_json(self._folder / results.SUMMARY, summary)
         return replace(done, summary=summary)
+
+    def checked(self, outcome: Outcome) -> Outcome:
+        """Return how the run ended once it is seen whether it has covered what it was to cover."""
+        reason = self._lacking(self._recorders[0].recording) if outcome.status == "complete" else ""
+        if not reason or self._may_lack:
+            return outcome
+        error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")
+        return replace(outcome, status="incomplete", error=error)
+
+    @property
+    def _may_lack(self) -> bool:
+        """Whether the user has asked for less than the interval of interest."""
+        continuation = self._manner.continuation
+        begins_anew = continuation is not None and not continuation.is_same_run
+        return self._system.may_stop_early or begins_anew
+
+    def _lacking(self, recording: Recording) -> str:
+        interval = self._system.settings.interval
+        if reason := shortfall(recording, self._contacts, (interval.start, interval.end)):
+            return reason
+        silent = never_touched(recording, self._contacts)
+        return f"'{silent}' never touches the wire" if silent else ""
+
+    def _not_judged(self, outcome: Outcome, recording: Recording) -> dict[str, str]:
+        reason = self._lacking(recording) if outcome.status == "complete" else ""
+        return {"not_judged": reason} if reason else {}
 
     def _performance(self, outcome: Outcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None

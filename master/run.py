@@ -26,7 +26,8 @@ from master.checkpoint import (
     take,
 )
 from master.contacts import find_contacts
-from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RunError, UsageError
+from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
+from master.evaluation.interval_coverage import never_touched, shortfall
 from master.instance import Instance, Recordable
 from master.interface import PowerObserver
 from master.interruption import heeded_at_once, interruptible
@@ -41,6 +42,7 @@ from master.simulation import Observer, Outcome, TimeGrid, simulate
 from master.ssp.annotation import Record
 from master.supervision import phase, unfinished
 from master.system import Component, System, Variable
+from master.track_watch import TrackWatch
 from master.watch import ContactWatch
 
 _MEASURED: Final = ("output", "local")
@@ -119,7 +121,7 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
         If another process works in the folder.
     MasterError
         If the folder is not ours, or was removed or taken over meanwhile.
-    UsageError
+    RequestError
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
@@ -152,6 +154,7 @@ def _run(
 
 
 def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
+    outcome = session.checked(outcome)
     try:
         done = session.conclude(outcome)
     except ForeignResultsError as error:
@@ -181,7 +184,7 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
         if continuation.is_same_run:
             known = results.identity(folder)
             if not known or known != continuation.checkpoint.run:
-                raise UsageError(f"{continuation.file} comes from another run than the results beside it")
+                raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
     results.prepare(folder, None if continuation is None else Path(continuation.file))
     return uuid.uuid4().hex
@@ -328,6 +331,7 @@ class _Session:
         self._geometry = GeometryObserver(system, lambda g: results.write_json(folder / results.GEOMETRY, g))
         self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
+        self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
         self._cautions = CautionObserver()
         self._remembering: tuple[Remembering, ...] = (self._power, self._contact_watch)
         self._stopwatch = Stopwatch()
@@ -355,6 +359,7 @@ class _Session:
             self._power,
             self._stopwatch,
             self._contact_watch,
+            self._track_watch,
             self._cautions,
         ]
 
@@ -378,7 +383,7 @@ class _Session:
             If the files are no longer those that this run wrote.
         """
         recordings = self._recordings(outcome)
-        description = _description(self._system, self._identity)
+        description = {**_description(self._system, self._identity), **self._not_judged(outcome, recordings[0])}
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
             **description,
@@ -415,6 +420,32 @@ class _Session:
                 found = f"has {len(recording.time)} rows, {recorder.rows} were written"
                 raise ForeignResultsError(f"{recorder.path} {found}: it was changed {advice}")
         return recordings
+
+    def checked(self, outcome: Outcome) -> Outcome:
+        """Return how the run ended once it is seen whether it has covered what it was to cover."""
+        reason = self._lacking(self._recorders[0].recording) if outcome.status == "complete" else ""
+        if not reason or self._may_lack:
+            return outcome
+        error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")
+        return replace(outcome, status="incomplete", error=error)
+
+    @property
+    def _may_lack(self) -> bool:
+        """Whether the user has asked for less than the interval of interest."""
+        continuation = self._manner.continuation
+        begins_anew = continuation is not None and not continuation.is_same_run
+        return self._system.may_stop_early or begins_anew
+
+    def _lacking(self, recording: Recording) -> str:
+        interval = self._system.settings.interval
+        if reason := shortfall(recording, self._contacts, (interval.start, interval.end)):
+            return reason
+        silent = never_touched(recording, self._contacts)
+        return f"'{silent}' never touches the wire" if silent else ""
+
+    def _not_judged(self, outcome: Outcome, recording: Recording) -> dict[str, str]:
+        reason = self._lacking(recording) if outcome.status == "complete" else ""
+        return {"not_judged": reason} if reason else {}
 
     def _performance(self, outcome: Outcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None

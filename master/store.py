@@ -20,8 +20,6 @@ from xml.etree import ElementTree
 #: Seconds after which asking for a fingerprint, or building, is given up.
 _ASK_SECONDS: Final = 60
 _BUILD_SECONDS: Final = 600
-#: Exit code of ``python -m fmus`` for a name it does not know.
-_UNKNOWN: Final = 2
 #: What a damaged, encrypted or exotically compressed archive raises.
 _UNREADABLE: Final = (
     OSError,
@@ -69,15 +67,13 @@ def fingerprint(name: str) -> str | None:
         With the builder's own words, if it knows the name but cannot tell.
     """
     try:
-        answer = _fmus("fingerprint", "--", name, seconds=_ASK_SECONDS)
+        answer = _fmus("fingerprint", "--if-known", "--", name, seconds=_ASK_SECONDS)
     except subprocess.TimeoutExpired:
         return None
-    if answer.returncode == _UNKNOWN:
-        return None
-    lines = answer.stdout.split()
-    if answer.returncode != 0 or not lines:
+    if answer.returncode != 0:
         raise ValueError(f"cannot be built: {_last_line(answer)}")
-    return lines[-1]
+    lines = answer.stdout.split()
+    return lines[-1] if lines else None
 
 
 def stored_guid(path: Path) -> str:

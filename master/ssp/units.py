@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -91,6 +92,26 @@ COMMON: Final = {
         _unit("degC", 1.0, 273.15, K=1),
     )
 }
+
+
+#: A number, as Python writes it, and a unit or none.
+_QUANTITY: Final = re.compile(
+    r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf))\s*(\S*)\s*", re.ASCII | re.IGNORECASE
+)
+
+
+def split_quantity(text: str) -> tuple[float | None, str]:
+    """Return the number in a text such as ``12 kN``, None if there is none, and its unit, empty if it has none.
+
+    Examples
+    --------
+    >>> split_quantity("12 kN"), split_quantity("-.5"), split_quantity("300km/h")
+    ((12.0, 'kN'), (-0.5, ''), (300.0, 'km/h'))
+    >>> split_quantity("much")
+    (None, '')
+    """
+    match = _QUANTITY.fullmatch(text)
+    return (None, "") if match is None else (float(match[1]), match[2])
 
 
 def parse_units(node: Any | None, reader: Reader) -> dict[str, Unit]:

@@ -30,7 +30,7 @@ _USER_ERRORS = (
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run ``python -m models``; return 0, 1 (the run failed) or 2 (wrong command line or input)."""
+    """Run ``python -m models``; return 0, 1 (failed or invalid) or 2 (a command line that was not understood)."""
     parser = argparse.ArgumentParser(prog="python -m models", description="Physics of lines and pantographs.")
     subparsers = parser.add_subparsers(dest="verb", required=True)
     for verb in _VERBS:
@@ -40,7 +40,7 @@ def main(argv: Sequence[str]) -> int:
         return int(arguments.run(arguments))
     except _USER_ERRORS as error:
         print(f"error: {error}", file=sys.stderr)
-        return 2 if isinstance(error, (DefinitionError, UnknownNameError, ParameterError)) else 1
+        return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 1

@@ -63,13 +63,15 @@ def run(arguments: argparse.Namespace) -> int:
     """Run and print the contact-force figures."""
     _check_step(arguments)
     chosen = chosen_filter(arguments)
-    definition = load_line(arguments.line).with_values(settings(arguments.set, "line"))
+    definition = load_line(arguments.line)
+    definition = definition.with_values(settings(arguments.set, "line", definition))
     line = CatenaryModel(definition)
     span = _span_of(arguments, line)
     _check_length(arguments, span)
     speed = arguments.speed / 3.6
-    wanted = {"speed": speed, "start_position": span[0]} | settings(arguments.set, "pantograph")
-    pantograph = load_lumped(arguments.pantograph).with_values(wanted)
+    pantograph = load_lumped(arguments.pantograph)
+    given = settings(arguments.set, "pantograph", pantograph)
+    pantograph = pantograph.with_values({"speed": speed, "start_position": span[0]} | given)
     warn(_limits(line, pantograph, arguments.step))
     coupled = CoupledModel(line, [pantograph])
     stop = (span[1] - span[0]) / speed

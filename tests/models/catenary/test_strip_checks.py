@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.catenary.strip_checks import WireAtRest, check_strips
+from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
 from models.part import ParameterError
 
 
@@ -31,6 +31,13 @@ def test_a_strip_at_work_is_taken():
 def test_a_strip_above_the_wire_is_refused_with_its_height():
     with pytest.raises(ParameterError, match=r"stands at 5\.300 m, 300 mm above .* 6e\+03 N: lower .* to 5\.000 m"):
         check([wire(0.2)], strip(z=5.3), 6000.0)
+
+
+def test_one_that_is_pushed_into_the_wire_is_warned_of():
+    wires, strips = [wire(0.2)], strip(z=5.04)
+    check(wires, strips, 800.0)
+    assert "40 mm above the contact wire" in start_warning(wires, strips, np.array([800.0]))
+    assert start_warning(wires, strips, np.array([300.0])) == ""
 
 
 @pytest.mark.parametrize(("half", "offset", "y"), [(0.15, 0.0, "-0.1"), (0.7, 0.6, "-0.1"), (0.7, -0.6, "0.1")])

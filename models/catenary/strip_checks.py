@@ -9,8 +9,8 @@ import numpy as np
 
 from models.part import BoolArray, FloatArray, ParameterError
 
-#: Contact force at the first instant that is warned of, and that no line is meant for [N]: EN 50367 allows at most 400 N
-#: while running, and a strip that is pushed into the wire on purpose is so by a few centimetres.
+#: Contact force at the first instant that is warned of, and that no line is meant for [N]: EN 50367 allows 400 N
+#: at most while running, and a strip that is pushed into the wire on purpose is so by a few centimetres.
 LARGEST_USUAL: Final = 500.0
 LARGEST_AT_REST: Final = 2000.0
 #: A strip farther below the wire than this is no strip at work (an unconnected port, a lowered pantograph) [m].

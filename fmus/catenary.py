@@ -80,6 +80,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         strips = inputs.reshape(self.pantographs, 2, 2, 3)
         along_track = strips[:, :, 1, 0]
         part.check_strips(strips)
+        yield part.start_warning(strips)
         yield slack_warning(part.droppers, part.model.static.dropper_force)
         yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))

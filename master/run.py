@@ -154,9 +154,10 @@ def _run(
 
 
 def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
-    outcome = session.checked(outcome)
     try:
-        done = session.conclude(outcome)
+        recordings = session.recordings(outcome)
+        outcome = session.checked(outcome, recordings[0])
+        done = session.conclude(outcome, recordings)
     except ForeignResultsError as error:
         session.disown(error)
         raise ForeignResultsError(f"{outcome.error}. {error}" if outcome.error else str(error)) from error
@@ -374,15 +375,8 @@ class _Session:
             recorder.sync()  # no checkpoint is ahead of the rows that it goes on from
         return take(self._system, network, self.algorithm, index, self._remembering, self._identity)
 
-    def conclude(self, outcome: Outcome) -> Results:
-        """Write the summary and return the results, of what is in the files.
-
-        Raises
-        ------
-        ForeignResultsError
-            If the files are no longer those that this run wrote.
-        """
-        recordings = self._recordings(outcome)
+    def conclude(self, outcome: Outcome, recordings: tuple[Recording, ...]) -> Results:
+        """Write the summary and return the results, of what is in the files."""
         description = {**_description(self._system, self._identity), **self._not_judged(outcome, recordings[0])}
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
@@ -406,8 +400,14 @@ class _Session:
             data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
             results.write_json(self._folder / results.SUMMARY, data)
 
-    def _recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
-        """Read what was recorded; refuses files that are not those that this run has written."""
+    def recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
+        """Read what was recorded.
+
+        Raises
+        ------
+        ForeignResultsError
+            If the files are no longer those that this run wrote.
+        """
         advice = "while the run went on; run it again, in a folder of its own (--out)"
         if not _is_still(self._folder, self._identity):
             raise ForeignResultsError(f"the results in {self._folder} were removed or taken by another run {advice}")
@@ -421,9 +421,9 @@ class _Session:
                 raise ForeignResultsError(f"{recorder.path} {found}: it was changed {advice}")
         return recordings
 
-    def checked(self, outcome: Outcome) -> Outcome:
+    def checked(self, outcome: Outcome, recording: Recording) -> Outcome:
         """Return how the run ended once it is seen whether it has covered what it was to cover."""
-        reason = self._lacking(self._recorders[0].recording) if outcome.status == "complete" else ""
+        reason = self._lacking(recording) if outcome.status == "complete" else ""
         if not reason or self._may_lack:
             return outcome
         error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")

@@ -43,7 +43,7 @@ class Wire:
 
     area: float = quantity("m2", "cross-section", positive=True, minimum=1e-6, maximum=1e-2)
     mass: float = quantity("kg/m", "mass per length", positive=True, minimum=0.01, maximum=20.0)
-    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e9, maximum=1e12)
+    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e7, maximum=1e12)
     tension: float = quantity("N", "tension", positive=True, minimum=500.0, maximum=1e5)
     bending_stiffness: float | None = quantity("N.m2", "bending stiffness EI", default=None, minimum=0.0, maximum=1e5)
 

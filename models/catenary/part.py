@@ -11,7 +11,7 @@ from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.parameters import CatenaryDefinition
 from models.catenary.statics import contact_wire_wave_speed, elasticity
-from models.catenary.strip_checks import WireAtRest, check_strips
+from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
 from models.contact import application_point
 from models.energy import NO_BALANCE
 from models.extrapolation import StripExtrapolation
@@ -190,6 +190,10 @@ class CatenaryPart:
         strips : ndarray, shape (P, 2, 2, 3)
         """
         check_strips(wires_at_rest(self.model), strips, self.contact_force)
+
+    def start_warning(self, strips: FloatArray) -> str:
+        """Return which of the strips begins inside the wire, empty if none does; shape as of `check_strips`."""
+        return start_warning(wires_at_rest(self.model), strips, self.contact_force)
 
     def initialise(self, time: float, strips: FloatArray) -> None:
         """Put the line to rest at ``time`` and find the contacts of the strips with it.

@@ -9,8 +9,10 @@ import numpy as np
 
 from models.part import BoolArray, FloatArray, ParameterError
 
-#: Contact force at the first instant that no line is meant for [N]: EN 50367 allows 400 N at most while running.
-LARGEST_AT_REST: Final = 500.0
+#: Contact force at the first instant that is warned of, and that no line is meant for [N]: EN 50367 allows 400 N
+#: at most while running, and a strip that is pushed into the wire on purpose is so by a few centimetres.
+LARGEST_USUAL: Final = 500.0
+LARGEST_AT_REST: Final = 2000.0
 #: A strip farther below the wire than this is no strip at work (an unconnected port, a lowered pantograph) [m].
 _REACH: Final = 3.0
 
@@ -46,13 +48,20 @@ def check_strips(wires: Sequence[WireAtRest], strips: FloatArray, force: FloatAr
         For the first of these strips, with what to do.
     """
     for number, (strip, found) in enumerate(zip(strips, force.tolist(), strict=True), 1):
-        text = _inside_wire(wires, strip, found) or _beside_wire(wires, strip)
+        text = _inside_wire(wires, strip, found, LARGEST_AT_REST) or _beside_wire(wires, strip)
         if text:
             raise ParameterError(f"the strip of pantograph {number} {text}")
 
 
-def _inside_wire(wires: Sequence[WireAtRest], strip: FloatArray, force: float) -> str:
-    if force <= LARGEST_AT_REST:
+def start_warning(wires: Sequence[WireAtRest], strips: FloatArray, force: FloatArray) -> str:
+    """Return which strip begins inside a wire, empty if none does; the arguments are those of `check_strips`."""
+    found = zip(strips, force.tolist(), strict=True)
+    texts = [_inside_wire(wires, strip, value, LARGEST_USUAL) for strip, value in found]
+    return next((f"the strip of pantograph {i} {text}" for i, text in enumerate(texts, 1) if text), "")
+
+
+def _inside_wire(wires: Sequence[WireAtRest], strip: FloatArray, force: float, largest: float) -> str:
+    if force <= largest:
         return ""
     x, z = float(strip[:, 0, 0].mean()), float(strip[:, 0, 2].mean())
     wire = min(_heights(wires, x), default=z)

@@ -93,7 +93,7 @@ def test_the_first_step_can_be_too_long(instantiate, sound):
 
 def test_a_line_that_cannot_be_built_tells_errors_alone(instantiate, sound):
     line = instantiate(sound)
-    line.initialise(**{"contact_wire.tension": 1.0})
+    line.initialise(**{"contact_wire.tension": 500.0, "contact_wire.mass": 20.0})
     assert line.warnings == []
     assert "no static equilibrium of the wanted shape" in line.errors[0]
 

@@ -5,19 +5,11 @@ Every function returns a sentence for the user, empty where there is nothing to 
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from models.pantograph.lumped_characteristics import contact_force_over_height
 from models.pantograph.parameters import LumpedDefinition
-
-#: A wire farther than this above the reference height is at another working height, and not merely sagging less [m].
-_SAME_HEIGHT: Final = 0.1
-#: Largest share of the static force that the chain's lowest spring may take away by then.
-_LARGEST_LOSS: Final = 0.1
-#: A wire farther than this from the pantograph's start is not the one above it [m].
-_NEAR: Final = 1.0
+from models.pantograph.working_height import Raised
 
 
 def working_height_warning(definition: LumpedDefinition, x: float, z: float) -> str:
@@ -29,17 +21,12 @@ def working_height_warning(definition: LumpedDefinition, x: float, z: float) -> 
     x, z : float
         Where the wire is above the strip as it starts [m].
     """
-    reference, force = definition.reference_height, definition.static_force
-    if abs(x - definition.start_position) > _NEAR or z - reference <= _SAME_HEIGHT or not force:
+    force, reference = definition.static_force, definition.reference_height
+    raised = Raised("static_force", force, "N", reference, definition.start_position)
+    if not raised.is_under_another_height(x, z) or not force:
         return ""
     try:
         left = float(contact_force_over_height(definition, np.array([z]))[0])
     except np.linalg.LinAlgError:  # nothing joins a mass to the one below
         return ""
-    if left >= (1.0 - _LARGEST_LOSS) * force:
-        return ""
-    what = f"{left:.0f} N are left" if left > 0.0 else "nothing is left, and the strip does not reach it"
-    return (
-        f"the static force of {force:g} N is that at the reference height, {reference:g} m; at the wire's, {z:.2f} m, "
-        f"{what}: set reference_height to the wire's height, or find static_force anew"
-    )
+    return raised.warning(z, left, force)

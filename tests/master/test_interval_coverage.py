@@ -9,6 +9,7 @@ import pytest
 from master.cli import main
 from master.contacts import Contact
 from master.errors import RequestError
+from master.evaluation.en50367_limits import LimitChoice
 from master.evaluation.interval_coverage import never_touched, shortfall
 from master.recorder import Recording
 from master.report.markup import verdict
@@ -129,12 +130,13 @@ def test_an_energy_that_does_not_balance_withholds_the_verdict_not_the_figures(t
         run = Recording(time, (*names, *works), units, columns)
         contact = asdict(Contact(1, "line", "train", "line.p.contact"))
         summary = {"status": "complete", "contacts": [contact], "settings": {"interval": {"start": 10.0, "end": 90.0}}}
-        (found,) = Results(tmp_path, summary, (run,), {}).assessments()
+        done = Results(tmp_path, summary, (run,), {})
+        (found,) = done.assessments()
         assert found.quality.mean == pytest.approx(150.0)
         assert bool(found.withheld) == withheld
         assert bool(found.criteria) != withheld
-        assert ("not judged" in verdict(found, "train")) == withheld
-        data = figures((found,), ())["quality"][0]
+        assert ("not judged" in verdict(found, "train", LimitChoice())) == withheld
+        (data,) = figures(done)["quality"]
         assert (data["passed"] is None) == withheld
 
 

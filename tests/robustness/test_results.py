@@ -28,7 +28,7 @@ SOUND = {
     ("generator",): VALUES, ("status",): ("x", NOTHING), ("scenario",): ("x", NOTHING), ("contacts",): ([], NOTHING),
     ("contacts", 0, "index"): (1,), ("contacts", 0, "ends"): ({}, NOTHING), ("contacts", 0, "told"): ("x", NOTHING),
     ("contacts", 0, "catenary"): ("x",), ("contacts", 0, "pantograph"): ("x",), ("contacts", 0, "prefix"): ("x",),
-    ("settings",): ({}, NOTHING), ("settings", "start"): VALUES, ("settings", "stop"): VALUES,
+    ("settings",): ({}, NOTHING), ("settings", "start"): (None, 1, 1e3, NOTHING), ("settings", "stop"): VALUES,
     ("settings", "step"): VALUES, ("settings", "interval"): ({}, NOTHING),
     ("settings", "interval", "start"): (None, 1, 1e3, NOTHING),
     ("settings", "interval", "end"): (None, 1, 1e3, NOTHING),

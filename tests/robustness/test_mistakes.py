@@ -124,6 +124,38 @@ def test_the_physics_refuses_them_too(setting, parts):
     refused(ask(models, "statics", "LN2", "--set", setting), *parts)
 
 
+@pytest.mark.parametrize(
+    ("setting", "parts"),
+    [
+        ("pantograph.reference_height=5.35", ("mm above the contact wire at x = 500 m", "lower its reference_height")),
+        ("pantograph.reference_height=5020", ("5020 m is outside 2 ... 10 m", "check its size and its unit")),
+        ("pantograph.strip_length=0.3", ("the contact wire lies at y = ", "make strip_length longer than the stagger")),
+        ("pantograph.strip_offset=1.5", ("the contact wire lies at y = ", "or mend strip_offset")),
+        ("pantograph.static_force=0", ("static_force = 0 N never lifts the strip", "give it more than 0")),
+        ("pantograph.speed=80", ("pantograph.speed: the run's own options say that", "give --speed")),
+        ("pantograph.start_position=0", ("the run's own options say that", "give --start")),
+        ("pantograph.reference_height=2.5", ("'CX' never touches the wire", "check static_force, reference_height")),
+    ],
+)
+def test_the_monolithic_run_refuses_them_too(setting, parts):
+    refused(ask(models, "couple", "LN2", "CX", "--start", "500", "--end", "595", "--quiet", "--set", setting), *parts)
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("line.profile.contact_wire_height=5.30", "at the wire's, 5.30 m, 114 N are left: set reference_height"),
+        ("pantograph.reference_height=5.12", "mm above the contact wire at x = 500 m, and would begin with"),
+        ("pantograph.reference_height=5.02", ""),
+    ],
+)
+def test_the_monolithic_run_warns_as_the_fmus_do(setting, said):
+    options = ["--start", "500", "--end", "512", "--quiet", "--set", setting]
+    answer = ask(models, "couple", "LN2", "CX", *options)
+    assert answer.code == 0
+    assert [said in line for line in answer.err.splitlines() if line.startswith("warning: ")] == [True] * bool(said)
+
+
 def test_values_with_units_are_taken(scenario, tmp_path):
     """The same value with a unit gives the same run."""
     for name, speed in (("plain", "83.3333333333333333"), ("unit", "300 km/h")):

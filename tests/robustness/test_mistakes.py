@@ -5,6 +5,7 @@ Every mistake stands with what its sentence must say, the cure among it.
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -110,6 +111,26 @@ def test_stop_times_and_intervals_that_do_not_go_together(scenario, tmp_path, ol
     assert old in description.read_text()
     description.write_text(description.read_text().replace(old, new))
     refused(ask(master, "validate", folder, "--no-build"), *parts)
+
+
+@pytest.mark.parametrize("stop", ['stopTime="5.16"', 'stopTime="0.1"', ""])
+def test_a_run_until_the_end_of_its_interval_ends_there(scenario, tmp_path, stop):
+    """It has 60 m to go at 300 km/h, 0.72 s, and goes on for 0.5 s, whatever stop time other tools are told."""
+    folder, out = tmp_path / "changed.ssp", tmp_path / "out"
+    shutil.copytree(scenario, folder)
+    description = folder / "SystemStructure.ssd"
+    text = description.read_text().replace('stopTime="5.16"', stop)
+    description.write_text(text.replace('start="240" end="360"', 'start="60" end="90" until="end"'))
+    assert "0 s to 1.22 s" in ask(master, "validate", folder, "--no-build").out
+    assert ask(master, "run", folder, "--no-build", "--quiet", "--no-report", "--out", out).code == 0
+    done = json.loads((out / "summary.json").read_text())
+    assert (done["status"], done["settings"]["stop"]) == ("complete", pytest.approx(1.22))
+    assert "not_judged" not in done
+    (quality,) = done["quality"]
+    assert (quality["start"], quality["end"]) == (pytest.approx(60.0, abs=0.1), pytest.approx(90.0, abs=0.1))
+    assert quality["criteria"]
+    last = (out / "timeseries.csv").read_text().splitlines()[-1]
+    assert float(last.split(",")[0]) == pytest.approx(1.22)
 
 
 @pytest.mark.parametrize(

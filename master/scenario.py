@@ -128,7 +128,7 @@ def load_system(package: Package, overrides: Overrides, tell: Callable[[str], No
     problems = reader.problems or ([w for w in reader.warnings if w.rule != NOTE] if overrides.strict else [])
     if problems:
         raise ScenarioError(_sorted(problems))
-    components = _override(components, overrides.parameters)
+    components = with_values(components, overrides.parameters)
     if overrides.tolerance is not None:
         components = tuple(replace(c, tolerance=overrides.tolerance) for c in components)
     if overrides.energy:
@@ -283,11 +283,24 @@ def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterat
         yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components"
 
 
-def _override(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
+def with_values(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
+    """Return components with other parameter values.
+
+    Parameters
+    ----------
+    components : tuple of Component
+    values : mapping
+        Values as text, with a unit or in the FMU's own, by ``component.parameter``.
+
+    Raises
+    ------
+    RequestError
+        If there is no such parameter, or it cannot take the value.
+    """
     for full, text in values.items():
         index, variable = find_parameter(components, full)
-        parameters = {**components[index].parameters, variable.name: _typed(variable, full, text)}
-        changed = replace(components[index], parameters=parameters)
+        old = components[index]
+        changed = replace(old, parameters={**old.parameters, variable.name: _typed(old.fmu, variable, full, text)})
         components = (*components[:index], changed, *components[index + 1 :])
     return components
 
@@ -327,7 +340,7 @@ def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, V
     raise RequestError(f"there is no parameter '{full}' in the scenario{hint}")
 
 
-def _typed(variable: Variable, full: str, text: str) -> float | int | bool | str:
+def _typed(fmu: Fmu, variable: Variable, full: str, text: str) -> float | int | bool | str:
     reason = settable(variable, variable.type if variable.type != "Enumeration" else "Integer")
     if reason:
         raise RequestError(f"parameter '{full}' {reason}")
@@ -338,15 +351,15 @@ def _typed(variable: Variable, full: str, text: str) -> float | int | bool | str
             raise RequestError(f"parameter '{full}': '{text}' is neither true nor false")
         return text.lower() in ("true", "1")
     items = dict(variable.items)
-    number = items[text] if text in items else _number(variable, full, text)
+    number = items[text] if text in items else _number(fmu, variable, full, text)
     reason = out_of_range(variable, number)
     if reason:
         raise RequestError(f"parameter '{full}' {reason}")
     return number
 
 
-def _number(variable: Variable, full: str, text: str) -> float:
-    return _quantity(variable, full, text) if variable.type == "Real" else _whole(full, text)
+def _number(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
+    return _quantity(fmu, variable, full, text) if variable.type == "Real" else _whole(full, text)
 
 
 def _whole(full: str, text: str) -> int:
@@ -356,7 +369,7 @@ def _whole(full: str, text: str) -> int:
         raise RequestError(f"parameter '{full}': '{text}' is not a whole number") from None
 
 
-def _quantity(variable: Variable, full: str, text: str) -> float:
+def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
     """Return a number in the FMU's unit from a text with or without a unit of its own."""
     number, unit = split_quantity(text)
     if number is None:
@@ -364,10 +377,10 @@ def _quantity(variable: Variable, full: str, text: str) -> float:
         raise RequestError(f"parameter '{full}': '{text}' is not a number{example}")
     if not unit or unit == variable.unit:
         return number
-    if unit not in COMMON:
-        raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known (known: {', '.join(COMMON)})")
-    known = COMMON.get(variable.unit)
-    found = None if known is None else conversion(COMMON[unit], known)
+    known = {**fmu.units, **COMMON}
+    if unit not in known:
+        raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known (known: {', '.join(known)})")
+    found = conversion(known[unit], known[variable.unit]) if variable.unit in known else None
     if found is None:
         wanted = f"a unit of {variable.unit}" if variable.unit else "no unit: the FMU declares none"
         raise RequestError(f"parameter '{full}' = {text}: give it in {wanted}")

@@ -89,6 +89,14 @@ def test_a_stop_time_beyond_the_interval_is_judged(toy, tmp_path):
     assert read(tmp_path / "whole").assessments()
 
 
+def test_one_that_is_not_judged_is_not_compared(toy, tmp_path, capsys):
+    for name, stop in (("part", "0.8"), ("whole", "0.9")):
+        assert go(toy, tmp_path / name, "--stop", stop, "--quiet", "--no-report") == 0
+    assert main(["compare", str(tmp_path / "whole"), str(tmp_path / "part")]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"no contact in common that has figures; {tmp_path / 'part'} is not judged: the run ends with" in said
+
+
 def test_a_scenario_that_stops_early_is_incomplete(toy, toy_text, tmp_path, capsys):
     """Nobody knows where the toy will be; what it has passed is seen at the end."""
     (toy / "SystemStructure.ssd").write_text(toy_text(stop="0.8"))

@@ -18,12 +18,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         code: int | None = options.run(options)
+        sys.stdout.flush()  # here, where an error can still be told
     except UnknownFmuError as error:
         return _fail(str(error), 2)
     except BuildError as error:
         return _fail(str(error), 1)
     except OSError as error:
-        return _fail(f"{error.filename or 'a file'}: {error.strerror or error}", 1)
+        return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}", 1)
     except KeyboardInterrupt:
         return _fail("interrupted", 1)
     return code or 0

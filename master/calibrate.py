@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from master.durable import write_whole
 from master.errors import MasterError
 
 MAX_RUNS: Final = 12
@@ -179,4 +180,4 @@ def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     m = found[0]
     comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
     new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"
-    path.write_text(text[: m.start()] + new + text[m.end() :], encoding="utf-8")
+    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode(), "a copy of the scenario elsewhere")

@@ -50,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     error = Console(stderr=True, width=_WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
     try:
         code: int = options.verb(options)
+        sys.stdout.flush()  # here, where an error can still be told
     except UsageError as failure:
         return _fail(error, failure, 2)
     except MasterError as failure:
@@ -59,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _fail(error, "interrupted", 1)
     except OSError as failure:
-        return _fail(error, f"{failure.filename or 'a file'}: {failure.strerror or failure}", 1)
+        return _fail(error, f"{failure.filename or 'standard output'}: {failure.strerror or failure}", 1)
     return code
 
 

@@ -179,7 +179,7 @@ def _empty(folder: Path) -> None:
         raise MasterError(
             f"{folder} exists and is not a results folder of this tool; it is left alone, choose another with --out"
         )
-    for pattern in (*_OURS, *_PARTS):
+    for pattern in (*_OURS, *(name + PART for name in _OURS), *_PARTS):
         for path in folder.glob(pattern):
             path.unlink()
 

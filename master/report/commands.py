@@ -12,6 +12,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from master import compare, export, report, results
+from master.durable import write_whole
 from master.errors import MasterError
 from master.report import tables
 from master.report.comparison import columns, comparison_page
@@ -96,7 +97,7 @@ def run_compare(options: argparse.Namespace) -> int:
     """Compare runs with the first one."""
     runs = [results.read(folder) for folder in (options.first, *options.others)]
     if options.report:
-        options.report.write_text(comparison_page(runs), encoding="utf-8")
+        write_whole(options.report, comparison_page(runs).encode(), "another file with --report")
     pairs = [compare.compare(runs[0], other) for other in runs[1:]]
     if options.json:
         print(json.dumps([_as_json(c) for found in pairs for c in found], indent=1))

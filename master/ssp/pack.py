@@ -6,6 +6,7 @@ import zipfile
 from pathlib import Path
 from typing import Final
 
+from master.durable import cannot_write, whole_file
 from master.errors import MasterError
 
 #: Time stamp of every member: the earliest that zip can express.
@@ -25,17 +26,24 @@ def pack(root: Path, archive: Path) -> Path:
         If the archive cannot be written, or ``root`` holds symbolic links.
     """
     members = _members(root)
-    temporary = archive.with_name(archive.name + ".part")
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file:
-            for path in members:
-                file.writestr(_info(path.relative_to(root).as_posix()), path.read_bytes())
-        temporary.replace(archive)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise MasterError(f"{archive} cannot be written ({error.strerror})") from error
+        raise cannot_write(archive, error) from error
+    with (
+        whole_file(archive) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file,
+    ):
+        for path in members:
+            file.writestr(_info(path.relative_to(root).as_posix()), _content(path))
     return archive
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
 
 
 def _members(root: Path) -> list[Path]:

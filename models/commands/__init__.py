@@ -25,7 +25,6 @@ _USER_ERRORS = (
     MechanismError,
     ParameterError,
     UnknownNameError,
-    OSError,
 )
 
 
@@ -37,10 +36,15 @@ def main(argv: Sequence[str]) -> int:
         verb.add(subparsers)
     arguments = parser.parse_args(argv)
     try:
-        return int(arguments.run(arguments))
+        code = int(arguments.run(arguments))
+        sys.stdout.flush()  # here, where an error can still be told
+    except OSError as error:
+        print(f"error: {error.filename or 'standard output'}: {error.strerror or error}", file=sys.stderr)
+        return 1
     except _USER_ERRORS as error:
         print(f"error: {error}", file=sys.stderr)
         return 2 if isinstance(error, (DefinitionError, UnknownNameError, ParameterError)) else 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 1
+    return code

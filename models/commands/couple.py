@@ -7,7 +7,6 @@ import math
 import time
 from pathlib import Path
 
-import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from models.catenary import limits
@@ -15,6 +14,7 @@ from models.catenary.model import CatenaryModel
 from models.catenary.parameters import SHORTEST_STEP
 from models.catenary.part import CatenaryPart
 from models.commands.options import add_settings, finite, new_folder, positive, print_table, settings, warn
+from models.commands.output_files import write_csv
 from models.coupled import CoupledModel, CoupledRecord
 from models.library import load_line, load_lumped
 from models.pantograph.parameters import LumpedDefinition
@@ -92,7 +92,7 @@ def write_timeseries(path: Path, record: CoupledRecord) -> None:
         columns += [record.contact_force[:, p], record.position[:, p], *record.contact_point[:, p, 1:].T]
     names += [f"catenary.support[{i + 1}].uplift [m]" for i in range(record.uplift.shape[1])]
     columns += list(record.uplift.T)
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+    write_csv(path, names, columns)
 
 
 def _span_of(arguments: argparse.Namespace, line: CatenaryModel) -> tuple[float, float]:

@@ -5,18 +5,23 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from models.commands.options import add_settings, finite, new_folder, print_table, settings
+from models.commands.output_files import write_csv, write_figure
 from models.library import load_pantograph
 from models.pantograph import lumped_characteristics as lumped
 from models.pantograph.multibody.characteristics import Rig
 from models.pantograph.multibody.definition import MechanismDefinition
 from models.pantograph.parameters import LumpedDefinition
 from models.part import FloatArray, ParameterError
+
+#: Significant digits of the tables: all that a double has.
+_DIGITS: Final = 17
 
 
 @dataclass(frozen=True)
@@ -82,14 +87,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def write(folder: Path, result: Characteristics) -> None:
     """Write statics and response as CSV and the plots as PNG."""
-    np.savetxt(
-        folder / "statics.csv", result.statics, delimiter=",", header=",".join(result.static_columns), comments=""
-    )
-    response = np.column_stack([result.frequency, result.apparent_mass.real, result.apparent_mass.imag])
-    header = "frequency [Hz],apparent mass real [kg],apparent mass imaginary [kg]"
-    np.savetxt(folder / "apparent_mass.csv", response, delimiter=",", header=header, comments="")
-    _plot_response(result).savefig(folder / "apparent_mass.png", dpi=120)
-    _plot_statics(result).savefig(folder / "statics.png", dpi=120)
+    write_csv(folder / "statics.csv", result.static_columns, list(result.statics.T), _DIGITS)
+    response = (result.frequency, result.apparent_mass.real, result.apparent_mass.imag)
+    names = ("frequency [Hz]", "apparent mass real [kg]", "apparent mass imaginary [kg]")
+    write_csv(folder / "apparent_mass.csv", names, response, _DIGITS)
+    write_figure(folder / "apparent_mass.png", _plot_response(result), 120)
+    write_figure(folder / "statics.png", _plot_statics(result), 120)
 
 
 def _heights(arguments: argparse.Namespace, reference: float) -> FloatArray:

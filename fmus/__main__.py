@@ -9,6 +9,7 @@ from pathlib import Path
 
 from fmus import doctor
 from fmus.build import MAX_PORTS, BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe
+from models.definition import printable
 
 DEFAULT_FOLDER = Path("build/fmus")
 
@@ -31,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"error: {text}", file=sys.stderr)
+    print(f"error: {printable(text)}", file=sys.stderr)
     return code
 
 

@@ -24,6 +24,7 @@ from master.errors import MasterError, Problem, RunError, ScenarioError, UsageEr
 from master.isolation import Isolation
 from master.progress import ProgressObserver
 from master.report import commands
+from master.report.terminal import Terminal, printable_json
 from master.results import Results
 from master.run import Manner, run
 from master.scenario import Overrides, find_parameter, open_scenario
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given and given[0] not in VERBS and given[0] not in ("-h", "--help"):
         given.insert(0, "run")
     options = _parser().parse_args(given)
-    error = Console(stderr=True, width=_WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
+    error = Terminal(stderr=True, width=_WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
     try:
         code: int = options.verb(options)
         sys.stdout.flush()  # here, where an error can still be told
@@ -219,7 +220,7 @@ def _overrides(options: argparse.Namespace) -> Overrides:
 
 
 def _tell(text: str, console: Console | None = None) -> None:
-    (console or Console(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
+    (console or Terminal(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -246,7 +247,7 @@ def _tell_results(done: Results, options: argparse.Namespace) -> None:
     if options.parquet:
         export.write_parquet(done.folder)
     if options.json:
-        print((done.folder / results.SUMMARY).read_text(encoding="utf-8"), end="")
+        print(printable_json((done.folder / results.SUMMARY).read_text(encoding="utf-8")), end="")
     elif not options.quiet:
         _show(done)
 
@@ -306,7 +307,7 @@ def _continuation(options: argparse.Namespace) -> Continuation | None:
 def _run_shown(system: System, folder: Path, quiet: bool, manner: Manner = _PLAIN) -> Results:
     if quiet:
         return run(system, folder, (), manner)
-    console = Console(stderr=True)  # that of the progress bar, which then stays below
+    console = Terminal(stderr=True)  # that of the progress bar, which then stays below
     cautions = CautionObserver(lambda caution: _tell(str(caution), console))
     if manner.real_time is not None:  # drawing takes more time than a step has
         _tell(f"running for {(system.stop - system.start) / manner.real_time:g} s by the wall clock")
@@ -319,7 +320,7 @@ def _run_shown(system: System, folder: Path, quiet: bool, manner: Manner = _PLAI
 
 
 def _show(done: Results) -> None:
-    console = Console(width=_WIDTH, highlight=False)
+    console = Terminal(width=_WIDTH, highlight=False)
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
@@ -331,7 +332,7 @@ def _show(done: Results) -> None:
     elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
     if line := report.uplift_line(done):
-        console.print(line)
+        console.print(line, markup=False)
     for following in done.followings:
         console.print(following.sentence, markup=False, soft_wrap=True)
     for line in _closing_lines(done):

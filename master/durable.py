@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,6 +16,8 @@ from master.errors import MasterError
 PART: Final = ".part"
 #: Where else the user can have it, for most files of ours.
 _ELSEWHERE: Final = "another folder with --out"
+#: How a cell begins that a spreadsheet computes, behind what keeps it from doing so.
+_FORMULA: Final = re.compile(r"'*[=+\-@\t\r]")
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -69,6 +72,22 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def safe_cell(text: str) -> str:
+    """Return text for a cell of a table that a spreadsheet does not take for a formula; `plain_cell` undoes it.
+
+    Examples
+    --------
+    >>> safe_cell("=cmd|'/C calc'!A0"), safe_cell("31 m"), plain_cell(safe_cell("'=1"))
+    ("'=cmd|'/C calc'!A0", '31 m', "'=1")
+    """
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
+def plain_cell(cell: str) -> str:
+    """Return the text of which `safe_cell` has made a cell."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 class LineFile:

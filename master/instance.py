@@ -24,8 +24,14 @@ from master.system import Component, Variable
 from master.unpacked import Unpacked
 
 _STATUS: Final = ("ok", "warning", "discard", "error", "fatal", "pending")
-_WARNING: Final = 1
-_FATAL: Final = 4
+#: What counts as success: ok and warning. A number that FMI does not know, a negative one too, is a failure.
+_GOOD: Final = (0, 1)
+#: After these an instance must not be called any more; nor after a number that FMI does not know.
+_LIVING: Final = range(4)
+
+
+#: Largest state that is taken from an FMU [bytes].
+LONGEST_STATE: Final = 1 << 30
 
 
 class Readable(Protocol):
@@ -89,14 +95,14 @@ class Group:
         """Fill `values` from the FMU."""
         if self._typed is not None:
             self._typed.read()
-        elif self.names and (status := self._get(*self._arguments)) > _WARNING:
+        elif self.names and (status := self._get(*self._arguments)) not in _GOOD:
             raise self._instance.error("reading its variables", status)
 
     def write(self) -> None:
         """Set the FMU's variables to `values`."""
         if self._typed is not None:
             self._typed.write()
-        elif self.names and (status := self._set(*self._arguments)) > _WARNING:
+        elif self.names and (status := self._set(*self._arguments)) not in _GOOD:
             raise self._instance.error("setting its inputs", status)
 
 
@@ -192,7 +198,7 @@ class Instance:
         began = perf_counter()
         status = self._do_step(self.handle, time, step, 1)
         self.stepping_time += perf_counter() - began
-        if status > _WARNING:
+        if status not in _GOOD:
             raise self.error("a step", status)
 
     def save(self) -> c_void_p:
@@ -214,11 +220,21 @@ class Instance:
         state, size = self.save(), c_size_t()
         try:
             self._call("serialising its state", "fmi2SerializedFMUstateSize", state, byref(size))
-            data = (c_char * size.value)()
+            data = self._room(size.value)
             self._call("serialising its state", "fmi2SerializeFMUstate", state, data, size.value)
             return data.raw
         finally:
             self.release(state)
+
+    def _room(self, size: int) -> Any:
+        """Return room for a state of the size that the FMU claims."""
+        claim = f"component '{self.name}' ({self.component.fmu.path.name}) claims a state of {size} bytes"
+        if size > LONGEST_STATE:
+            raise SlaveError(f"{claim}, more than the {LONGEST_STATE} that are read; it cannot be checkpointed")
+        try:
+            return (c_char * size)()
+        except MemoryError as error:
+            raise SlaveError(f"{claim}, for which there is no memory; it cannot be checkpointed") from error
 
     def deserialise(self, data: bytes) -> None:
         """Return to a state given as bytes."""
@@ -249,7 +265,7 @@ class Instance:
 
     def error(self, doing: str, status: int) -> SlaveError:
         """Return the error for a failed call, in the FMU's own words if it said any."""
-        self._dead = self._dead or status >= _FATAL
+        self._dead = self._dead or status not in _LIVING
         label = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
         said = fmi_log.last_words(self.name) or "the FMU gave no reason"
         at = f" at t = {self.time:.6g} s" if self.time == self.time else ""
@@ -258,7 +274,7 @@ class Instance:
 
     def _call(self, doing: str, function: str, *arguments: Any) -> None:
         status = self.function(function)(self.handle, *arguments)
-        if status > _WARNING:
+        if status not in _GOOD:
             raise self.error(doing, status)
 
     def _set(self, variable: Variable, value: Value) -> None:

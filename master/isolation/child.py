@@ -17,10 +17,9 @@ from typing import Any, Final
 import numpy as np
 
 from master.errors import MasterError
-from master.instance import Group, Instance
+from master.instance import LONGEST_STATE, Group, Instance
 from master.isolation.wire import (
     HEADER,
-    LONGEST_STATE,
     LONGEST_TEXT,
     NUMBER,
     STEP,

@@ -11,11 +11,11 @@ import numpy as np
 
 from master.arrays import FloatArray
 from master.errors import SlaveError, one_line
+from master.instance import LONGEST_STATE
 from master.isolation.child import describe
 from master.isolation.process import Process
 from master.isolation.wire import (
     HEADER,
-    LONGEST_STATE,
     LONGEST_TEXT,
     MOST_PREFETCHED,
     NUMBER,

@@ -29,7 +29,6 @@ MOST_PREFETCHED: Final = 64
 _WATCHFUL: Final = 1e-4
 #: Longest text, and longest serialised state, that is accepted from a child [bytes].
 LONGEST_TEXT: Final = 1 << 16
-LONGEST_STATE: Final = 1 << 30
 
 
 class Ask(IntEnum):

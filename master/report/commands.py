@@ -9,8 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from rich.console import Console
-
 from master import compare, export, report, results
 from master.durable import write_whole
 from master.errors import MasterError
@@ -20,6 +18,7 @@ from master.report.film import FilmOptions, write_film
 from master.report.measured import Comparison, compare_measured, read_measured
 from master.report.movie import MOST_LAPS, make_movie
 from master.report.signals import all_signals
+from master.report.terminal import Terminal
 from master.results import Results
 
 REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
@@ -73,7 +72,7 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
 
 def _say_measured(measured: Comparison) -> None:
     rows = tables.plain_table(("0-20 Hz", "simulated", "measured", "difference"), report.comparison_rows(measured))
-    Console(width=_WIDTH, highlight=False).print(rows)
+    Terminal(width=_WIDTH, highlight=False).print(rows)
 
 
 def _film(done: Results, options: argparse.Namespace) -> Path:
@@ -107,7 +106,7 @@ def run_compare(options: argparse.Namespace) -> int:
 
 
 def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]], options: argparse.Namespace) -> None:
-    console = Console(width=_WIDTH, highlight=False)
+    console = Terminal(width=_WIDTH, highlight=False)
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
     console.print(report.figures_table([c.assessment.quality for c in found], heads))

@@ -105,7 +105,7 @@ def _of_criterion(name: str, criterion: Criterion) -> Headline:
 def verdict_table(assessment: Assessment) -> Table:
     """Return the verdict of one contact for a terminal of 80 columns."""
     q = assessment.quality
-    title = f"EN 50367, {assessment.contact.pantograph}, {q.start:.0f}-{q.end:.0f} m, {3.6 * q.speed:.0f} km/h"
+    title = f"EN 50367, {escape(assessment.contact.pantograph)}, {q.start:.0f}-{q.end:.0f} m, {3.6 * q.speed:.0f} km/h"
     table = Table(title=title, title_justify="left", width=78)
     for head in ("figure", "value", "limit", "verdict"):
         table.add_column(head, justify="left" if head == "figure" else "right", no_wrap=True)

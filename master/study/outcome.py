@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import Any, Final
 
+from master.durable import safe_cell
 from master.results import Results
 from master.study.family import Family, Interval
 from master.study.figures import Entry, entries
@@ -126,7 +127,8 @@ def as_csv(outcome: Outcome) -> str:
     for interval in outcome.family.settings.interval:
         for e in outcome.entries(interval):
             values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
-            writer.writerow([e.variant, interval.name, e.pantograph, *values, verdict(e), *_sharing_cells(e)])
+            named = map(safe_cell, (e.variant, interval.name, e.pantograph))
+            writer.writerow([*named, *values, verdict(e), *_sharing_cells(e)])
     return text.getvalue()
 
 

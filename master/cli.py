@@ -26,6 +26,7 @@ from master.progress import ProgressObserver
 from master.report import commands
 from master.report.terminal import Terminal, printable_json
 from master.results import Results
+from master.rounding import adjustments
 from master.run import Manner, run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.ssp.annotation import SCHEMES, Calibration
@@ -308,6 +309,8 @@ def _run_shown(system: System, folder: Path, quiet: bool, manner: Manner = _PLAI
     if quiet:
         return run(system, folder, (), manner)
     console = Terminal(stderr=True)  # that of the progress bar, which then stays below
+    for text in adjustments(system, manner.checkpoint_every):
+        _tell(f"warning: {text}", console)
     cautions = CautionObserver(lambda caution: _tell(str(caution), console))
     if manner.real_time is not None:  # drawing takes more time than a step has
         _tell(f"running for {(system.stop - system.start) / manner.real_time:g} s by the wall clock")
@@ -384,7 +387,7 @@ def _validate(options: argparse.Namespace) -> int:
         _tell_warnings(system, _tell)
         counts = f"{len(system.components)} components, {len(system.connections)} connections"
         times = f"{system.start:g} s to {system.stop:g} s in steps of {system.step:g} s"
-        for text in limits.warnings(system):
+        for text in (*limits.warnings(system), *adjustments(system)):
             _tell(f"warning: {text}")
         tolerance = _told_tolerance({c.name: c.tolerance for c in system.components})
         print(f"{system.name}: valid; {counts}, {times}, {system.settings.coupling.scheme}{tolerance}")

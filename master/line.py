@@ -154,6 +154,39 @@ def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -
     return x[(x >= limits[0]) & (x <= limits[1])]
 
 
+def passages(
+    x: float, interval: tuple[float | None, float | None], travelled: tuple[float, float], period: float = 0.0
+) -> FloatArray:
+    """Return where a place is passed within an interval of the track, shape (n,) [m].
+
+    Parameters
+    ----------
+    x : float
+        The place [m].
+    interval : (float or None, float or None)
+        Ends of the interval [m]; None where it has none.
+    travelled : (float, float)
+        Between what positions the run goes [m]: on a line that repeats there is no lap beyond.
+    period : float
+        Length after which the line repeats [m]; 0 if it does not: then the place is passed once.
+
+    Examples
+    --------
+    >>> passages(20.0, (110.0, None), (0.0, 330.0), 100.0).tolist()
+    [120.0, 220.0, 320.0]
+    >>> passages(20.0, (110.0, None), (0.0, 330.0)).tolist()
+    []
+    """
+    start = -math.inf if interval[0] is None else interval[0]
+    end = math.inf if interval[1] is None else interval[1]
+    if not period:
+        return np.array([x] if start <= x <= end else [])
+    start, end = max(start, travelled[0]), min(end, travelled[1])
+    first, last = math.ceil((start - x) / period), math.floor((end - x) / period)
+    places: FloatArray = x + period * np.arange(first, last + 1, dtype=np.float64)
+    return places
+
+
 def lies_within(x: float | None, interval: tuple[float | None, float | None], period: float = 0.0) -> bool:
     """Return whether a place is in an interval of the track or beside it; on a line that repeats, in some lap.
 

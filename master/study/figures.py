@@ -9,7 +9,7 @@ import numpy as np
 
 from master.arrays import BoolArray, FloatArray
 from master.contacts import Contact, strip_centre, track_position
-from master.line import lies_within
+from master.line import lies_within, passages, period_of
 from master.recorder import Recording
 from master.results import Assessment, Results, assess_contacts
 from master.study.family import Interval
@@ -110,23 +110,31 @@ def passing_time(recording: Recording, contact: Contact, x: float) -> float:
 def slack_share(done: Results, contact: Contact, follower: Contact | None, interval: Interval) -> float | None:
     """Return the share of the interval's droppers that carry nothing for a moment as a pantograph passes.
 
-    From just before it passes until the next pantograph comes, or for a second.
+    From just before it passes until the next pantograph comes, or for a second. On a line that closes on itself every
+    passage of a dropper counts.
     """
     geometry = done.geometry.get(contact.catenary, {})
+    position = track_position(done.recordings[0], contact)
+    travelled = (float(position.min()), float(position.max()))
     total = slack = 0
     for recording in done.recordings:
         for name in recording.matching(f"{contact.catenary}.dropper[*].force"):
             x = geometry.get(f"{name.removeprefix(contact.catenary + '.').removesuffix('.force')}.x")
-            if x is None or not interval.start <= x <= interval.end:
+            if x is None:
                 continue
-            begin = passing_time(done.recordings[0], contact, x) - _BEFORE
-            end = begin + _BEFORE + _AFTER
-            if follower is not None:
-                end = min(end, passing_time(done.recordings[0], follower, x) - _BEFORE)
-            during = (recording.time >= begin) & (recording.time < end)
-            total += 1
-            slack += bool((recording[name][during] <= 0.0).any())
+            for place in passages(x, (interval.start, interval.end), travelled, period_of(geometry)):
+                begin, end = _passage(done.recordings[0], contact, follower, float(place))
+                during = (recording.time >= begin) & (recording.time < end)
+                total += 1
+                slack += bool((recording[name][during] <= 0.0).any())
     return slack / total if total else None
+
+
+def _passage(whole: Recording, contact: Contact, follower: Contact | None, x: float) -> tuple[float, float]:
+    """Return from when to when a place belongs to a pantograph [s]."""
+    begin = passing_time(whole, contact, x) - _BEFORE
+    end = begin + _BEFORE + _AFTER
+    return begin, end if follower is None else min(end, passing_time(whole, follower, x) - _BEFORE)
 
 
 def section_forces(recording: Recording, contact: Contact) -> FloatArray | None:

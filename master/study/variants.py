@@ -15,6 +15,7 @@ from master.calibrate import Found, find_values
 from master.caution import CautionObserver
 from master.errors import MasterError, UsageError
 from master.results import Results, assess_contacts
+from master.rounding import adjustments
 from master.run import run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.simulation import Observer
@@ -51,6 +52,8 @@ class Runner:
 
     def run(self, system: System, folder: Path) -> Results:
         """Run one system."""
+        for text in adjustments(system):
+            self.tell(f"{system.name}: warning: {text}")
         cautions = CautionObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
         with self.watching(system) as observers:
             return run(system, folder, [cautions, *observers])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -11,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from models.commands.options import add_settings, finite, new_folder, print_table, settings
+from models.commands.options import add_settings, finite, new_folder, print_table, settings, warn
 from models.commands.output_files import write_csv, write_figure
 from models.library import load_pantograph
 from models.pantograph import lumped_characteristics as lumped
-from models.pantograph.multibody.characteristics import Rig
+from models.pantograph.multibody.characteristics import Dynamics, Rig
 from models.pantograph.multibody.definition import MechanismDefinition
 from models.pantograph.parameters import LumpedDefinition
 from models.part import FloatArray, ParameterError
@@ -125,6 +126,7 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
     statics = rig.statics(_heights(arguments, reference), arguments.force)
     height = arguments.height if arguments.height is not None else reference
     dynamics = rig.dynamics(height, _frequencies(), arguments.force)
+    warn([friction_warning(definition, dynamics, lambda d: Rig(d).dynamics(height, _frequencies(), arguments.force))])
     unit = rig.lift_unit
     columns = (
         "strip height [m]",
@@ -140,6 +142,39 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         dynamics.frequency,
         dynamics.apparent_mass,
     )
+
+
+def friction_warning(
+    definition: MechanismDefinition, found: Dynamics, analysed: Callable[[MechanismDefinition], Dynamics]
+) -> str:
+    """Return what dry friction does to the modes, empty if there is none.
+
+    About rest its force changes with the speed as a damper's of friction over transition speed does: a strong one,
+    under which a mode creeps back instead of oscillating.
+
+    Parameters
+    ----------
+    definition : MechanismDefinition
+    found : Dynamics
+        With the friction.
+    analysed : callable
+        Gives the dynamics of the definition without it.
+    """
+    rubbing = [f for f in definition.forces if f.kind == "joint_friction" and f.friction > 0.0]
+    if not rubbing:
+        return ""
+    names = {f"force.{f.name}.{key}" for f in rubbing for key in ("force", "moment")}
+    without = {p.name: 0.0 for p in definition.parameters() if p.name in names}
+    free = _frequencies_of(analysed(definition.with_values(without)))
+    return (
+        f"dry friction in {', '.join(f.name for f in rubbing)}: the modes are those of small motions about rest, where "
+        f"it damps like a fluid; {len(_frequencies_of(found))} of them oscillate, without the friction {len(free)}: "
+        f"{', '.join(f'{f:.3f}' for f in free)} Hz"
+    )
+
+
+def _frequencies_of(dynamics: Dynamics) -> list[float]:
+    return [m.frequency for m in dynamics.modes if m.frequency > 0.0]
 
 
 def _mode_rows(result: Characteristics) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,6 +17,8 @@ from master.system import System
 
 #: Calculated parameter of a line that closes on itself: the length after which it repeats [m].
 PERIOD: Final = "period"
+#: Most laps on a line that closes on itself.
+_MOST_LAPS: Final = 10_000
 #: What is this near to an interval counts as in it [m].
 _NEAR: Final = 1.0
 _INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
@@ -110,9 +112,22 @@ def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:
     return np.array([found[i] for i in sorted(found)])
 
 
+def aligned(geometry: Mapping[str, float], kind: str, names: Sequence[str]) -> dict[str, FloatArray]:
+    """Return values of supports or droppers that are to be put side by side, of those whose ``x`` is known.
+
+    Examples
+    --------
+    >>> known = {"support[1].x": 0.0, "support[2].x": 50.0, "support[2].z": 5.0, "support[3].z": 6.0}
+    >>> {name: values.tolist() for name, values in aligned(known, "support", ("x", "z")).items()}
+    {'x': [0.0, 50.0], 'z': [nan, 5.0]}
+    """
+    numbers = sorted(int(m[2]) for k in geometry if (m := _INDEXED.fullmatch(k)) and (m[1], m[3]) == (kind, "x"))
+    return {name: np.array([geometry.get(f"{kind}[{i}].{name}", math.nan) for i in numbers]) for name in names}
+
+
 def period_of(geometry: Mapping[str, float]) -> float:
     """Return the length after which a line repeats because it closes on itself [m]; 0 if it does not."""
-    return geometry.get(PERIOD, 0.0)
+    return max(0.0, geometry.get(PERIOD, 0.0))
 
 
 def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArray:
@@ -136,8 +151,17 @@ def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArr
     period, x = period_of(geometry), indexed(geometry, "support", "x")
     if not period or not len(x):
         return np.zeros(1)
-    first, last = (math.floor((limit - x.min()) / period) for limit in limits)
-    return period * np.arange(first, last + 1)
+    return period * _whole(*((limit - x.min()) / period for limit in limits))
+
+
+def _whole(first: float, last: float) -> FloatArray:
+    """Return the whole numbers from the one at or below ``first`` to that at or below ``last``, shape (n,).
+
+    Where there are more than any run has laps, the positions mean nothing, and there are none.
+    """
+    if not last - first <= _MOST_LAPS:
+        return np.zeros(0)
+    return np.arange(math.floor(first), math.floor(last) + 1, dtype=np.float64)
 
 
 def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -> FloatArray:
@@ -182,9 +206,8 @@ def passages(
     if not period:
         return np.array([x] if start <= x <= end else [])
     start, end = max(start, travelled[0]), min(end, travelled[1])
-    first, last = math.ceil((start - x) / period), math.floor((end - x) / period)
-    places: FloatArray = x + period * np.arange(first, last + 1, dtype=np.float64)
-    return places
+    places: FloatArray = x + period * _whole((start - x) / period, (end - x) / period)
+    return places[(places >= start) & (places <= end)]
 
 
 def lies_within(x: float | None, interval: tuple[float | None, float | None], period: float = 0.0) -> bool:

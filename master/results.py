@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from master import stored
+from master import summary_schema
 from master.checkpoint import NAME as CHECKPOINT
 from master.contacts import Contact, lateral_position, track_position
 from master.durable import PART, write_whole
@@ -248,7 +248,7 @@ def read(folder: Path) -> Results:
         If it is not a results folder of ours, or a file in it is damaged.
     """
     summary = _summary(folder)
-    geometry = stored.read_geometry(folder / GEOMETRY) if (folder / GEOMETRY).is_file() else {}
+    geometry = summary_schema.read_geometry(folder / GEOMETRY) if (folder / GEOMETRY).is_file() else {}
     coarse = sorted(p for p in folder.glob("timeseries*.csv") if p.name != TIMESERIES)
     recordings = tuple(load(p) for p in (folder / TIMESERIES, *coarse))
     return Results(folder, summary, recordings, geometry)
@@ -257,7 +257,7 @@ def read(folder: Path) -> Results:
 def _summary(folder: Path) -> dict[str, Any]:
     if not is_ours(folder):
         raise MasterError(f"{folder} is not a results folder: it has no {SUMMARY} written by this tool")
-    return stored.read_summary(folder / SUMMARY)
+    return summary_schema.read_summary(folder / SUMMARY)
 
 
 def figures(

@@ -114,7 +114,7 @@ def _is_of(summary: dict[str, Any], system: System) -> bool:
     components = [[c.name, c.fmu.sha256, c.parameters] for c in system.components]
     times = {"start": system.start, "stop": system.stop, "step": system.step}
     wanted = [components, {**times, **system.settings.model_dump(mode="json")}]
-    found = [[c["name"], c["sha256"], c["parameters"]] for c in summary.get("components", [])]
+    found = [[c["name"], c.get("sha256"), c.get("parameters")] for c in summary.get("components", [])]
     return bool(json.loads(json.dumps(wanted)) == [found, summary.get("settings")])
 
 

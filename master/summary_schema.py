@@ -62,6 +62,7 @@ class _Component(_Loose):
     sha256: str = ""
     guid: str = ""
     tool: str = ""
+    tolerance: float | None = None
     parameters: dict[str, Any] = {}
     inputs: list[_Input] = []
 
@@ -111,6 +112,7 @@ class _Summary(_Loose):
     components: list[_Component] = []
     warnings: list[_Caution] = []
     adjustments: list[str] = []
+    scenario_warnings: list[str] = []
     interface_power: list[_Power] = []
     energy: list[_Energy] = []
     performance: _Performance = _Performance()

@@ -24,12 +24,17 @@ class Caution:
     component : str
     text : str
         In the FMU's own words.
+    is_own : bool
+        Whether they are: how an FMU ended it does not say itself.
     """
 
     component: str
     text: str
+    is_own: bool = True
 
     def __str__(self) -> str:
+        if not self.is_own:
+            return f"warning: {self.text}; what was computed is not touched by that"
         return f"warning: component '{self.component}' says: {self.text}"
 
 
@@ -76,10 +81,16 @@ class CautionObserver:
     def finish(self) -> None:
         """Nothing to finish."""
 
+    def add(self, found: Caution) -> None:
+        """Take a warning that comes from elsewhere."""
+        if found not in self.warnings:
+            self.warnings.append(found)
+            self._tell(found)
+
     def _look(self, network: Network) -> None:
         for slave in network.slaves:
             for text in slave.warnings() if isinstance(slave, Cautious) else ():
-                self._add(Caution(slave.name, text))
+                self.add(Caution(slave.name, text))
 
     def _weigh(self, time: float, network: Network) -> None:
         """Tell once of every output that has become larger than anything can be."""
@@ -89,9 +100,4 @@ class CautionObserver:
                 self._seen.add(name)
                 component, _, variable = name.partition(".")
                 text = f"{variable} became {network.outputs[index]:.3g} at t = {time:.6g} s, larger than anything here"
-                self._add(Excess(component, f"{text} can be ({LARGEST:g}); the results mean nothing"))
-
-    def _add(self, found: Caution) -> None:
-        if found not in self.warnings:
-            self.warnings.append(found)
-            self._tell(found)
+                self.add(Excess(component, f"{text} can be ({LARGEST:g}); the results mean nothing"))

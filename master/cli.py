@@ -1,6 +1,6 @@
 """The command line: ``python -m master [VERB] ...``.
 
-Exit codes: 0 done, 1 the run failed or the scenario is invalid, 2 the command line is wrong.
+Exit codes: docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -21,7 +21,9 @@ from master import calibrate, checkpoint, export, limits, report, results
 from master.caution import CautionObserver
 from master.checkpoint import Continuation
 from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
-from master.isolation import Isolation
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import EvaluationSettings
+from master.isolation import INIT_TIMEOUT, Isolation
 from master.progress import ProgressObserver
 from master.report import commands
 from master.report.terminal import Terminal, printable_json
@@ -129,6 +131,12 @@ def _add_run(verbs: Any) -> None:
         "--step-timeout", type=_positive, metavar="S", help="with --isolate: a step of more than S seconds has failed"
     )
     parser.add_argument(
+        "--init-timeout",
+        type=_positive,
+        metavar="S",
+        help=f"with --isolate: loading or initialising for more than S seconds has failed, default {INIT_TIMEOUT:g}",
+    )
+    parser.add_argument(
         "--real-time",
         type=_positive,
         nargs="?",
@@ -232,13 +240,14 @@ def _run(options: argparse.Namespace) -> int:
         folder = _folder(options, scenario.system)
         _protect(folder, scenario.package)
         _tell_warnings(scenario.system, tell)
-        try:
-            done = _run_shown(scenario.system, folder, options.quiet, manner)
-        except RunError:
-            if not options.no_report:
-                _report_what_there_is(folder)
-            raise
-    _tell_results(done, options)
+        with results.claimed(folder):  # until the report is written too
+            try:
+                done = _run_shown(scenario.system, folder, options.quiet, manner)
+            except RunError:
+                if not options.no_report:
+                    _report_what_there_is(folder)
+                raise
+            _tell_results(done, options)
     return 0
 
 
@@ -285,7 +294,12 @@ def _manner(options: argparse.Namespace) -> Manner:
         raise UsageError(
             "--step-timeout needs --isolate: only a process of its own can be ended when it does not return"
         )
-    isolation = Isolation(options.step_timeout, options.real_time is not None) if options.isolate else None
+    if options.init_timeout is not None and not options.isolate:
+        raise UsageError(
+            "--init-timeout needs --isolate: only a process of its own can be ended when it does not return"
+        )
+    limits = (options.step_timeout, options.real_time is not None, options.init_timeout or INIT_TIMEOUT)
+    isolation = Isolation(*limits) if options.isolate else None
     every = options.checkpoint_every
     return Manner(options.checkpoint, every, _continuation(options), isolation, options.real_time)
 
@@ -327,19 +341,29 @@ def _show(done: Results) -> None:
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
-        console.print(report.figures_table([a.quality for a in assessments], heads))
+        console.print(report.figures_table(assessments, heads, [done.evaluation.filter]))
     for assessment in assessments:
-        console.print(report.verdict_table(assessment))
+        _show_verdict(console, assessment, done.evaluation)
     if not report.has_contacts(done):
         console.print(report.outputs_table(done))
     elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
-    if line := report.uplift_line(done):
-        console.print(line, markup=False)
+    for line in filter(None, (report.calibration_line(done), report.uplift_line(done))):
+        console.print(line, markup=False, soft_wrap=True)
     for following in done.followings:
         console.print(following.sentence, markup=False, soft_wrap=True)
     for line in _closing_lines(done):
         console.print(line, markup=False, soft_wrap=True)
+
+
+def _show_verdict(console: Console, assessment: Assessment, settings: EvaluationSettings) -> None:
+    """Print the verdict of a contact, and what makes it less than certain."""
+    console.print(report.verdict_table(assessment, settings.limits))
+    if rows := report.filter_rows(assessment.quality, settings.filter):
+        console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
+        console.print(report.plain_table(report.FILTER_HEADS, rows))
+    if assessment.drift:
+        console.print(f"warning: {assessment.contact.pantograph}: {assessment.drift}", markup=False, soft_wrap=True)
 
 
 def _closing_lines(done: Results) -> list[str]:
@@ -420,30 +444,42 @@ def _pack(options: argparse.Namespace) -> int:
 
 
 def _calibrate(options: argparse.Namespace) -> int:
+    is_stored = not (options.dry_run or options.set)
+    is_folder = options.scenario.is_dir()
+    with calibrate.unchanged(options.scenario) if is_stored and is_folder else nullcontext(lambda: None) as check:
+        return _calibrated(options, is_stored, check)
+
+
+def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[], None]) -> int:
     with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
         system = scenario.system
         _tell_warnings(system, _tell)
         task = _task(options, system)
-        place = None if options.dry_run or options.set else _place(scenario.package, task.parameter)
-        found = calibrate.find_value(
-            lambda value: _trial(system, task, value),
-            task.mean_force,
-            _start_value(system, task.parameter),
-            task.tolerance,
-        )
+        place = _place(scenario.package, task.parameter) if is_stored else None
+        found = _found(system, task)
         print(
             f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
-            f"({len(found.trials)} runs)"
+            f"({len(found.trials)} runs; filter {_filter_of(system)})"
         )
         if place is not None:
             note = (
-                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) with "
+                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) after {_filter_of(system)}, with "
                 f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
                 f"in {len(found.trials)} runs of 'python -m master calibrate'"
             )
+            check()
             calibrate.store_value(*place, found.value, note)
             print(f"stored in {place[0]}")
     return 0
+
+
+def _filter_of(system: System) -> str:
+    return results.filter_of(system.settings.filter.model_dump()).short
+
+
+def _found(system: System, task: Calibration) -> calibrate.Found:
+    start = _start_value(system, task.parameter)
+    return calibrate.find_value(lambda value: _trial(system, task, value), task.mean_force, start, task.tolerance)
 
 
 def _task(options: argparse.Namespace, system: System) -> Calibration:

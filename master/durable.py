@@ -45,7 +45,8 @@ def whole_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
     MasterError
         If it cannot be written; the old one is still there then.
     """
-    temporary = path.with_name(path.name + PART)
+    # Hidden, so that no archive takes it along, and each process has its own: two writers do not mix.
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     try:
         yield temporary
         _sync(temporary)

@@ -16,10 +16,11 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from master.errors import printable
+from master.errors import one_line
 
-#: Messages kept per instance.
+#: Messages kept per instance, and bytes of one that are looked at.
 _KEPT: Final = 20
+_LONGEST: Final = 1 << 16
 
 #: FMI status of what is no more than information, and of a warning.
 _OK: Final = 0
@@ -32,7 +33,7 @@ _messages: defaultdict[str, deque[tuple[int, str]]] = defaultdict(lambda: deque(
 def _log(_environment: Any, instance: bytes, status: int, _category: bytes, message: bytes) -> None:
     if status != _OK:
         # The FMU's own words go to terminals, tables and pages: on one line, without control characters.
-        text = printable(" ".join(message.decode("utf-8", "replace").split()))
+        text = one_line(" ".join(message[:_LONGEST].decode("utf-8", "replace").split()))
         _messages[(instance or b"").decode("utf-8", "replace")].append((status, text))
 
 

@@ -254,19 +254,29 @@ class Instance:
         """Return the FMU's warnings so far, each once and on one line."""
         return tuple(one_line(text) for text in fmi_log.warnings(self.name))
 
-    def close(self) -> None:
-        """Terminate and free the instance and its files; an FMU that died is only forgotten."""
+    def close(self) -> str:
+        """Terminate and free the instance and its files; an FMU that died is only forgotten.
+
+        Returns
+        -------
+        str
+            What went wrong, empty if nothing did: what was computed is not touched by how an FMU ends.
+        """
+        said = ""
+        if not self._dead:
+            status = self.function("fmi2Terminate")(self.handle)
+            said = "" if status in _GOOD else str(self.error("its termination", status))
         if not self._dead:
             self._dead = True
-            self.function("fmi2Terminate")(self.handle)
             self._fmu.freeInstance()
             self._unpacked.release()
         self._unpacked.remove()
+        return said
 
     def error(self, doing: str, status: int) -> SlaveError:
         """Return the error for a failed call, in the FMU's own words if it said any."""
         self._dead = self._dead or status not in _LIVING
-        label = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
+        label = _STATUS[status] if 0 <= status < len(_STATUS) else f"{status}, which FMI does not know"
         said = fmi_log.last_words(self.name) or "the FMU gave no reason"
         at = f" at t = {self.time:.6g} s" if self.time == self.time else ""
         who = f"component '{self.name}' ({self.component.fmu.path.name})"

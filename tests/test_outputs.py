@@ -27,6 +27,7 @@ ROOT = Path(__file__).parents[1]
 WRITES = {"write_text", "write_bytes", "savefig", "savetxt", "write_table", "saving", "save", "savez", "to_csv"}
 #: Functions that may: they write beside the file's place, into memory, or into a temporary folder of their own.
 WHOLE = {
+    "master/folder_lock.py": {"_sign"}, "master/results.py": {"write_forces"},
     "master/durable.py": {"write_whole"}, "master/report/__init__.py": {"write"}, "master/export.py": {"_write"},
     "master/report/film.py": {"write_film"}, "master/verify/page.py": {"_picture"}, "master/ssp/pack.py": {"pack"},
     "models/commands/output_files.py": {"write_whole", "write_csv", "write_figure"},

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from master import compare, export, report, results
+from master import compare, export, folder_lock, report, results
 from master.durable import write_whole
 from master.errors import MasterError
 from master.report import tables
@@ -17,7 +18,6 @@ from master.report.comparison import columns, comparison_page
 from master.report.film import FilmOptions, write_film
 from master.report.measured import Comparison, compare_measured, read_measured
 from master.report.movie import MOST_LAPS, make_movie
-from master.report.signals import all_signals
 from master.report.terminal import Terminal
 from master.results import Results
 
@@ -38,14 +38,19 @@ def add_report_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is wanted."""
-    done = results.read(options.run)
-    figures = results.figures(done.assessments(), done.uplifts, done.followings, done.events, done.balances)
-    summary = {**done.summary, **figures}
-    measured = _measured(done, options.measured, options.contact) if options.measured else None
-    results.write_json(done.folder / results.SUMMARY, summary)
-    print(report.write(replace(done, summary=summary), measured))
-    if options.parquet:
-        print(*export.write_parquet(done.folder), sep="\n")
+    results.identity(options.run)  # a folder that is none of ours is left alone
+    with _claimed(options.run):
+        done = results.read(options.run)
+        summary = {**done.summary, **results.figures(done), "format": results.FORMAT}
+        summary["settings"] = {**summary.get("settings", {}), "filter": results.filter_data(done.evaluation.filter)}
+        done = replace(done, summary=summary)
+        measured = _measured(done, options.measured, options.contact) if options.measured else None
+        results.write_forces(done)
+        results.write_json(done.folder / results.SUMMARY, summary)
+        print(report.write(done, measured))
+        if options.parquet:
+            print(*export.write_parquet(done.folder), sep="\n")
+    _warn_of_open_runs([done])
     if options.film:
         print(_film(done, options))
     if measured is not None:
@@ -53,16 +58,35 @@ def run_report(options: argparse.Namespace) -> int:
     return 0
 
 
+@contextmanager
+def _claimed(folder: Path) -> Iterator[None]:
+    """Keep others out of a results folder while its report is written."""
+    with ExitStack() as claim:
+        with suppress(PermissionError):  # writing the report will say it
+            claim.enter_context(folder_lock.claimed(folder, "wait for it to end"))
+        yield
+
+
+def _warn_of_open_runs(runs: Sequence[Results]) -> None:
+    """Say which runs were ended before they could say how: what they show is a part."""
+    for done in runs:
+        if done.summary.get("status") == "running":
+            text = f"warning: the run in {done.folder} was ended before it had finished; figures are of what it left"
+            Terminal(stderr=True).print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
+
+
 def report_what_there_is(folder: Path) -> None:
     """Write the report of a run that stopped, if it has left anything to report on."""
     try:
-        report.write(results.read(folder))
+        done = results.read(folder)
+        results.write_forces(done)
+        report.write(done)
     except MasterError:
         return  # it stopped before anything was recorded; the error itself is told by the caller
 
 
 def _measured(done: Results, path: Path, contact: int) -> Comparison:
-    signals = [s for s in all_signals(done) if s.contact.index == contact]
+    signals = [s for s in done.signals if s.contact.index == contact]
     if not signals:
         raise MasterError(
             f"{done.folder} has no contact {contact} with a recorded force; choose another with --contact"
@@ -71,12 +95,12 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
 
 
 def _say_measured(measured: Comparison) -> None:
-    rows = tables.plain_table(("0-20 Hz", "simulated", "measured", "difference"), report.comparison_rows(measured))
+    rows = tables.plain_table(("low-passed", "simulated", "measured", "difference"), report.comparison_rows(measured))
     Terminal(width=_WIDTH, highlight=False).print(rows)
 
 
 def _film(done: Results, options: argparse.Namespace) -> Path:
-    movie = make_movie(done, all_signals(done))
+    movie = make_movie(done, done.signals)
     if movie is None:
         needed = "a film needs recorded uplift, contact point and geometry"
         raise MasterError(f"{done.folder} cannot be drawn: {needed}, and at most {MOST_LAPS} laps of a line")
@@ -95,11 +119,13 @@ def add_compare_arguments(parser: argparse.ArgumentParser) -> None:
 def run_compare(options: argparse.Namespace) -> int:
     """Compare runs with the first one."""
     runs = [results.read(folder) for folder in (options.first, *options.others)]
+    _warn_of_open_runs(runs)
     if options.report:
         write_whole(options.report, comparison_page(runs).encode(), "another file with --report")
     pairs = [compare.compare(runs[0], other) for other in runs[1:]]
     if options.json:
-        print(json.dumps([_as_json(c) for found in pairs for c in found], indent=1))
+        others = [(other, c) for other, found in zip(runs[1:], pairs, strict=True) for c in found]
+        print(json.dumps([_as_json(c, runs[0], other) for other, c in others], indent=1))
         return 0
     _show(runs, pairs, options)
     return 0
@@ -109,18 +135,23 @@ def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]]
     console = Terminal(width=_WIDTH, highlight=False)
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
-    console.print(report.figures_table([c.assessment.quality for c in found], heads))
+    console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
+    if note := compare.filter_note(runs):
+        console.print(f"warning: {note}", markup=False, soft_wrap=True)
     for folder, differences in zip(options.others, pairs, strict=True):
         for c in differences:
             if c.rms is not None and c.largest is not None:
-                who = f"{folder}, {c.first.contact.pantograph}: 0-20 Hz forces differ by"
+                who = f"{folder}, {c.first.contact.pantograph}: low-passed forces differ by"
                 console.print(f"{who} {c.rms:.3g} N (rms), {c.largest:.3g} N (largest)", markup=False, soft_wrap=True)
     if options.report:
         console.print(f"report in {options.report}", markup=False, soft_wrap=True)
 
 
-def _as_json(c: compare.Comparison) -> Mapping[str, Any]:
+def _as_json(c: compare.Comparison, first: Results, other: Results) -> Mapping[str, Any]:
     names = ("mean", "sigma", "minimum", "maximum")
     one, two = c.first.quality, c.second.quality
     difference = {n: getattr(two, n) - getattr(one, n) for n in names}
-    return {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
+    filters = [run.evaluation.filter.short for run in (first, other)]
+    same = len(set(filters)) == 1
+    known = {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
+    return {**known, "filters": filters, "same_filter": same}

@@ -94,6 +94,8 @@ def _table(summary: Mapping[str, Any]) -> dict[str, str]:
     coupling = settings.get("coupling", {})
     found = {"scheme": str(coupling.get("scheme", "-")), "step [s]": number(settings.get("step"))}
     found |= {f"scheme, {name}": text for name, text in scheme_options(coupling)}
+    for section in ("interval", "filter", "limits"):
+        found |= {f"{section}, {k}": str(v) for k, v in (settings.get(section) or {}).items() if v is not None}
     for component in summary.get("components", []):
         found[f"FMU of {component['name']}"] = f"{component.get('fmu', '-')} ({component.get('sha256', '-')[:8]})"
         for i in inputs_of(component):

@@ -115,7 +115,7 @@ def instance(toy_fmus):
 @pytest.mark.parametrize("status", [-1, -(2**31), 6, 2**31 - 1])
 def test_a_status_that_fmi_does_not_know_is_a_failure(instance, monkeypatch, status):
     monkeypatch.setattr(instance, "_do_step", lambda *_: status)
-    with pytest.raises(SlaveError, match=rf"failed in a step at t = 0 s, status {status}: "):
+    with pytest.raises(SlaveError, match=rf"failed in a step at t = 0 s, status {status}, which FMI does not know: "):
         instance.step(0.0, 0.1)
 
 
@@ -171,6 +171,6 @@ def test_a_run_with_values_that_cannot_be_says_so(toy, tmp_path, capsys):
 
 def test_a_table_takes_no_markup_from_names():
     stream = io.StringIO()
-    Terminal(file=stream, width=80).print(figures_table([], ["[/]", "[red]x"]))
+    Terminal(file=stream, width=80).print(figures_table([], ["[/]", "[red]x"], []))
     assert "[red]x" in stream.getvalue()
     assert issubclass(SlaveError, MasterError)

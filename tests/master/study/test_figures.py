@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from master.contacts import Contact
+from master.evaluation.contact_assessment import slack_share
 from master.recorder import Recording
 from master.results import Results
 from master.study import charts
 from master.study.family import Family, Interval, Settings, Variant
-from master.study.figures import entries, slack_share
+from master.study.figures import entries
 from master.study.outcome import Done, Outcome, as_csv, differences
 from master.study.page import page
 from master.verify.quantities import QUANTITIES, Choice
@@ -131,6 +132,7 @@ def _lap(slack_at):
 def test_droppers_of_a_later_lap_are_found(slack_at, share):
     """The dropper at 30 m is passed at 130 m, after 2.6 s, in the interval of the second lap."""
     done, contact = _lap(slack_at)
-    assert slack_share(done, contact, None, Interval(name="second lap", start=100.0, end=200.0)) == share
+    geometry = done.geometry["catenary"]
+    assert slack_share(done.recordings, geometry, contact, None, (100.0, 200.0)) == share
     measured = QUANTITIES["slack_share"].measure(done, Choice(within=5.0))
     assert measured.values == (100.0 * share,)

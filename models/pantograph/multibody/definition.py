@@ -574,6 +574,10 @@ class _Reader:
             if body and body not in names:
                 listed = ", ".join(sorted(names))
                 self.root.problem(f"{where}.{key}", f"there is no body '{body}' (bodies: {listed})")
+        driven = {j.body_j for j in d.joints if j.kind == "prescribed_motion"}
+        if d.strip is not None and d.strip.body in driven:
+            text = f"body '{d.strip.body}' has a prescribed motion; put the strip on one that the contact can move"
+            self.root.problem("strip.body", text)
         self._check_pairs(d)
         self._check_friction(d)
 

@@ -44,6 +44,15 @@ def test_so_it_is_of_strip_and_assembly(section):
         definition.from_dict(data)
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_strip_that_nothing_can_move_is_told(name):
+    """Its apparent mass would be no number."""
+    data = library_data(name)
+    data["strip"]["body"] = "base"
+    with pytest.raises(DefinitionError, match=r"strip\.body: body 'base' has a prescribed motion; put the strip on one"):
+        definition.from_dict(data)
+
+
 def test_a_spring_that_carries_the_weights_needs_a_stiffness(capsys, tmp_path):
     text = pantograph_path("CX_multibody").read_text(encoding="utf-8")
     head, tail = text.split("carries_weights = true", 1)

@@ -49,7 +49,7 @@ def test_a_strip_that_nothing_can_move_is_told(name):
     """Its apparent mass would be no number."""
     data = library_data(name)
     data["strip"]["body"] = "base"
-    with pytest.raises(DefinitionError, match=r"strip\.body: body 'base' has a prescribed motion; put the strip on one"):
+    with pytest.raises(DefinitionError, match=r"strip\.body: body 'base' has a prescribed motion; put the strip"):
         definition.from_dict(data)
 
 

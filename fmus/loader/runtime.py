@@ -1,0 +1,281 @@
+"""The Python that a standalone FMU brings along: one folder, small and complete.
+
+It holds the Python library, the standard library as one archive of byte code, those compiled modules of Python, numpy
+and scipy that runs of FMUs of every kind load, the system's libraries that these need, and the licences of all of it.
+``runtime.txt`` tells the loader (``loader.c``) what lies where.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import io
+import json
+import marshal
+import shutil
+import subprocess
+import tempfile
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+import pythonfmu
+
+from fmus.loader.installation import PACKAGES, Installation, InstallationError, own
+from fmus.loader.licences import licences
+from fmus.loader.rehearsal import LoadedModules, RehearsalError, rehearse
+from fmus.loader.shared_libraries import Libraries, collect_libraries
+
+#: Version of this layout, for the loader.
+FORMAT: Final = 1
+DESCRIPTION: Final = "runtime.txt"
+_SEARCH_PATH: Final = ("stdlib.zip", "extensions", "packages")
+#: Modules of the standard library that come along though no good run loads them: what other systems and encodings need,
+#: and what puts an error into words.
+_ALWAYS: Final = frozenset(
+    """
+    _compat_pickle _strptime bisect cmd code codecs codeop configparser copy csv decimal encodings fractions getopt
+    hashlib heapq html linecache nturl2path ntpath numbers pdb posixpath _pydecimal queue runpy sched site statistics
+    stringprep tarfile timeit trace traceback tracemalloc
+    """.split()
+)
+#: Compiled modules that Python does without: they would need OpenSSL or libuuid. ``hashlib`` takes ``_sha256`` etc.
+_REPLACED: Final = frozenset({"_hashlib", "_ssl", "_uuid"})
+#: What hashlib takes instead.
+_ADDED: Final = frozenset({"_md5", "_sha1", "_sha256", "_sha512", "_sha3", "_blake2"})
+#: What stands in the place of modules that would load all of scipy.linalg and scipy.sparse.linalg for a few functions.
+_FRONTS: Final[Mapping[str, str]] = {
+    "scipy.linalg": "from numpy.linalg import LinAlgError\n",
+    "scipy.linalg.lapack": "from scipy.linalg._flapack import *\n",
+    "scipy.sparse.linalg": "from scipy.sparse.linalg._dsolve import SuperLU, splu\n",
+}
+_TEST_FILES: Final = ("test_", "conftest", "setup.py")
+_ZIP_DATE: Final = (1980, 1, 1, 0, 0, 0)
+_BYTE_CODE_UNCHECKED: Final = (1).to_bytes(4, "little")
+
+
+class RuntimeBuildError(ValueError):
+    """A runtime that cannot be made; says why."""
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """A runtime folder, as files.
+
+    Attributes
+    ----------
+    files : mapping
+        Path below the folder, with forward slashes -> content.
+    platform : str
+        ``linux64`` or ``win64``.
+    content : str
+        Hash of all that it was made from.
+    was_tried : bool
+        Whether FMUs ran with it here; another system's cannot.
+    """
+
+    files: Mapping[str, bytes]
+    platform: str
+    content: str
+    was_tried: bool
+
+
+def make_runtime(source: Installation, resources: Iterable[Path]) -> Runtime:
+    """Return the runtime taken from an installation of Python, tried out if it is one of this system.
+
+    Parameters
+    ----------
+    source : Installation
+    resources : iterable of Path
+        Unpacked ``resources`` of one FMU of every kind: their runs decide what is needed.
+
+    Raises
+    ------
+    RuntimeBuildError
+    """
+    folders = list(resources)
+    here = own()
+    _check_versions(source, here)
+    try:
+        with tempfile.TemporaryDirectory(prefix="openpanto_") as name:
+            try:
+                return _make(source, here, folders, Path(name), _FRONTS)
+            except RehearsalError:
+                # Another version of scipy may be built otherwise: then all of it comes along.
+                return _make(source, here, folders, Path(name), {})
+    except RehearsalError as error:
+        raise RuntimeBuildError(f"an FMU does not run with the bundled Python: {error}") from error
+    except OSError as error:
+        raise RuntimeBuildError(f"{error.filename} cannot be read ({error.strerror})") from error
+
+
+def _make(
+    source: Installation, here: Installation, folders: Sequence[Path], work: Path, fronts: Mapping[str, str]
+) -> Runtime:
+    loaded = rehearse(folders, work, fronts)
+    originals = _originals(source, here, loaded)
+    libraries = collect_libraries(source, originals)
+    originals = {**originals, **libraries.files}
+    content = _hash(originals, fronts)
+    files = _finish(originals, fronts) | licences(source, originals)
+    files[DESCRIPTION] = _description(source, libraries, content)
+    is_of_this_system = source.platform == here.platform
+    if is_of_this_system:
+        _try_out(files, libraries, folders, work)
+    return Runtime(dict(sorted(files.items())), source.platform, content, is_of_this_system)
+
+
+def _check_versions(source: Installation, here: Installation) -> None:
+    for package in PACKAGES:
+        there, wanted = source.package_version(package), here.package_version(package)
+        if there != wanted:
+            raise InstallationError(
+                f"{source.root} has {package} {there}, but what an FMU needs of it was found with {wanted}, which "
+                f"builds the FMU; install {package}=={wanted} there"
+            )
+
+
+def _originals(source: Installation, here: Installation, loaded: LoadedModules) -> dict[str, Path]:
+    """Return the files that a runtime is made from, by their places in it (those of the archive too)."""
+    found = {f"stdlib/{n}": path for n, path in _standard_library(source.modules, loaded)}
+    found |= {f"extensions/{path.name}": path for path in _python_extensions(source, loaded)}
+    for package in PACKAGES:
+        files = loaded.of_package(package, here.packages[package].resolve())
+        found |= {f"packages/{n}": path for n, path in _package_files(source, package, files)}
+    return found
+
+
+def _standard_library(folder: Path, loaded: LoadedModules) -> Iterator[tuple[str, Path]]:
+    """Yield the modules that were loaded, packages whole."""
+    wanted = {name.partition(".")[0] for name in loaded.files} | _ALWAYS
+    for entry in sorted(folder.iterdir()):
+        if entry.stem in wanted and (entry.is_dir() or entry.suffix == ".py"):
+            for path in sorted(entry.rglob("*.py")) if entry.is_dir() else [entry]:
+                yield path.relative_to(folder).as_posix(), path
+
+
+def _python_extensions(source: Installation, loaded: LoadedModules) -> Iterator[Path]:
+    wanted = (set(loaded.files) | _ADDED) - _REPLACED
+    for path in sorted(source.extensions.iterdir()):
+        if path.suffix in (".so", ".pyd") and path.name.partition(".")[0] in wanted:
+            yield path
+
+
+def _package_files(source: Installation, package: str, files: Iterable[Path]) -> Iterator[tuple[str, Path]]:
+    """Yield all Python files of the folders that files were loaded from, and the compiled modules among those."""
+    root = source.packages[package]
+    folders = {file.parent for file in files if file.suffix == ".py"}
+    for folder in sorted(folders):
+        for path in sorted((root / folder).glob("*.py")):
+            if not path.name.startswith(_TEST_FILES):
+                yield path.relative_to(root).as_posix(), path
+    for file in files:
+        if file.suffix != ".py":
+            path = _compiled_module(root, file)
+            yield path.relative_to(root).as_posix(), path
+
+
+def _compiled_module(root: Path, file: Path) -> Path:
+    stem = file.name.partition(".")[0]
+    for path in sorted((root / file.parent).glob(f"{stem}.*")):
+        if path.suffix in (".so", ".pyd"):
+            return path
+    raise InstallationError(f"{root / file.parent} has no compiled module {stem}, which FMUs load here")
+
+
+def _finish(originals: Mapping[str, Path], fronts: Mapping[str, str]) -> dict[str, bytes]:
+    standing_in = {f"packages/{_inner(name, originals)}": text.encode() for name, text in fronts.items()}
+    files: dict[str, bytes] = {}
+    for name, path in originals.items():
+        if name.startswith("stdlib/"):
+            continue
+        if name.endswith(".py"):
+            files[f"{name}c"] = _byte_code(name, standing_in.get(name) or path.read_bytes())
+        else:
+            files[name] = _library(name, path)
+    files["stdlib.zip"] = _archive({n: p for n, p in originals.items() if n.startswith("stdlib/")})
+    return files
+
+
+def _inner(module: str, files: Iterable[str]) -> str:
+    stem = module.replace(".", "/")
+    return f"{stem}/__init__.py" if f"packages/{stem}/__init__.py" in files else f"{stem}.py"
+
+
+def _library(name: str, path: Path) -> bytes:
+    # Libraries in wheels were rearranged by their makers, which strip does not always survive.
+    return path.read_bytes() if name.startswith("packages/") else _stripped(path)
+
+
+def _byte_code(name: str, source: bytes) -> bytes:
+    """Return a module's byte code, which is never compared with a source (PEP 552)."""
+    code = compile(source, name, "exec", dont_inherit=True, optimize=0)
+    # Twice: what marshal writes depends on who else holds an object, and only a copy of its own has no such past.
+    body = marshal.dumps(marshal.loads(marshal.dumps(code)))
+    return importlib.util.MAGIC_NUMBER + _BYTE_CODE_UNCHECKED + importlib.util.source_hash(source) + body
+
+
+def _archive(modules: Mapping[str, Path]) -> bytes:
+    buffer = io.BytesIO()
+    # Stored: it is compressed with the FMU, and Python starts faster.
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
+        for name, path in sorted(modules.items()):
+            inner = name.removeprefix("stdlib/")
+            archive.writestr(zipfile.ZipInfo(f"{inner}c", _ZIP_DATE), _byte_code(inner, path.read_bytes()))
+    return buffer.getvalue()
+
+
+def _stripped(path: Path) -> bytes:
+    """Return a library without the symbols that only debuggers read, as it is where there is no strip."""
+    tool = shutil.which("strip")
+    if tool is None or ".so" not in path.name:
+        return path.read_bytes()
+    with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
+        out = Path(folder) / path.name
+        done = subprocess.run([tool, "--strip-unneeded", "-o", out, path], capture_output=True, check=False)
+        return (out if done.returncode == 0 else path).read_bytes()
+
+
+def _description(source: Installation, libraries: Libraries, content: str) -> bytes:
+    entries = {
+        "format": str(FORMAT),
+        "platform": source.platform,
+        "python": source.version,
+        **{name: source.package_version(name) for name in PACKAGES},
+        "glibc": libraries.glibc,
+        "libpython": libraries.python,
+        "home": ".",
+        "path": ":".join(_SEARCH_PATH),
+        "preload": ":".join(libraries.preload),
+        "binding": f"pythonfmu-{pythonfmu.__version__}",
+        "content": content,
+    }
+    return "".join(f"{key}={value}\n" for key, value in entries.items() if value).encode()
+
+
+def _hash(originals: Mapping[str, Path], fronts: Mapping[str, str]) -> str:
+    whole = hashlib.sha256(json.dumps([FORMAT, dict(fronts)], sort_keys=True).encode())
+    for name, path in sorted(originals.items()):
+        whole.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\0".encode())
+    return whole.hexdigest()[:32]
+
+
+def write_runtime(runtime: Runtime, folder: Path) -> None:
+    """Write a runtime's files below a folder."""
+    _write(runtime.files, folder)
+
+
+def _write(files: Mapping[str, bytes], folder: Path) -> None:
+    for name, data in files.items():
+        path = folder / PurePosixPath(name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+
+
+def _try_out(files: Mapping[str, bytes], libraries: Libraries, folders: Sequence[Path], work: Path) -> None:
+    place = work / "runtime"
+    _write(files, place)
+    search_path = [place / name for name in _SEARCH_PATH]
+    rehearse(folders, work, search_path=search_path, preload=[place / name for name in libraries.preload])

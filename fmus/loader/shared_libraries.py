@@ -1,0 +1,114 @@
+"""The shared libraries that a runtime has to bring: what its compiled modules ask for, and glibc does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from graphlib import TopologicalSorter
+from pathlib import Path
+from typing import Final
+
+from fmus.loader.elf import glibc_needed, needed, soname
+from fmus.loader.installation import PACKAGES, Installation, InstallationError
+
+#: Libraries of glibc: these are the machine's, whoever brings others breaks it.
+_GLIBC: Final = frozenset(
+    """
+    ld-linux-x86-64.so.2 libc.so.6 libdl.so.2 libm.so.6 libpthread.so.0 libresolv.so.2 librt.so.1 libutil.so.1
+    """.split()
+)
+_SYSTEM_FOLDERS: Final = ("/lib/x86_64-linux-gnu", "/usr/lib/x86_64-linux-gnu", "/lib64", "/usr/lib64", "/lib", "/usr/lib")
+_ROOT_FOLDERS: Final = ("lib", "lib64", "lib/x86_64-linux-gnu")
+
+
+@dataclass(frozen=True)
+class Libraries:
+    """Libraries of a runtime.
+
+    Attributes
+    ----------
+    files : mapping
+        Place in the runtime -> file.
+    python : str
+        Place of Python's own.
+    preload : tuple of str
+        Places of those that the loader opens before it, each after those that it needs itself.
+    glibc : str
+        The oldest glibc that has all that they ask for, empty for other systems.
+    """
+
+    files: Mapping[str, Path]
+    python: str
+    preload: tuple[str, ...]
+    glibc: str
+
+
+def collect_libraries(source: Installation, modules: Mapping[str, Path]) -> Libraries:
+    """Return the libraries that Python and compiled modules need.
+
+    Parameters
+    ----------
+    source : Installation
+    modules : mapping
+        Place in the runtime -> file; those that are not libraries are passed over.
+
+    Raises
+    ------
+    InstallationError
+        If a library is nowhere to be found.
+    """
+    return _of_windows(source) if source.platform == "win64" else _of_linux(source, modules)
+
+
+# Libraries of wheels lie with the others: what numpy and scipy both need is there once. Opened first, they are found by
+# their names, for which those of wheels hold a hash.
+def _of_linux(source: Installation, modules: Mapping[str, Path]) -> Libraries:
+    compiled = [path for name, path in modules.items() if name.endswith(".so")]
+    found = _closure([source.library, *compiled], source)
+    order = TopologicalSorter({name: set(needed(path.read_bytes())) & found.keys() for name, path in found.items()})
+    files = {f"lib/{name}": path for name, path in found.items()}
+    preload = [f"lib/{name}" for name in order.static_order()]
+    python = f"lib/{soname(source.library.read_bytes()) or source.library.name}"
+    files[python] = source.library
+    glibc = max(glibc_needed(path.read_bytes()) for path in (*files.values(), *compiled))
+    return Libraries(files, python, tuple(preload), f"2.{glibc}")
+
+
+def _closure(start: Iterable[Path], source: Installation) -> dict[str, Path]:
+    """Return all libraries that some need, directly or not: name asked for -> file."""
+    found: dict[str, Path] = {}
+    waiting = list(start)
+    while waiting:
+        asking = waiting.pop()
+        for name in needed(asking.read_bytes()):
+            if name not in _GLIBC and name not in found:
+                found[name] = _find(name, asking, source)
+                waiting.append(found[name])
+    return found
+
+
+def _find(name: str, asking: Path, source: Installation) -> Path:
+    own = [folder / f"{package}.libs" for package, folder in source.packages.items()]
+    inside = [source.root / folder for folder in _ROOT_FOLDERS]
+    system = [Path(folder) for folder in _SYSTEM_FOLDERS]
+    for folder in (*own, *inside, *system):
+        if (folder / name).is_file():
+            return (folder / name).resolve()
+    raise InstallationError(f"{asking} needs {name}, which is not on this machine; install it")
+
+
+def _of_windows(source: Installation) -> Libraries:
+    files = {f"packages/{p.parent.name}/{p.name}": p for p in _wheel_libraries(source)}
+    beside = [p for pattern in ("vcruntime*.dll", "python3.dll") for p in sorted(source.root.glob(pattern))]
+    # Compiled modules of Python find their libraries (libffi) in their own folder.
+    files |= {f"extensions/{p.name}": p for p in sorted(source.extensions.glob("libffi*.dll"))}
+    files |= {f"lib/{p.name}": p for p in beside}
+    python = f"lib/{source.library.name}"
+    files[python] = source.library
+    first = sorted(f"lib/{p.name}" for p in beside if p.name != "python3.dll")
+    return Libraries(files, python, tuple(first), "")
+
+
+def _wheel_libraries(source: Installation) -> Iterable[Path]:
+    for package in PACKAGES:
+        yield from sorted((source.packages[package] / f"{package}.libs").glob("*.dll"))

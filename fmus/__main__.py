@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fmus import doctor
-from fmus.build import MAX_PORTS, BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe
+from fmus.build import MAX_PORTS, BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe, why_no_loader
 
 DEFAULT_FOLDER = Path("build/fmus")
 
@@ -41,7 +41,6 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
-    verb.add_argument("--shim", action="store_true", help="bring Python into hosts that are not Python (Linux)")
     verb.set_defaults(run=_build)
     verb = verbs.add_parser("doctor", help="say what this machine lacks for running an FMU")
     verb.add_argument("fmu", type=Path, metavar="FILE", help="X.fmu")
@@ -62,7 +61,9 @@ def _count(text: str) -> int:
 
 def _build(options: argparse.Namespace) -> None:
     for wanted in _recipes(options.names or known_names(), options.pantographs):
-        print(build(wanted, options.out, options.shim))
+        print(build(wanted, options.out))
+    if why := why_no_loader():
+        print(f"note: the FMUs have pythonfmu's own library only, without our loader: {why}", file=sys.stderr)
 
 
 def _examine(options: argparse.Namespace) -> int:

@@ -23,8 +23,8 @@ import pythonfmu
 from fmus.bundle import BundleError, Module, collect, rewrite
 from fmus.documentation import About, page
 from fmus.icon import icon
+from fmus.loader.loader_build import LoaderError, sources, with_loader
 from fmus.repair import repaired
-from fmus.shim import NATIVE, ShimError, with_shim
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 LIBRARY = REPOSITORY / "models" / "library"
@@ -44,11 +44,13 @@ _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
     "multibody": ("fmus.multibody", "MultibodyPantographSlave"),
 }
 #: Sources that are not carried along but decide about an FMU's bytes.
-_BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "repair.py", "shim.py")
+_BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "repair.py")
 _REQUIREMENTS = b"numpy>=1.26\nscipy>=1.11\n"
 #: Most pantograph ports of a line: each costs variables, and no train has more.
 MAX_PORTS = 16
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
+#: In every FMU of ours: what it is, for the loader and for whoever wants to know whether it may be replaced.
+MARK = "resources/openpanto.txt"
 
 _SCRIPT = '''"""Entry for pythonfmu. Generated; the name of this file holds the content hash."""
 
@@ -172,22 +174,22 @@ def fingerprint(wanted: Recipe) -> str:
     return _gather(wanted).fingerprint
 
 
-def build(wanted: Recipe, folder: Path, shim: bool = False) -> Path:
+def build(wanted: Recipe, folder: Path, loader: bool = True) -> Path:
     """Write ``folder/NAME.fmu`` and return its path; other builds may run at the same time.
 
     Parameters
     ----------
     wanted : Recipe
     folder : Path
-    shim : bool
-        Whether the Linux library is to bring Python into hosts that are not Python (``fmus.shim``).
+    loader : bool
+        Whether our loader is to stand before pythonfmu's Linux library; where it cannot be had, it does not.
 
     Raises
     ------
     BuildError
         If the definition or the sources do not make an FMU.
     """
-    data = archive(wanted, shim)
+    data = archive(wanted, loader)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
     handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{wanted.name}.", suffix=".tmp")
@@ -202,14 +204,13 @@ def build(wanted: Recipe, folder: Path, shim: bool = False) -> Path:
     return path
 
 
-def archive(wanted: Recipe, shim: bool = False) -> bytes:
-    """Return the bytes of an FMU; the same sources give the same bytes (with the shim: and the same compiler)."""
-    files = _contents(wanted, _gather(wanted))
-    if shim:
-        try:
-            files = with_shim(files, wanted.name)
-        except ShimError as error:
-            raise BuildError(f"{wanted.name}: {error}") from error
+def archive(wanted: Recipe, loader: bool = True) -> bytes:
+    """Return the bytes of an FMU; the same sources give the same bytes (with the loader: and the same compiler)."""
+    gathered = _gather(wanted)
+    files = _contents(wanted, gathered)
+    if loader and not why_no_loader():
+        files = with_loader(files, wanted.name)
+    files[MARK] = _mark(gathered.fingerprint, files)
     buffer = io.BytesIO()
     # Stored, not compressed: what a compressor makes of the same input differs between its versions.
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as package:
@@ -219,6 +220,29 @@ def archive(wanted: Recipe, shim: bool = False) -> bytes:
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             package.writestr(entry, data)
     return buffer.getvalue()
+
+
+def why_no_loader() -> str:
+    """Return why FMUs that are built here get pythonfmu's own library instead of our loader; empty if they do not."""
+    try:
+        with_loader(_binaries("X"), "X")
+    except LoaderError as error:
+        return str(error)
+    return ""
+
+
+def content_hash(files: Mapping[str, bytes]) -> str:
+    """Return a SHA-256 of an FMU's files but the mark, which holds it: of an FMU that nobody changed by hand."""
+    whole = hashlib.sha256()
+    for name, data in sorted(files.items()):
+        if name != MARK:
+            whole.update(f"{name}\0{len(data)}\0".encode() + data)
+    return whole.hexdigest()
+
+
+def _mark(guid: str, files: Mapping[str, bytes]) -> bytes:
+    lines = {"format": "1", "guid": guid, "content": content_hash(files)}
+    return "".join(f"{key}={value}\n" for key, value in lines.items()).encode()
 
 
 def _definitions(folder: str) -> list[Path]:
@@ -264,8 +288,8 @@ def _gather(wanted: Recipe) -> _Sources:
 
 def _builders() -> dict[str, bytes]:
     here = Path(__file__).parent
-    files = [here / name for name in _BUILDERS] + sorted(NATIVE.glob("*.*"))
-    return {f"build/{path.name}": path.read_bytes() for path in files}
+    files = {name: (here / name).read_bytes() for name in _BUILDERS} | sources()
+    return {f"build/{name}": data for name, data in files.items()}
 
 
 def _recipe_bytes(wanted: Recipe) -> bytes:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final, Literal
 from xml.etree import ElementTree
 
-from fmus.shim import INNER_SUFFIX, probe_text
+from fmus.loader.loader_build import INNER_SUFFIX, PROBE
 
 Level = Literal["ok", "note", "missing"]
 #: (system, machine) -> folder and suffix of an FMU's library.
@@ -65,7 +65,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Interpreter:
-    """The Python that a tool would run the FMU with, in its own words (``native/probe.py``)."""
+    """The Python that a tool would run the FMU with, in its own words (``loader/python_probe.py``)."""
 
     executable: str
     version: str
@@ -88,7 +88,7 @@ class Package:
         return f"binaries/{folder}/{self.identifier}{suffix}" if folder else ""
 
     @property
-    def has_shim(self) -> bool:
+    def has_loader(self) -> bool:
         """Whether it brings Python into hosts that are not Python."""
         return f"binaries/linux64/{self.identifier}{INNER_SUFFIX}" in self.names
 
@@ -131,7 +131,7 @@ def read_package(path: Path) -> Package:
 
 def ask(name: str | None = None) -> Interpreter | None:
     """Ask an interpreter (default: the one that tools take) what it has; None if it cannot be run."""
-    command = [name or interpreter_name(), "-c", probe_text()]
+    command = [name or interpreter_name(), "-c", PROBE.read_text(encoding="utf-8")]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
     except (OSError, subprocess.TimeoutExpired):
@@ -199,13 +199,13 @@ def _other_hosts(package: Package, python: Interpreter) -> Iterator[Finding]:
             f"tools that are not Python cannot: {python.executable} has no shared library; install libpython "
             f"(Debian: apt-get install libpython{python.version}), or a Python built with --enable-shared",
         )
-    elif package.has_shim:
-        yield Finding("ok", f"tools that are not Python can run it too: its shim will load {python.library}")
+    elif package.has_loader:
+        yield Finding("ok", f"tools that are not Python can run it too: its loader will load {python.library}")
     else:
         first = Path(python.executable).parent
         yield Finding(
             "note",
-            "tools that are not Python need it built with --shim, or to be started like this: "
+            "tools that are not Python need it built with our loader, or to be started like this: "
             f"PATH={first}:$PATH LD_PRELOAD={python.library} the-tool",
         )
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from fmus.build import build, recipe
-from fmus.shim import INNER_SUFFIX
+from fmus.loader.loader_build import INNER_SUFFIX
 from master.run import loaded
 from master.scenario import open_scenario
 from master.ssp.archive import extract
@@ -79,7 +79,7 @@ def plain(system, tmp_path_factory):
 def shimmed(system, tmp_path_factory):
     """The same FMUs with the shim."""
     built, folder = tmp_path_factory.mktemp("built"), tmp_path_factory.mktemp("shimmed")
-    return [unpack(build(recipe(c.fmu.path.stem), built, shim=True), folder) for c in system.components]
+    return [unpack(build(recipe(c.fmu.path.stem), built), folder) for c in system.components]
 
 
 def plan(system, unpacked):
@@ -180,7 +180,7 @@ for path in sys.argv[1:]:
 
 def test_the_shim_keeps_out_of_the_way_where_the_host_is_python(system, tmp_path):
     pantograph = system.components[1].fmu.path
-    with_shim = build(recipe(pantograph.stem), tmp_path, shim=True)
+    with_shim = build(recipe(pantograph.stem), tmp_path)
     command = [sys.executable, "-c", _IN_PYTHON, str(pantograph), str(with_shim)]
     environment = {**os.environ, "OPENPANTO_PYTHON": "/nowhere/python3"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -1,0 +1,51 @@
+"""Asked of the Python that an FMU runs in, before pythonfmu is: whether the FMU's code can be loaded, and why not.
+
+The loader carries this text. pythonfmu's library does not survive code that cannot be imported or compiled, or a path
+that Python takes for another one; so such an FMU never reaches it. Old Pythons must understand this file.
+"""
+
+import importlib
+import os
+import sys
+
+
+def problem(resources, script):
+    """Return why ``script`` in the folder cannot be loaded, in words; empty if it can, "alias" for another path."""
+    if sys.version_info < (3, 11):
+        return "Python in this process is %d.%d, but 3.11 or newer is needed" % sys.version_info[:2]
+    try:
+        if os.fsencode(resources) != resources.encode("utf-8"):
+            return "alias"
+    except UnicodeError:
+        return "alias"
+    path = os.path.join(resources, script + ".py")
+    sys.path.insert(0, resources)
+    try:
+        importlib.import_module(script)
+        with open(path, "rb") as file:
+            compile(file.read(), script, "exec")
+    except ModuleNotFoundError as error:
+        name = str(error.name).partition(".")[0]
+        if name.startswith(("openpanto_", script)):
+            return "the FMU is incomplete: " + str(error) + "; unpack it again, or build it anew"
+        return "the Python in this process (" + _place() + ") lacks the package " + name + "; install it there"
+    except BaseException as error:
+        return "the FMU cannot be loaded: " + (str(error) or type(error).__name__)
+    finally:
+        forget(resources)
+    return ""
+
+
+def forget(resources):
+    """Take the folder out of the places that modules come from; all that is needed has been imported."""
+    sys.path[:] = [place for place in sys.path if place != resources]
+
+
+def set_paths(places, content):
+    """Let modules come from these places alone, the parts of a runtime that came with an FMU."""
+    sys.path[:] = places.split("\n")
+    sys.openpanto_runtime = content
+
+
+def _place():
+    return sys.executable or sys.prefix

@@ -35,6 +35,7 @@ INNER_SUFFIX: Final = ".pythonfmu.so"
 OLDEST_GLIBC: Final = (2, 17)
 _BINARIES: Final = "binaries/linux64"
 _INPUTS: Final = ("loader.c", "platform_posix.c")
+#: Not to be unloaded: pythonfmu's library stays in the process as well, and so their place can be used again.
 #: libdl and libpthread are part of libc from glibc 2.34 on; older ones have dlopen in libdl.
 _OPTIONS: Final = (
     "-std=gnu11",
@@ -46,7 +47,7 @@ _OPTIONS: Final = (
     "-Wextra",
     "-Wno-unused-parameter",
 )
-_LIBRARIES: Final = ("-Wl,--no-as-needed", "-l:libdl.so.2", "-lpthread")
+_LIBRARIES: Final = ("-Wl,-z,nodelete", "-Wl,--no-as-needed", "-l:libdl.so.2", "-lpthread")
 _VERSION: Final = re.compile(rb"\0(GLIBC|GLIBCXX)_(\d+(?:\.\d+)+)(?=\0)")
 
 

@@ -51,6 +51,8 @@ MAX_PORTS = 16
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
 #: In every FMU of ours: what it is, for the loader and for whoever wants to know whether it may be replaced.
 MARK = "resources/openpanto.txt"
+#: Where a standalone FMU holds its own Python.
+RUNTIME = "resources/runtime"
 
 _SCRIPT = '''"""Entry for pythonfmu. Generated; the name of this file holds the content hash."""
 
@@ -174,7 +176,9 @@ def fingerprint(wanted: Recipe) -> str:
     return _gather(wanted).fingerprint
 
 
-def build(wanted: Recipe, folder: Path, loader: bool = True) -> Path:
+def build(
+    wanted: Recipe, folder: Path, loader: bool = True, runtime: Mapping[str, bytes] | None = None
+) -> Path:
     """Write ``folder/NAME.fmu`` and return its path; other builds may run at the same time.
 
     Parameters
@@ -183,13 +187,15 @@ def build(wanted: Recipe, folder: Path, loader: bool = True) -> Path:
     folder : Path
     loader : bool
         Whether our loader is to stand before pythonfmu's Linux library; where it cannot be had, it does not.
+    runtime : mapping, optional
+        The Python that the FMU is to bring along (``fmus.loader.runtime``): path -> content.
 
     Raises
     ------
     BuildError
         If the definition or the sources do not make an FMU.
     """
-    data = archive(wanted, loader)
+    data = archive(wanted, loader, runtime)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
     handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{wanted.name}.", suffix=".tmp")
@@ -204,21 +210,39 @@ def build(wanted: Recipe, folder: Path, loader: bool = True) -> Path:
     return path
 
 
-def archive(wanted: Recipe, loader: bool = True) -> bytes:
-    """Return the bytes of an FMU; the same sources give the same bytes (with the loader: and the same compiler)."""
+def archive(wanted: Recipe, loader: bool = True, runtime: Mapping[str, bytes] | None = None) -> bytes:
+    """Return the bytes of an FMU; the same sources give the same bytes (with the loader: and the same compiler).
+
+    Raises
+    ------
+    BuildError
+        If the definition or the sources do not make an FMU, or a runtime has no loader to open it.
+    """
     gathered = _gather(wanted)
     files = _contents(wanted, gathered)
-    if loader and not why_no_loader():
+    why_not = why_no_loader()
+    if runtime and why_not:
+        raise BuildError(f"{wanted.name} cannot be standalone: {why_not}")
+    if loader and not why_not:
         files = with_loader(files, wanted.name)
+    files |= {f"{RUNTIME}/{name}": data for name, data in (runtime or {}).items()}
     files[MARK] = _mark(gathered.fingerprint, files)
+    return _zipped(files)
+
+
+def _zipped(files: Mapping[str, bytes]) -> bytes:
     buffer = io.BytesIO()
-    # Stored, not compressed: what a compressor makes of the same input differs between its versions.
+    # Stored, not compressed: what a compressor makes of the same input differs between its versions. A runtime is too
+    # large for that.
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as package:
         for name, data in sorted(files.items()):
             entry = zipfile.ZipInfo(name, _ZIP_DATE)
             entry.create_system = 3
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-            package.writestr(entry, data)
+            if name.startswith(f"{RUNTIME}/"):
+                package.writestr(entry, data, zipfile.ZIP_DEFLATED, 9)
+            else:
+                package.writestr(entry, data)
     return buffer.getvalue()
 
 

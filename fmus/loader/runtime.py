@@ -7,6 +7,7 @@ and scipy that runs of FMUs of every kind load, the system's libraries that thes
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import importlib.util
 import io
@@ -31,7 +32,6 @@ from fmus.loader.shared_libraries import Libraries, collect_libraries
 #: Version of this layout, for the loader.
 FORMAT: Final = 1
 DESCRIPTION: Final = "runtime.txt"
-_SEARCH_PATH: Final = ("stdlib.zip", "extensions", "packages")
 #: Modules of the standard library that come along though no good run loads them: what other systems and encodings need,
 #: and what puts an error into words.
 _ALWAYS: Final = frozenset(
@@ -51,6 +51,9 @@ _FRONTS: Final[Mapping[str, str]] = {
     "scipy.linalg.lapack": "from scipy.linalg._flapack import *\n",
     "scipy.sparse.linalg": "from scipy.sparse.linalg._dsolve import SuperLU, splu\n",
 }
+#: numpy.ma makes its docstrings from numpy's, and insists on them.
+_KEEPS_DOCSTRINGS: Final = ("packages/numpy/",)
+_DOCUMENTED: Final = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 _TEST_FILES: Final = ("test_", "conftest", "setup.py")
 _ZIP_DATE: Final = (1980, 1, 1, 0, 0, 0)
 _BYTE_CODE_UNCHECKED: Final = (1).to_bytes(4, "little")
@@ -119,11 +122,11 @@ def _make(
     libraries = collect_libraries(source, originals)
     originals = {**originals, **libraries.files}
     content = _hash(originals, fronts)
-    files = _finish(originals, fronts) | licences(source, originals)
+    files = _finish(source, originals, fronts) | licences(source, originals)
     files[DESCRIPTION] = _description(source, libraries, content)
     is_of_this_system = source.platform == here.platform
     if is_of_this_system:
-        _try_out(files, libraries, folders, work)
+        _try_out(source, files, libraries, folders, work)
     return Runtime(dict(sorted(files.items())), source.platform, content, is_of_this_system)
 
 
@@ -185,7 +188,17 @@ def _compiled_module(root: Path, file: Path) -> Path:
     raise InstallationError(f"{root / file.parent} has no compiled module {stem}, which FMUs load here")
 
 
-def _finish(originals: Mapping[str, Path], fronts: Mapping[str, str]) -> dict[str, bytes]:
+def _standard_archive(source: Installation) -> str:
+    """Return where the standard library lies: where Python looks for it as it starts."""
+    name = f"python{source.minor_version.replace('.', '')}.zip"
+    return name if source.platform == "win64" else f"lib/{name}"
+
+
+def _search_path(source: Installation) -> tuple[str, ...]:
+    return (_standard_archive(source), "extensions", "packages")
+
+
+def _finish(source: Installation, originals: Mapping[str, Path], fronts: Mapping[str, str]) -> dict[str, bytes]:
     standing_in = {f"packages/{_inner(name, originals)}": text.encode() for name, text in fronts.items()}
     files: dict[str, bytes] = {}
     for name, path in originals.items():
@@ -194,8 +207,8 @@ def _finish(originals: Mapping[str, Path], fronts: Mapping[str, str]) -> dict[st
         if name.endswith(".py"):
             files[f"{name}c"] = _byte_code(name, standing_in.get(name) or path.read_bytes())
         else:
-            files[name] = _library(name, path)
-    files["stdlib.zip"] = _archive({n: p for n, p in originals.items() if n.startswith("stdlib/")})
+            files[name] = _library(path, source)
+    files[_standard_archive(source)] = _archive({n: p for n, p in originals.items() if n.startswith("stdlib/")})
     return files
 
 
@@ -204,17 +217,28 @@ def _inner(module: str, files: Iterable[str]) -> str:
     return f"{stem}/__init__.py" if f"packages/{stem}/__init__.py" in files else f"{stem}.py"
 
 
-def _library(name: str, path: Path) -> bytes:
-    # Libraries in wheels were rearranged by their makers, which strip does not always survive.
-    return path.read_bytes() if name.startswith("packages/") else _stripped(path)
+def _library(path: Path, source: Installation) -> bytes:
+    # Libraries in wheels were rearranged by their makers, which strip does not survive.
+    is_python = path == source.library or path.parent == source.extensions
+    return _stripped(path) if is_python else path.read_bytes()
 
 
 def _byte_code(name: str, source: bytes) -> bytes:
     """Return a module's byte code, which is never compared with a source (PEP 552)."""
-    code = compile(source, name, "exec", dont_inherit=True, optimize=0)
+    tree = ast.parse(source) if name.startswith(_KEEPS_DOCSTRINGS) else _without_docstrings(source)
+    code = compile(tree, name, "exec", dont_inherit=True, optimize=0)
     # Twice: what marshal writes depends on who else holds an object, and only a copy of its own has no such past.
     body = marshal.dumps(marshal.loads(marshal.dumps(code)))
     return importlib.util.MAGIC_NUMBER + _BYTE_CODE_UNCHECKED + importlib.util.source_hash(source) + body
+
+
+def _without_docstrings(source: bytes) -> ast.Module:
+    """Return a module's syntax tree without docstrings, a sixth of its byte code; assertions stay."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            node.body[:1] = [ast.copy_location(ast.Pass(), node.body[0])] if len(node.body) == 1 else []
+    return tree
 
 
 def _archive(modules: Mapping[str, Path]) -> bytes:
@@ -247,7 +271,7 @@ def _description(source: Installation, libraries: Libraries, content: str) -> by
         "glibc": libraries.glibc,
         "libpython": libraries.python,
         "home": ".",
-        "path": ":".join(_SEARCH_PATH),
+        "path": ":".join(_search_path(source)),
         "preload": ":".join(libraries.preload),
         "binding": f"pythonfmu-{pythonfmu.__version__}",
         "content": content,
@@ -262,20 +286,18 @@ def _hash(originals: Mapping[str, Path], fronts: Mapping[str, str]) -> str:
     return whole.hexdigest()[:32]
 
 
-def write_runtime(runtime: Runtime, folder: Path) -> None:
-    """Write a runtime's files below a folder."""
-    _write(runtime.files, folder)
-
-
-def _write(files: Mapping[str, bytes], folder: Path) -> None:
+def write_files(files: Mapping[str, bytes], folder: Path) -> None:
+    """Write files, named by their paths with forward slashes, below a folder."""
     for name, data in files.items():
         path = folder / PurePosixPath(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
 
 
-def _try_out(files: Mapping[str, bytes], libraries: Libraries, folders: Sequence[Path], work: Path) -> None:
+def _try_out(
+    source: Installation, files: Mapping[str, bytes], libraries: Libraries, folders: Sequence[Path], work: Path
+) -> None:
     place = work / "runtime"
-    _write(files, place)
-    search_path = [place / name for name in _SEARCH_PATH]
+    write_files(files, place)
+    search_path = [place / name for name in _search_path(source)]
     rehearse(folders, work, search_path=search_path, preload=[place / name for name in libraries.preload])

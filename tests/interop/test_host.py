@@ -127,7 +127,7 @@ def in_python(system):
 def run(host, orders, **environment):
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "LD_"))}
     clean |= {"OMP_NUM_THREADS": "1", **environment}
-    return subprocess.run([host], input=orders, env=clean, capture_output=True, text=True, check=False)
+    return subprocess.run(host, input=orders, env=clean, capture_output=True, text=True, check=False)
 
 
 def numbers(done):

@@ -12,6 +12,8 @@ from typing import Final
 from fmus.loader.installation import PACKAGES, Installation, InstallationError
 
 FOLDER: Final = "licences"
+#: Folder of libraries of our own.
+COMPILED_HERE: Final = "compiled_here"
 _COMMON: Final = Path("/usr/share/common-licenses")
 _PYTHON_FILES: Final = ("LICENSE.txt", "LICENSE", "../../LICENSE.txt", "../LICENSE.txt", "../share/doc/python3/copyright")
 
@@ -40,8 +42,9 @@ def licences(source: Installation, files: Mapping[str, Path]) -> dict[str, bytes
 
 
 def _has_other_licence(library: Path, source: Installation) -> bool:
-    """Whether the licence of Python or of a wheel covers a library."""
-    return library == source.library or library.parent.name in {f"{package}.libs" for package in PACKAGES}
+    """Whether the licence of Python, of a wheel or of the FMU itself (what is compiled here) covers a library."""
+    wheels = {f"{package}.libs" for package in PACKAGES}
+    return library == source.library or library.parent.name in {*wheels, COMPILED_HERE}
 
 
 def _python_licence(source: Installation) -> bytes:

@@ -18,6 +18,7 @@ import subprocess
 import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Final
@@ -25,9 +26,9 @@ from typing import Final
 import pythonfmu
 
 from fmus.loader.installation import PACKAGES, Installation, InstallationError, own
-from fmus.loader.licences import licences
+from fmus.loader.licences import COMPILED_HERE, licences
 from fmus.loader.rehearsal import LoadedModules, RehearsalError, rehearse
-from fmus.loader.shared_libraries import Libraries, collect_libraries
+from fmus.loader.shared_libraries import BlasError, Libraries, collect_libraries
 
 #: Version of this layout, for the loader.
 FORMAT: Final = 1
@@ -103,23 +104,35 @@ def make_runtime(source: Installation, resources: Iterable[Path]) -> Runtime:
     _check_versions(source, here)
     try:
         with tempfile.TemporaryDirectory(prefix="openpanto_") as name:
-            try:
-                return _make(source, here, folders, Path(name), _FRONTS)
-            except RehearsalError:
-                # Another version of scipy may be built otherwise: then all of it comes along.
-                return _make(source, here, folders, Path(name), {})
+            return _smallest(source, here, folders, Path(name))
     except RehearsalError as error:
         raise RuntimeBuildError(f"an FMU does not run with the bundled Python: {error}") from error
     except OSError as error:
         raise RuntimeBuildError(f"{error.filename} cannot be read ({error.strerror})") from error
 
 
+def _smallest(source: Installation, here: Installation, folders: Sequence[Path], work: Path) -> Runtime:
+    """Return the smallest runtime that works: other versions of numpy and scipy may be built otherwise."""
+    compiled = work / COMPILED_HERE
+    compiled.mkdir()
+    with suppress(RehearsalError, BlasError):
+        return _make(source, here, folders, work, _FRONTS, compiled)
+    with suppress(RehearsalError):
+        return _make(source, here, folders, work, _FRONTS, None)
+    return _make(source, here, folders, work, {}, None)
+
+
 def _make(
-    source: Installation, here: Installation, folders: Sequence[Path], work: Path, fronts: Mapping[str, str]
+    source: Installation,
+    here: Installation,
+    folders: Sequence[Path],
+    work: Path,
+    fronts: Mapping[str, str],
+    one_blas: Path | None,
 ) -> Runtime:
     loaded = rehearse(folders, work, fronts)
     originals = _originals(source, here, loaded)
-    libraries = collect_libraries(source, originals)
+    libraries = collect_libraries(source, originals, one_blas)
     originals = {**originals, **libraries.files}
     content = _hash(originals, fronts)
     files = _finish(source, originals, fronts) | licences(source, originals)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
@@ -19,6 +22,12 @@ _GLIBC: Final = frozenset(
 )
 _SYSTEM_FOLDERS: Final = ("/lib/x86_64-linux-gnu", "/usr/lib/x86_64-linux-gnu", "/lib64", "/usr/lib64", "/lib", "/usr/lib")
 _ROOT_FOLDERS: Final = ("lib", "lib64", "lib/x86_64-linux-gnu")
+#: Lets numpy use the OpenBLAS of scipy.
+ONE_BLAS: Final = Path(__file__).resolve().parent / "one_blas.c"
+
+
+class BlasError(ValueError):
+    """One OpenBLAS cannot serve both numpy and scipy; says why."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +52,7 @@ class Libraries:
     glibc: str
 
 
-def collect_libraries(source: Installation, modules: Mapping[str, Path]) -> Libraries:
+def collect_libraries(source: Installation, modules: Mapping[str, Path], one_blas: Path | None = None) -> Libraries:
     """Return the libraries that Python and compiled modules need.
 
     Parameters
@@ -51,20 +60,27 @@ def collect_libraries(source: Installation, modules: Mapping[str, Path]) -> Libr
     source : Installation
     modules : mapping
         Place in the runtime -> file; those that are not libraries are passed over.
+    one_blas : Path, optional
+        Folder to compile the library in that lets numpy use scipy's OpenBLAS (``one_blas.c``); without it the runtime
+        holds both copies.
 
     Raises
     ------
     InstallationError
         If a library is nowhere to be found.
+    BlasError
+        If that library cannot be compiled here.
     """
-    return _of_windows(source) if source.platform == "win64" else _of_linux(source, modules)
+    return _of_windows(source) if source.platform == "win64" else _of_linux(source, modules, one_blas)
 
 
 # Libraries of wheels lie with the others: what numpy and scipy both need is there once. Opened first, they are found by
 # their names, for which those of wheels hold a hash.
-def _of_linux(source: Installation, modules: Mapping[str, Path]) -> Libraries:
+def _of_linux(source: Installation, modules: Mapping[str, Path], one_blas: Path | None) -> Libraries:
     compiled = [path for name, path in modules.items() if name.endswith(".so")]
     found = _closure([source.library, *compiled], source)
+    if one_blas is not None:
+        found |= _one_blas(found, one_blas)
     order = TopologicalSorter({name: set(needed(path.read_bytes())) & found.keys() for name, path in found.items()})
     files = {f"lib/{name}": path for name, path in found.items()}
     preload = [f"lib/{name}" for name in order.static_order()]
@@ -72,6 +88,24 @@ def _of_linux(source: Installation, modules: Mapping[str, Path]) -> Libraries:
     files[python] = source.library
     glibc = max(glibc_needed(path.read_bytes()) for path in (*files.values(), *compiled))
     return Libraries(files, python, tuple(preload), f"2.{glibc}")
+
+
+def _one_blas(found: Mapping[str, Path], folder: Path) -> dict[str, Path]:
+    """Compile what stands in the place of numpy's OpenBLAS and hands over to scipy's."""
+    numpys = [name for name in found if name.startswith("libscipy_openblas64_-")]
+    scipys = [path for name, path in found.items() if name.startswith("libscipy_openblas-")]
+    if len(numpys) != 1 or len(scipys) != 1:
+        raise BlasError("numpy and scipy do not bring one OpenBLAS each")
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    if compiler is None:
+        raise BlasError("there is no C compiler (install gcc, or set CC)")
+    library = folder / numpys[0]
+    options = ["-shared", "-fPIC", "-O2", "-s", f"-Wl,-soname,{library.name}", "-Wl,--allow-shlib-undefined"]
+    command = [compiler, *options, str(ONE_BLAS), "-o", str(library), str(scipys[0])]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise BlasError(f"the C compiler refused {ONE_BLAS.name}: {done.stderr.strip()}")
+    return {library.name: library}
 
 
 def _closure(start: Iterable[Path], source: Installation) -> dict[str, Path]:

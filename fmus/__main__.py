@@ -8,7 +8,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fmus import doctor
-from fmus.build import MAX_PORTS, BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe, why_no_loader
+from fmus.build import (
+    MAX_PORTS,
+    BuildError,
+    Recipe,
+    UnknownFmuError,
+    build,
+    fingerprint,
+    known_names,
+    recipe,
+    why_no_loader,
+)
 
 DEFAULT_FOLDER = Path("build/fmus")
 
@@ -38,7 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs, and see whether they run here.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     verb = verbs.add_parser("build", help="build FMUs, all of the library if none is named")
-    verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, ...")
+    verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, path/to/LINE.toml ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
     verb.set_defaults(run=_build)
@@ -46,7 +56,8 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("fmu", type=Path, metavar="FILE", help="X.fmu")
     verb.set_defaults(run=_examine)
     verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
-    verb.add_argument("name", metavar="NAME")
+    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
+    verb.add_argument("name", metavar="NAME", help="as for build")
     verb.set_defaults(run=_fingerprint)
     verb = verbs.add_parser("list", help="list the FMUs that can be built")
     verb.set_defaults(run=_list)
@@ -76,7 +87,7 @@ def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:
 
 
 def _fingerprint(options: argparse.Namespace) -> None:
-    print(fingerprint(recipe(options.name)))
+    print(fingerprint(recipe(options.name, options.pantographs)))
 
 
 def _list(options: argparse.Namespace) -> None:

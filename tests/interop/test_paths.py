@@ -166,7 +166,7 @@ def _spoil(part, how):
         script.write_text("def (:\n")
         return "the FMU cannot be loaded: "
     if how == "a module is missing":
-        next(resources.glob("openpanto_*/models/contact.py")).unlink()
+        next(resources.glob("openpanto_*/models/part.py")).unlink()
         return "the FMU is incomplete: No module named"
     if how == "a module is cut":
         path = next(resources.glob("openpanto_*/fmus/adapter.py"))

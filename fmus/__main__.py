@@ -50,7 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs, and see whether they run here.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     verb = verbs.add_parser("build", help="build FMUs, all of the library if none is named")
-    verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, ...")
+    verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, path/to/LINE.toml ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
     verb.add_argument(
@@ -69,7 +69,8 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("fmu", type=Path, metavar="FILE", help="X.fmu")
     verb.set_defaults(run=_examine)
     verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
-    verb.add_argument("name", metavar="NAME")
+    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
+    verb.add_argument("name", metavar="NAME", help="as for build")
     verb.set_defaults(run=_fingerprint)
     verb = verbs.add_parser("list", help="list the FMUs that can be built")
     verb.set_defaults(run=_list)
@@ -128,7 +129,7 @@ def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:
 
 
 def _fingerprint(options: argparse.Namespace) -> None:
-    print(fingerprint(recipe(options.name)))
+    print(fingerprint(recipe(options.name, options.pantographs)))
 
 
 def _list(options: argparse.Namespace) -> None:

@@ -533,7 +533,10 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         return self._refused or self._broken
 
     def _refuse(self, error: BaseException) -> None:
-        self._refused = self._refused or self._tell(_explain(error))
+        if self._refused:
+            self.log(_clean(_explain(error)), Fmi2Status.error)  # the status of this call too
+        else:
+            self._refused = self._tell(_explain(error))
         self._forget_results()
 
     def _break(self, error: BaseException) -> None:

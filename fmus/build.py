@@ -101,6 +101,8 @@ class Recipe:
         Class attributes of the adapter.
     roots : mapping
         Packages that are carried along, and their folders.
+    is_own : bool
+        Whether the definition is a file of the user's, not of the library: the FMU remembers where it lay.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Recipe:
     definition: Path
     settings: Mapping[str, int] = field(default_factory=dict)
     roots: Mapping[str, Path] = field(default_factory=lambda: ROOTS)
+    is_own: bool = False
 
 
 @dataclass(frozen=True)
@@ -141,7 +144,8 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     Parameters
     ----------
     name : str
-        ``Catenary_LINE``, ``Catenary_LINE_P2`` for two pantograph ports, or ``Pantograph_NAME``.
+        ``Catenary_LINE``, ``Catenary_LINE_P2`` for two pantograph ports, ``Pantograph_NAME``, or the path of a
+        definition: ``path/to/LINE.toml``.
     pantographs : int, optional
         Number of pantograph ports of a line; the name gets the suffix ``_Pn``.
 
@@ -149,7 +153,11 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     ------
     UnknownFmuError
         If the library has no definition for it.
+    BuildError
+        If the file is not there, or is no definition.
     """
+    if name.endswith(".toml"):
+        return _own_recipe(Path(name), pantographs or 1)
     kind, _, rest = name.partition("_")
     stem, ports = _split_ports(rest, pantographs)
     if kind == "Catenary" and (path := _definition("lines", stem)) is not None:
@@ -169,6 +177,31 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     raise UnknownFmuError(
         f"There is no FMU '{name}'; known are {known} (and NAME_P2: a line for two pantographs)."
     )
+
+
+def _own_recipe(path: Path, ports: int) -> Recipe:
+    """Return how to make the FMU of a user's definition; its file name gives the FMU's."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BuildError(f"{path} cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise BuildError(f"{path} is not a TOML file ({error})") from error
+    stem, kind = path.stem, data.get("type")
+    if not (stem.isascii() and stem.replace("_", "a").isalnum()):
+        raise BuildError(f"{path}: the FMU gets the file's name, which may hold letters, digits and _ only")
+    title = data.get("title") if isinstance(data.get("title"), str) else ""
+    if isinstance(kind, str) and kind in _PANTOGRAPHS:
+        if ports > 1:
+            raise BuildError(f"{path} is a pantograph; only lines have pantograph ports")
+        return Recipe(f"Pantograph_{stem}", title or f"Pantograph {stem}", *_PANTOGRAPHS[kind], path, is_own=True)
+    if "spans" in data or "contact_wire" in data:
+        suffix = f"_P{ports}" if ports > 1 else ""
+        line = title or f"Overhead contact line {stem}"
+        name, settings = f"Catenary_{stem}{suffix}", {"pantographs": ports}
+        return Recipe(name, line, "fmus.catenary", "CatenarySlave", path, settings, is_own=True)
+    kinds = " or ".join(f"'{name}'" for name in _PANTOGRAPHS)
+    raise BuildError(f"{path} defines neither a line (no [spans]) nor a pantograph (type {kinds})")
 
 
 def fingerprint(wanted: Recipe) -> str:
@@ -195,7 +228,7 @@ def build(
     BuildError
         If the definition or the sources do not make an FMU.
     """
-    data = archive(wanted, loader, runtime)
+    data = archive(wanted, loader, _origin(wanted, folder), runtime)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
     handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{wanted.name}.", suffix=".tmp")
@@ -210,8 +243,23 @@ def build(
     return path
 
 
-def archive(wanted: Recipe, loader: bool = True, runtime: Mapping[str, bytes] | None = None) -> bytes:
+def archive(
+    wanted: Recipe,
+    loader: bool = True,
+    origin: Mapping[str, str] | None = None,
+    runtime: Mapping[str, bytes] | None = None,
+) -> bytes:
     """Return the bytes of an FMU; the same sources give the same bytes (with the loader: and the same compiler).
+
+    Parameters
+    ----------
+    wanted : Recipe
+    loader : bool
+        See `build`.
+    origin : mapping, optional
+        What the mark says about a user's definition.
+    runtime : mapping, optional
+        See `build`.
 
     Raises
     ------
@@ -226,7 +274,7 @@ def archive(wanted: Recipe, loader: bool = True, runtime: Mapping[str, bytes] | 
     if loader and not why_not:
         files = with_loader(files, wanted.name)
     files |= {f"{RUNTIME}/{name}": data for name, data in (runtime or {}).items()}
-    files[MARK] = _mark(gathered.fingerprint, files)
+    files[MARK] = _mark(gathered.fingerprint, files, origin or {})
     return _zipped(files)
 
 
@@ -264,8 +312,20 @@ def content_hash(files: Mapping[str, bytes]) -> str:
     return whole.hexdigest()
 
 
-def _mark(guid: str, files: Mapping[str, bytes]) -> bytes:
-    lines = {"format": "1", "guid": guid, "content": content_hash(files)}
+def _origin(wanted: Recipe, folder: Path) -> dict[str, str]:
+    """Return where a user's definition lies, seen from the FMU: so that it is known to be stale when that changes."""
+    if not wanted.is_own:
+        return {}
+    path = wanted.definition.resolve()
+    try:
+        path = Path(os.path.relpath(path, folder.resolve()))
+    except ValueError:  # on another drive
+        return {}
+    return {"definition": path.as_posix(), "pantographs": str(wanted.settings.get("pantographs", 1))}
+
+
+def _mark(guid: str, files: Mapping[str, bytes], origin: Mapping[str, str]) -> bytes:
+    lines = {"format": "1", "guid": guid, "content": content_hash(files), **origin}
     return "".join(f"{key}={value}\n" for key, value in lines.items()).encode()
 
 
@@ -337,11 +397,18 @@ def _binaries(name: str) -> dict[str, bytes]:
 
 
 def _licenses() -> dict[str, bytes]:
-    found = {"openpanto": REPOSITORY / "LICENSE"}
-    for info in PYTHONFMU.parent.glob(f"pythonfmu-{pythonfmu.__version__}.dist-info"):
-        found["pythonfmu"] = next(iter(sorted(info.rglob("LICENSE*"))), info)
-    files = {name: path for name, path in sorted(found.items()) if path.is_file()}
-    return {f"documentation/licenses/{name}.txt": path.read_bytes() for name, path in files.items()}
+    # An installed one first: beside installed packages a file LICENSE can be anybody's.
+    own = [*_installed_licenses(REPOSITORY, "openpanto"), REPOSITORY / "LICENSE"]
+    found = {"openpanto": own, "pythonfmu": _installed_licenses(PYTHONFMU.parent, "pythonfmu")}
+    files = {name: next((p for p in paths if p.is_file()), None) for name, paths in found.items()}
+    if lacking := [name for name, path in files.items() if path is None]:
+        raise BuildError(f"the licence of {' and '.join(lacking)} is not installed; install the package again")
+    return {f"documentation/licenses/{name}.txt": path.read_bytes() for name, path in files.items() if path}
+
+
+def _installed_licenses(folder: Path, package: str) -> list[Path]:
+    """Return the licence files of a package that was installed into a folder."""
+    return sorted(p for info in folder.glob(f"{package}-*.dist-info") for p in info.rglob("LICENSE*"))
 
 
 def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:

@@ -343,7 +343,7 @@ def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
 
 
 def _validate(options: argparse.Namespace) -> int:
-    with open_scenario(options.scenario, tell=_tell, build=not options.no_build) as scenario:
+    with open_scenario(options.scenario, tell=_tell, build=not options.no_build, is_check=True) as scenario:
         system = scenario.system
         counts = f"{len(system.components)} components, {len(system.connections)} connections"
         times = f"{system.start:g} s to {system.stop:g} s in steps of {system.step:g} s"

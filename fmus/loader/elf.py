@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Final
 
 _HEAD: Final = b"\x7fELF\x02\x01"  # 64 bits, little-endian
+_PAGE: Final = 4096
 _PT_LOAD: Final = 1
 _PT_DYNAMIC: Final = 2
 _DT_NULL: Final = 0
@@ -45,6 +46,17 @@ def soname(library: bytes) -> str:
 def glibc_needed(library: bytes) -> int:
     """Return the minor version of the oldest glibc 2.x that has all that a library asks for, 0 if it asks for none."""
     return max((int(minor) for minor in _GLIBC.findall(library)), default=0)
+
+
+def is_aligned(library: bytes) -> bool:
+    """Return whether the system can map a library: whether its parts lie as they do in memory, but for whole pages.
+
+    Raises
+    ------
+    ElfError
+    """
+    loads = [(offset, address) for kind, offset, address, _ in _segments(library) if kind == _PT_LOAD]
+    return all((address - offset) % _PAGE == 0 for offset, address in loads)
 
 
 def _texts(library: bytes, tag: int) -> Iterator[str]:

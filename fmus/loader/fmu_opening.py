@@ -9,7 +9,7 @@ import os
 import sys
 
 
-def problem(resources, script):
+def problem(resources: str, script: str) -> str:
     """Return why ``script`` in the folder cannot be loaded, in words; empty if it can, "alias" for another path."""
     if sys.version_info < (3, 11):
         return "Python in this process is %d.%d, but 3.11 or newer is needed" % sys.version_info[:2]
@@ -36,16 +36,16 @@ def problem(resources, script):
     return ""
 
 
-def forget(resources):
+def forget(resources: str, _: str = "") -> None:
     """Take the folder out of the places that modules come from; all that is needed has been imported."""
     sys.path[:] = [place for place in sys.path if place != resources]
 
 
-def set_paths(places, content):
+def set_paths(places: str, content: str) -> None:
     """Let modules come from these places alone, the parts of a runtime that came with an FMU."""
     sys.path[:] = places.split("\n")
-    sys.openpanto_runtime = content
+    setattr(sys, "openpanto_runtime", content)  # noqa: B010 - for another FMU that brings a runtime
 
 
-def _place():
+def _place() -> str:
     return sys.executable or sys.prefix

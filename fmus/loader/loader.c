@@ -265,9 +265,9 @@ static char *find_folder(const char *location, Problem *problem) {
     size_t length = scheme(location);
     int is_uri = length == 4 && same_letters(location, "file", 4);
     if (length && !is_uri && !platform_is_folder(location))
-        return fail(problem, "the resource location '%s' is not a file URI", location), NULL;
+        return fail(problem, "the resource location '%.400s' is not a file URI", location), NULL;
     const char *written = is_uri ? path_in_uri(location) : location;
-    if (!written) return fail(problem, "the resource location '%s' names another machine", location), NULL;
+    if (!written) return fail(problem, "the resource location '%.400s' names another machine", location), NULL;
     char *plain = copy(written), *decoded = copy(written);
     if (!plain || !decoded) return free(plain), free(decoded), fail(problem, "out of memory"), NULL;
     int has_decoded = decode(decoded);
@@ -278,7 +278,7 @@ static char *find_folder(const char *location, Problem *problem) {
     int is_first = (first == plain || has_decoded) && platform_is_folder(first);
     int is_second = !is_first && (second == plain || has_decoded) && platform_is_folder(second);
     char *found = is_first ? first : is_second ? second : NULL;
-    if (!found) fail(problem, "the resource location '%s' is not a folder that exists", location);
+    if (!found) fail(problem, "the resource location '%.400s' is not a folder that exists", location);
     if (found != plain) free(plain);
     if (found != decoded) free(decoded);
     return found;
@@ -297,7 +297,7 @@ static char *read_script_name(const char *folder, Problem *problem) {
     free(file), free(script);
     if (is_there) return name;
     free(name);
-    fail(problem, "the FMU's resources in '%s' are incomplete: slavemodule.txt, or the script that it names, is missing; "
+    fail(problem, "the FMU's resources in '%.400s' are incomplete: slavemodule.txt, or the script that it names, is missing; "
                   "unpack the FMU again, or build it anew", folder);
     return NULL;
 }
@@ -307,11 +307,11 @@ static int check_guid(const char *folder, String guid, Problem *problem) {
     char *path = join(folder, "/", "openpanto.txt");
     int is_read = path && read_settings(&about, path);
     free(path);
-    if (!is_read) return fail(problem, "the FMU's resources in '%s' are incomplete: openpanto.txt is missing", folder);
+    if (!is_read) return fail(problem, "the FMU's resources in '%.400s' are incomplete: openpanto.txt is missing", folder);
     const char *own = setting(&about, "guid");
     int same = guid && *own && strcmp(own, guid) == 0;
     if (!same)
-        fail(problem, "the GUID %s is not that of the FMU in '%s', which is %s: its model description belongs to "
+        fail(problem, "the GUID %.100s is not that of the FMU in '%.400s', which is %.100s: its model description belongs to "
                       "another build", guid ? guid : "(none)", folder, *own ? own : "not known");
     free(about.text);
     return same;
@@ -639,7 +639,7 @@ static int open_code(Instance *instance, const char *folder, const char *script,
         free(instance->path);
         instance->path = platform_alias(folder, &instance->alias);
         if (!instance->path)
-            return fail(problem, "the path '%s' cannot be handed to Python; unpack the FMU somewhere else", folder);
+            return fail(problem, "the path '%.400s' cannot be handed to Python; unpack the FMU somewhere else", folder);
         is_asked = call_opening("problem", instance->path, script, answer, sizeof answer);
     }
     return is_asked && !*answer ? 1 : fail(problem, "%s", answer);

@@ -140,11 +140,11 @@ def build_command(library: Path, extra: tuple[str, ...] = ("-s",)) -> list[str]:
 
 
 def needed_versions(library: bytes) -> dict[str, tuple[int, ...]]:
-    """Return the newest versions of glibc ("GLIBC") and libstdc++ ("GLIBCXX") whose symbols a library needs.
+    r"""Return the newest versions of glibc ("GLIBC") and libstdc++ ("GLIBCXX") whose symbols a library needs.
 
     Examples
     --------
-    >>> needed_versions(b"\\0GLIBC_2.4\\0GLIBC_2.14\\0")
+    >>> needed_versions(b"\0GLIBC_2.4\0GLIBC_2.14\0")
     {'GLIBC': (2, 14)}
     """
     newest: dict[str, tuple[int, ...]] = {}

@@ -15,7 +15,7 @@ _SECONDS: Final = 300
 _NO_FRONTS: Final[Mapping[str, str]] = {}
 _SCRIPT: Final = """
 import importlib, importlib.util, json, os, sys
-answer, search_path, preload, fronts, *folders = sys.argv[1:]
+answer, search_path, preload, imports, fronts, *folders = sys.argv[1:]
 if preload:
     import ctypes
     for path in preload.split(os.pathsep):
@@ -28,6 +28,8 @@ for name, text in json.loads(fronts).items():
     exec(text, module.__dict__)
     parent, _, child = name.rpartition(".")
     setattr(sys.modules[parent], child, module)
+for name in imports.split():
+    importlib.import_module(name)
 for folder in folders:
     sys.path.insert(0, folder)
     with open(os.path.join(folder, "slavemodule.txt"), encoding="utf-8") as file:
@@ -71,6 +73,7 @@ def rehearse(
     resources: Sequence[Path],
     work: Path,
     fronts: Mapping[str, str] = _NO_FRONTS,
+    imports: Sequence[str] = (),
     search_path: Sequence[Path] = (),
     preload: Sequence[Path] = (),
 ) -> LoadedModules:
@@ -84,6 +87,8 @@ def rehearse(
         Folder for temporary files.
     fronts : mapping
         Name of a module -> source that stands in its place.
+    imports : sequence of str
+        Modules that are loaded besides.
     search_path : sequence of Path
         What replaces ``sys.path``, so that modules come from nowhere else; as it is if empty.
     preload : sequence of Path
@@ -96,7 +101,8 @@ def rehearse(
     """
     answer = work / "modules.json"
     joined = [os.pathsep.join(str(path) for path in paths) for paths in (search_path, preload)]
-    command = [sys.executable, "-I", "-B", "-c", _SCRIPT, str(answer), *joined, json.dumps(dict(fronts)), *map(str, resources)]
+    settings = [str(answer), *joined, " ".join(imports), json.dumps(dict(fronts))]
+    command = [sys.executable, "-I", "-B", "-c", _SCRIPT, *settings, *map(str, resources)]
     # A runtime is without numba: what the plain step loads is what counts.
     environment = {**os.environ, "OPENPANTO_KERNEL": "numpy", "OMP_NUM_THREADS": "1"}
     done = subprocess.run(

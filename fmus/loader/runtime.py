@@ -13,6 +13,7 @@ import importlib.util
 import io
 import json
 import marshal
+import re
 import shutil
 import subprocess
 import tempfile
@@ -25,6 +26,7 @@ from typing import Final
 
 import pythonfmu
 
+from fmus.loader.elf import is_aligned
 from fmus.loader.installation import PACKAGES, Installation, InstallationError, own
 from fmus.loader.licences import COMPILED_HERE, licences
 from fmus.loader.rehearsal import LoadedModules, RehearsalError, rehearse
@@ -37,23 +39,33 @@ DESCRIPTION: Final = "runtime.txt"
 #: and what puts an error into words.
 _ALWAYS: Final = frozenset(
     """
-    _compat_pickle _strptime bisect cmd code codecs codeop configparser copy csv decimal encodings fractions getopt
-    hashlib heapq html linecache nturl2path ntpath numbers pdb posixpath _pydecimal queue runpy sched site statistics
-    stringprep tarfile timeit trace traceback tracemalloc
+    _strptime bisect codecs codeop copy encodings hashlib heapq linecache ntpath numbers posixpath queue stringprep
+    textwrap traceback tracemalloc
     """.split()
 )
 #: Compiled modules that Python does without: they would need OpenSSL or libuuid. ``hashlib`` takes ``_sha256`` etc.
 _REPLACED: Final = frozenset({"_hashlib", "_ssl", "_uuid"})
 #: What hashlib takes instead.
 _ADDED: Final = frozenset({"_md5", "_sha1", "_sha256", "_sha512", "_sha3", "_blake2"})
-#: What stands in the place of modules that would load all of scipy.linalg and scipy.sparse.linalg for a few functions.
+#: What stands in the place of modules that would load all of scipy.linalg, scipy.sparse.linalg and numpy for a few names.
 _FRONTS: Final[Mapping[str, str]] = {
+    "numpy.random": "class Generator: pass\nclass RandomState: pass\n",
+    "scipy._lib._array_api": """Array = object
+def __getattr__(name):
+    if name.startswith("__"):
+        raise AttributeError(name)
+    def missing(*args, **kwargs):
+        raise NotImplementedError("the Python that came with the FMU has no " + name + " of scipy")
+    return missing
+""",
     "scipy.linalg": "from numpy.linalg import LinAlgError\n",
     "scipy.linalg.lapack": "from scipy.linalg._flapack import *\n",
     "scipy.sparse.linalg": "from scipy.sparse.linalg._dsolve import SuperLU, splu\n",
 }
-#: numpy.ma makes its docstrings from numpy's, and insists on them.
-_KEEPS_DOCSTRINGS: Final = ("packages/numpy/",)
+#: Parts of numpy that are imported as they are first used, which a short run may not do.
+_LAZY: Final = re.compile(r"\b(?:np|numpy)\.(linalg|random|fft|ma|polynomial|rec|char|strings|testing)\b")
+#: numpy.ma makes its docstrings from these, and insists on them.
+_DOCSTRINGS_NEEDED: Final = frozenset({"packages/numpy/_core/numeric.py"})
 _DOCUMENTED: Final = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 _TEST_FILES: Final = ("test_", "conftest", "setup.py")
 _ZIP_DATE: Final = (1980, 1, 1, 0, 0, 0)
@@ -115,11 +127,18 @@ def _smallest(source: Installation, here: Installation, folders: Sequence[Path],
     """Return the smallest runtime that works: other versions of numpy and scipy may be built otherwise."""
     compiled = work / COMPILED_HERE
     compiled.mkdir()
+    used = _lazily_used(folders)
+    fronts = {name: text for name, text in _FRONTS.items() if name not in used}
     with suppress(RehearsalError, BlasError):
-        return _make(source, here, folders, work, _FRONTS, compiled)
+        return _make(source, here, folders, work, fronts, compiled)
     with suppress(RehearsalError):
-        return _make(source, here, folders, work, _FRONTS, None)
+        return _make(source, here, folders, work, fronts, None)
     return _make(source, here, folders, work, {}, None)
+
+
+def _lazily_used(folders: Iterable[Path]) -> frozenset[str]:
+    texts = (path.read_text(encoding="utf-8") for folder in folders for path in folder.rglob("*.py"))
+    return frozenset(f"numpy.{part}" for text in texts for part in _LAZY.findall(text))
 
 
 def _make(
@@ -130,7 +149,7 @@ def _make(
     fronts: Mapping[str, str],
     one_blas: Path | None,
 ) -> Runtime:
-    loaded = rehearse(folders, work, fronts)
+    loaded = rehearse(folders, work, fronts, sorted(_lazily_used(folders)))
     originals = _originals(source, here, loaded)
     libraries = collect_libraries(source, originals, one_blas)
     originals = {**originals, **libraries.files}
@@ -220,7 +239,7 @@ def _finish(source: Installation, originals: Mapping[str, Path], fronts: Mapping
         if name.endswith(".py"):
             files[f"{name}c"] = _byte_code(name, standing_in.get(name) or path.read_bytes())
         else:
-            files[name] = _library(path, source)
+            files[name] = _stripped(path)
     files[_standard_archive(source)] = _archive({n: p for n, p in originals.items() if n.startswith("stdlib/")})
     return files
 
@@ -230,15 +249,9 @@ def _inner(module: str, files: Iterable[str]) -> str:
     return f"{stem}/__init__.py" if f"packages/{stem}/__init__.py" in files else f"{stem}.py"
 
 
-def _library(path: Path, source: Installation) -> bytes:
-    # Libraries in wheels were rearranged by their makers, which strip does not survive.
-    is_python = path == source.library or path.parent == source.extensions
-    return _stripped(path) if is_python else path.read_bytes()
-
-
 def _byte_code(name: str, source: bytes) -> bytes:
     """Return a module's byte code, which is never compared with a source (PEP 552)."""
-    tree = ast.parse(source) if name.startswith(_KEEPS_DOCSTRINGS) else _without_docstrings(source)
+    tree = ast.parse(source) if name in _DOCSTRINGS_NEEDED else _without_docstrings(source)
     code = compile(tree, name, "exec", dont_inherit=True, optimize=0)
     # Twice: what marshal writes depends on who else holds an object, and only a copy of its own has no such past.
     body = marshal.dumps(marshal.loads(marshal.dumps(code)))
@@ -272,7 +285,9 @@ def _stripped(path: Path) -> bytes:
     with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
         out = Path(folder) / path.name
         done = subprocess.run([tool, "--strip-unneeded", "-o", out, path], capture_output=True, check=False)
-        return (out if done.returncode == 0 else path).read_bytes()
+        stripped = out.read_bytes() if done.returncode == 0 else b""
+    # Libraries in wheels were rearranged by their makers, which strip does not always survive.
+    return stripped if stripped and is_aligned(stripped) else path.read_bytes()
 
 
 def _description(source: Installation, libraries: Libraries, content: str) -> bytes:
@@ -311,6 +326,8 @@ def _try_out(
     source: Installation, files: Mapping[str, bytes], libraries: Libraries, folders: Sequence[Path], work: Path
 ) -> None:
     place = work / "runtime"
+    shutil.rmtree(place, ignore_errors=True)
     write_files(files, place)
     search_path = [place / name for name in _search_path(source)]
-    rehearse(folders, work, search_path=search_path, preload=[place / name for name in libraries.preload])
+    preload = [place / name for name in libraries.preload]
+    rehearse(folders, work, imports=sorted(_lazily_used(folders)), search_path=search_path, preload=preload)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -69,6 +70,32 @@ def test_with_and_without_the_loader(toy_fmu, tmp_path):
     inner = f"binaries/linux64/Toy{INNER_SUFFIX}"
     copy = _changed(toy_fmu, tmp_path, lambda n, d: None if n == inner else (n, d))
     assert doctor.ask().library == "" or "LD_PRELOAD=" in _said(copy)["note"]
+
+
+def test_the_fmu_is_loaded_as_a_run_does_in_the_runs_folder(toy_fmu, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    said = _said(toy_fmu)
+    assert f"loaded as a run does it, in {tmp_path}, the FMU was initialised and made a step" in said["ok"]
+    assert list(tmp_path.iterdir()) == []
+
+    def spoil(name, data):
+        return name, data.replace(b"mass =", b"mess =") if name == "resources/definition.toml" else data
+
+    copies = tmp_path / "copies"
+    copies.mkdir()
+    assert "the FMU fails: " in (text := _said(_changed(toy_fmu, copies, spoil))["missing"])
+    assert "mass: is missing" in text
+
+
+def test_a_folder_that_cannot_be_written(toy_fmu, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    found = list(doctor._run(doctor.read_package(toy_fmu)))
+    assert "cannot be unpacked in" in found[0].text
+
+
+def test_an_older_machine(toy_fmu, monkeypatch):
+    monkeypatch.setattr(doctor.platform, "libc_ver", lambda: ("glibc", "2.17"))
+    assert "need glibc 2.32 or newer; this machine is older, it has 2.17" in _said(toy_fmu)["missing"]
 
 
 def test_code_that_does_not_run(toy_fmu, tmp_path):

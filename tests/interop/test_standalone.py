@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pytest
 from fmus.builder.standalone import runtime_of, write_runtime
 from tests.effort import count
 from tests.interop.support import STEP
-from tests.interop.test_host import host, numbers, plan, plain, pytestmark, run, system, unpack  # noqa: F401
+from tests.interop.test_host import host, numbers, plan, plain, pytestmark, run_host, system  # noqa: F401
 
 STEPS = count(60, 300)
 #: What every Linux with glibc has; libdl and libpthread are names that older programs ask for.
@@ -70,16 +71,14 @@ def put_into(root, fmus, with_runtime):
 
 
 def run_on_bare_machine(root, text, **environment):
-    return run([*in_prison(root), "/host"], text, **environment)
+    return run_host([*in_prison(root), "/host"], text, **environment)
 
 
 @pytest.fixture(scope="module")
 def ordinary(host, system, plain):  # noqa: F811
     """The numbers of the ordinary FMUs, with the step in numpy: a runtime is without numba."""
-    import sys
-
     return numbers(
-        run(host, orders(system, plain), OPENPANTO_PYTHON=sys.executable, OPENPANTO_KERNEL="numpy")
+        run_host(host, orders(system, plain), OPENPANTO_PYTHON=sys.executable, OPENPANTO_KERNEL="numpy")
     )
 
 

@@ -1,7 +1,8 @@
 /* A small FMI 2.0 host in plain C, which drives FMUs as a tool does that is not Python.
  *
  * It reads a plan on standard input, one order a line:
- *     fmu LIBRARY GUID RESOURCES          the next FMU
+ *     fmu LIBRARY GUID RESOURCES          the next FMU; tabs between, for paths may hold blanks
+ *     refuse LIBRARY GUID RESOURCES       an FMU that is to make no instance ("-": NULL); says what it made, twice
  *     parameter FMU REFERENCE VALUE
  *     connect FMU OUTPUT FMU INPUT        FMUs count from 0
  *     observe FMU REFERENCE
@@ -109,6 +110,14 @@ static void load(Fmu *fmu, const char *path) {
     fmu->deserialise = find(l, "fmi2DeSerializeFMUstate");
 }
 
+static void refuse(Fmu *f) {
+    const char *guid = strcmp(f->guid, "-") ? f->guid : NULL;
+    const char *resources = strcmp(f->resources, "-") ? f->resources : NULL;
+    fmi2Component made = f->instantiate("part", fmi2CoSimulation, guid, resources, &callbacks, fmi2False, fmi2False);
+    puts(made ? "an instance" : "NULL");
+    if (made) f->free(made);
+}
+
 static void read_plan(void) {
     char line[8192], path[4096];
     while (fgets(line, sizeof line, stdin)) {
@@ -116,7 +125,10 @@ static void read_plan(void) {
         Parameter *p = &parameters[parameter_count];
         Wire *w = &wires[wire_count];
         Place *o = &places[place_count];
-        if (sscanf(line, "fmu %4095s %127s %4095s", path, f->guid, f->resources) == 3) load(f, path), fmu_count++;
+        if (sscanf(line, "fmu\t%4095[^\t]\t%127[^\t]\t%4095[^\n]", path, f->guid, f->resources) == 3)
+            load(f, path), fmu_count++;
+        else if (sscanf(line, "refuse\t%4095[^\t]\t%127[^\t]\t%4095[^\n]", path, f->guid, f->resources) == 3)
+            load(f, path), refuse(f), refuse(f), exit(0);
         else if (sscanf(line, "parameter %d %u %lf", &p->fmu, &p->reference, &p->value) == 3) parameter_count++;
         else if (sscanf(line, "connect %d %u %d %u", &w->from, &w->output, &w->to, &w->input) == 4) wire_count++;
         else if (sscanf(line, "observe %d %u", &o->fmu, &o->reference) == 2) place_count++;

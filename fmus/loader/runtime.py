@@ -67,6 +67,7 @@ _LAZY: Final = re.compile(r"\b(?:np|numpy)\.(linalg|random|fft|ma|polynomial|rec
 #: numpy.ma makes its docstrings from these, and insists on them.
 _DOCSTRINGS_NEEDED: Final = frozenset({"packages/numpy/_core/numeric.py"})
 _DOCUMENTED: Final = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+_TEST_FOLDERS: Final = frozenset({"test", "tests"})
 _TEST_FILES: Final = ("test_", "conftest", "setup.py")
 _ZIP_DATE: Final = (1980, 1, 1, 0, 0, 0)
 _BYTE_CODE_UNCHECKED: Final = (1).to_bytes(4, "little")
@@ -150,7 +151,7 @@ def _make(
     one_blas: Path | None,
 ) -> Runtime:
     loaded = rehearse(folders, work, fronts, sorted(_lazily_used(folders)))
-    originals = _originals(source, here, loaded)
+    originals = _originals(source, here, loaded, fronts)
     libraries = collect_libraries(source, originals, one_blas)
     originals = {**originals, **libraries.files}
     content = _hash(originals, fronts)
@@ -172,13 +173,15 @@ def _check_versions(source: Installation, here: Installation) -> None:
             )
 
 
-def _originals(source: Installation, here: Installation, loaded: LoadedModules) -> dict[str, Path]:
+def _originals(
+    source: Installation, here: Installation, loaded: LoadedModules, fronts: Iterable[str]
+) -> dict[str, Path]:
     """Return the files that a runtime is made from, by their places in it (those of the archive too)."""
     found = {f"stdlib/{n}": path for n, path in _standard_library(source.modules, loaded)}
     found |= {f"extensions/{path.name}": path for path in _python_extensions(source, loaded)}
     for package in PACKAGES:
         files = loaded.of_package(package, here.packages[package].resolve())
-        found |= {f"packages/{n}": path for n, path in _package_files(source, package, files)}
+        found |= {f"packages/{n}": path for n, path in _package_files(source, package, files, fronts)}
     return found
 
 
@@ -188,7 +191,9 @@ def _standard_library(folder: Path, loaded: LoadedModules) -> Iterator[tuple[str
     for entry in sorted(folder.iterdir()):
         if entry.stem in wanted and (entry.is_dir() or entry.suffix == ".py"):
             for path in sorted(entry.rglob("*.py")) if entry.is_dir() else [entry]:
-                yield path.relative_to(folder).as_posix(), path
+                inner = path.relative_to(folder)
+                if not _TEST_FOLDERS.intersection(inner.parts):
+                    yield inner.as_posix(), path
 
 
 def _python_extensions(source: Installation, loaded: LoadedModules) -> Iterator[Path]:
@@ -198,14 +203,18 @@ def _python_extensions(source: Installation, loaded: LoadedModules) -> Iterator[
             yield path
 
 
-def _package_files(source: Installation, package: str, files: Iterable[Path]) -> Iterator[tuple[str, Path]]:
-    """Yield all Python files of the folders that files were loaded from, and the compiled modules among those."""
+def _package_files(
+    source: Installation, package: str, files: Iterable[Path], fronts: Iterable[str]
+) -> Iterator[tuple[str, Path]]:
+    """Yield the files that were loaded, and all other Python files of their folders, except behind a front."""
     root = source.packages[package]
-    folders = {file.parent for file in files if file.suffix == ".py"}
-    for folder in sorted(folders):
-        for path in sorted((root / folder).glob("*.py")):
-            if not path.name.startswith(_TEST_FILES):
-                yield path.relative_to(root).as_posix(), path
+    behind = {Path(name.replace(".", "/")) for name in fronts}
+    folders = {file.parent for file in files if file.suffix == ".py"} - behind
+    python = {path for folder in folders for path in (root / folder).glob("*.py")}
+    python |= {root / file for file in files if file.suffix == ".py"}
+    for path in sorted(python):
+        if not path.name.startswith(_TEST_FILES):
+            yield path.relative_to(root).as_posix(), path
     for file in files:
         if file.suffix != ".py":
             path = _compiled_module(root, file)

@@ -202,6 +202,24 @@ def _ports(number: str) -> list[str]:
     return ["--pantographs", number] if number not in ("", "1") else []
 
 
+def write_runtime(folder: Path) -> None:
+    """Write the Python that standalone FMUs run in into a folder.
+
+    Raises
+    ------
+    ValueError
+        With the builder's own words, if it cannot be made here.
+    """
+    if not has_builder():
+        raise ValueError("it takes the package fmus, which is not installed")
+    try:
+        answer = _fmus("runtime", "--out", str(folder), seconds=_BUILD_SECONDS)
+    except subprocess.TimeoutExpired as error:
+        raise ValueError(f"it could not be made: no answer within {_BUILD_SECONDS} s") from error
+    if answer.returncode != 0:
+        raise ValueError(_last_line(answer))
+
+
 def _last_line(answer: subprocess.CompletedProcess[str]) -> str:
     said = (answer.stderr.strip() or answer.stdout.strip()).splitlines()
     return said[-1].removeprefix("error: ") if said else "the builder gave no reason"

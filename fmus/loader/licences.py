@@ -15,7 +15,7 @@ FOLDER: Final = "licences"
 #: Folder of libraries of our own.
 COMPILED_HERE: Final = "compiled_here"
 _COMMON: Final = Path("/usr/share/common-licenses")
-_PYTHON_FILES: Final = ("LICENSE.txt", "LICENSE", "../../LICENSE.txt", "../LICENSE.txt", "../share/doc/python3/copyright")
+_PYTHON_FILES: Final = ("LICENSE.txt", "LICENSE", "../../LICENSE.txt", "../LICENSE.txt")
 
 
 def licences(source: Installation, files: Mapping[str, Path]) -> dict[str, bytes]:

@@ -660,6 +660,23 @@ static void drop(Instance *instance) {
     free(instance->name), free(instance->path), free(instance);
 }
 
+/* Say so if the FMU brought a Python of other versions than the one that was in the process before. */
+static void compare_versions(const Instance *instance, const char *folder) {
+    Settings about;
+    char answer[TEXT / 2], wanted[128], *path = join(folder, "/", "runtime/runtime.txt");
+    int is_there = path && read_settings(&about, path);
+    free(path);
+    if (!is_there) return;
+    snprintf(wanted, sizeof wanted, "%s %s %s", setting(&about, "python"), setting(&about, "numpy"),
+             setting(&about, "scipy"));
+    if (call_opening("other_versions", wanted, setting(&about, "content"), answer, sizeof answer) && *answer) {
+        clean(answer);
+        fprintf(stderr, "%s: %s\n", instance->name, answer);
+        tell(&instance->host, instance->name, WARNING, NULL, answer);
+    }
+    free(about.text);
+}
+
 static Instance *prepare(String name, const Callbacks *host, int logging) {
     Instance *instance = calloc(1, sizeof *instance);
     if (!instance) return NULL;
@@ -678,6 +695,7 @@ static int open_fmu(Instance *instance, int type, String guid, String location, 
     char *script = folder ? read_script_name(folder, problem) : NULL;
     int good = script && check_guid(folder, guid, problem) && ready(folder, problem) &&
                open_code(instance, folder, script, problem);
+    if (good) compare_versions(instance, folder);
     free(folder), free(script);
     return good;
 }

@@ -35,19 +35,34 @@ from fmus.loader.shared_libraries import BlasError, Libraries, collect_libraries
 #: Version of this layout, for the loader.
 FORMAT: Final = 1
 DESCRIPTION: Final = "runtime.txt"
-#: Modules of the standard library that come along though no good run loads them: what other systems and encodings need,
-#: and what puts an error into words.
+#: Modules of the standard library that come along though no good run loads them: what other systems and encodings
+#: need, and what puts an error into words.
 _ALWAYS: Final = frozenset(
-    """
-    _strptime bisect codecs codeop copy encodings hashlib heapq linecache ntpath numbers posixpath queue stringprep
-    textwrap traceback tracemalloc
-    """.split()
+    {
+        "_strptime",
+        "bisect",
+        "codecs",
+        "codeop",
+        "copy",
+        "encodings",
+        "hashlib",
+        "heapq",
+        "linecache",
+        "ntpath",
+        "numbers",
+        "posixpath",
+        "queue",
+        "stringprep",
+        "textwrap",
+        "traceback",
+        "tracemalloc",
+    }
 )
 #: Compiled modules that Python does without: they would need OpenSSL or libuuid. ``hashlib`` takes ``_sha256`` etc.
 _REPLACED: Final = frozenset({"_hashlib", "_ssl", "_uuid"})
 #: What hashlib takes instead.
 _ADDED: Final = frozenset({"_md5", "_sha1", "_sha256", "_sha512", "_sha3", "_blake2"})
-#: What stands in the place of modules that would load all of scipy.linalg, scipy.sparse.linalg and numpy for a few names.
+#: What stands in the place of modules that would load all of scipy.linalg, scipy.sparse.linalg and numpy for few names.
 _FRONTS: Final[Mapping[str, str]] = {
     "numpy.random": "class Generator: pass\nclass RandomState: pass\n",
     "scipy._lib._array_api": """Array = object

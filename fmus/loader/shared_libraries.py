@@ -16,11 +16,25 @@ from fmus.loader.installation import PACKAGES, Installation, InstallationError
 
 #: Libraries of glibc: these are the machine's, whoever brings others breaks it.
 _GLIBC: Final = frozenset(
-    """
-    ld-linux-x86-64.so.2 libc.so.6 libdl.so.2 libm.so.6 libpthread.so.0 libresolv.so.2 librt.so.1 libutil.so.1
-    """.split()
+    {
+        "ld-linux-x86-64.so.2",
+        "libc.so.6",
+        "libdl.so.2",
+        "libm.so.6",
+        "libpthread.so.0",
+        "libresolv.so.2",
+        "librt.so.1",
+        "libutil.so.1",
+    }
 )
-_SYSTEM_FOLDERS: Final = ("/lib/x86_64-linux-gnu", "/usr/lib/x86_64-linux-gnu", "/lib64", "/usr/lib64", "/lib", "/usr/lib")
+_SYSTEM_FOLDERS: Final = (
+    "/lib/x86_64-linux-gnu",
+    "/usr/lib/x86_64-linux-gnu",
+    "/lib64",
+    "/usr/lib64",
+    "/lib",
+    "/usr/lib",
+)
 _ROOT_FOLDERS: Final = ("lib", "lib64", "lib/x86_64-linux-gnu")
 #: Lets numpy use the OpenBLAS of scipy.
 ONE_BLAS: Final = Path(__file__).resolve().parent / "one_blas.c"

@@ -106,7 +106,8 @@ def _installed(folder, wheel, base):
         return python
     show = "import sysconfig; print(sysconfig.get_path('purelib'))"
     own = Path(_python(python, "-c", show, cwd=folder).stdout.strip())
-    (own / "base.pth").write_text(_python(base, "-c", show, cwd=folder).stdout)
+    places = "import sys; print(*(p for p in sys.path if p.endswith('site-packages')), sep='\\n')"
+    (own / "base.pth").write_text(_python(base, "-c", places, cwd=folder).stdout)
     with zipfile.ZipFile(wheel) as file:
         file.extractall(own)
     return python

@@ -566,7 +566,8 @@ typedef struct {
     void (*unlock)(int);
     void *(*compile)(const char *, const char *, int);
     void *(*evaluate)(void *, void *, void *);
-    void *(*make_dictionary)(void);
+    void *(*module)(const char *);
+    void *(*names)(void *);
     void *(*get)(void *, const char *);
     int (*set)(void *, const char *, void *);
     void *(*builtins)(void);
@@ -582,7 +583,8 @@ static int find_python(Python *python) {
         python->unlock = (void (*)(int))find_in_process("PyGILState_Release"),
         python->compile = (void *(*)(const char *, const char *, int))find_in_process("Py_CompileString"),
         python->evaluate = (void *(*)(void *, void *, void *))find_in_process("PyEval_EvalCode"),
-        python->make_dictionary = (void *(*)(void))find_in_process("PyDict_New"),
+        python->module = (void *(*)(const char *))find_in_process("PyImport_AddModule"),
+        python->names = (void *(*)(void *))find_in_process("PyModule_GetDict"),
         python->get = (void *(*)(void *, const char *))find_in_process("PyDict_GetItemString"),
         python->set = (int (*)(void *, const char *, void *))find_in_process("PyDict_SetItemString"),
         python->builtins = (void *(*)(void))find_in_process("PyEval_GetBuiltins"),
@@ -596,13 +598,27 @@ static int find_python(Python *python) {
     return 1;
 }
 
-static void *run_opening(const Python *python, void *names) {
+/* The name that fmu_opening.py has in sys.modules: another loader in the process may carry another text. */
+static void name_opening(char *name, size_t size) {
+    uint64_t hash = 14695981039346656037u; /* FNV-1a */
+    for (const char *c = openpanto_opening; *c; c++) hash = (hash ^ (unsigned char)*c) * 1099511628211u;
+    snprintf(name, size, "openpanto_opening_%016llx", (unsigned long long)hash);
+}
+
+/* A function of fmu_opening.py, which is run once and stays among the modules; what is returned is borrowed. */
+static void *opening_function(const Python *python, const char *function) {
     enum { FILE_INPUT = 257 }; /* Py_file_input */
+    char name[64];
+    name_opening(name, sizeof name);
+    void *module = python->module(name), *names = module ? python->names(module) : NULL;
+    void *found = names ? python->get(names, function) : NULL;
+    if (!names || found) return found;
     void *code = python->compile(openpanto_opening, "fmu_opening.py", FILE_INPUT);
-    if (!code || python->set(names, "__builtins__", python->builtins()) != 0) return code;
-    void *done = python->evaluate(code, names, names);
-    python->release(code);
-    return done;
+    int is_ready = code && python->set(names, "__builtins__", python->builtins()) == 0;
+    void *done = is_ready ? python->evaluate(code, names, names) : NULL;
+    if (code) python->release(code);
+    if (done) python->release(done);
+    return done ? python->get(names, function) : NULL;
 }
 
 /* Call a function of fmu_opening.py; 1 and what it returns, or 0 and why it could not be called. */
@@ -611,16 +627,12 @@ static int call_opening(const char *function, const char *first, const char *sec
     snprintf(answer, size, "Python lacks functions that the FMU needs");
     if (!find_python(&python)) return 0;
     int lock = python.lock();
-    void *names = python.make_dictionary();
-    void *done = names ? run_opening(&python, names) : NULL;
-    void *called = done ? python.get(names, function) : NULL;
+    void *called = opening_function(&python, function);
     void *result = called ? python.call(called, "ss", first, second) : NULL;
     const char *text = result ? python.text(result) : NULL;
     snprintf(answer, size, "%s", text ? text : result ? "" : "Python cannot run the loader's own code");
     if (!text) python.forget_error();
     if (result) python.release(result);
-    if (done) python.release(done);
-    if (names) python.release(names);
     python.unlock(lock);
     return result != NULL;
 }

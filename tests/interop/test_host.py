@@ -137,9 +137,9 @@ def numbers(done):
 
 
 def test_bits_as_in_python(host, system, unpacked, in_python):
-    """Nothing is preloaded, PATH does not lead to this Python: one variable names it."""
+    """Nothing is preloaded, PATH does not lead to this Python: one variable names it. The host stays as it was."""
     assert all(u.library.with_suffix(INNER_SUFFIX).is_file() for u in unpacked)
-    done = run_host(host, plan(system, unpacked), OPENPANTO_PYTHON=sys.executable)
+    done = run_host(host, plan(system, unpacked), OPENPANTO_PYTHON=sys.executable, HOST_STAYS="1", LC_ALL="C.UTF-8")
     assert numbers(done) == in_python
 
 

@@ -12,6 +12,8 @@
  * taken over by the other system, instances reset. It prints the observed values of every step as hexadecimal numbers.
  */
 #include <dlfcn.h>
+#include <locale.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -238,6 +240,14 @@ static void release(System *s, fmi2FMUstate *states) {
     for (int i = 0; i < fmu_count; i++) check(fmus[i].release(s->part[i], &states[i]), "freeing a state");
 }
 
+/* What a library may not change in its host. */
+static void check_host(void) {
+    struct sigaction interrupt;
+    sigaction(SIGINT, NULL, &interrupt);
+    if (interrupt.sa_handler != SIG_DFL) die("the host's handler of SIGINT was replaced");
+    if (strcmp(setlocale(LC_ALL, NULL), "C")) die("the host's locale was changed to %s", setlocale(LC_ALL, NULL));
+}
+
 int main(void) {
     System one, two;
     fmi2FMUstate states[8];
@@ -275,6 +285,7 @@ int main(void) {
     advance(&one, 0, 2, again);
     same(table, again, 0, 2, "instances made after the first ones were freed");
     finish(&one);
+    if (getenv("HOST_STAYS")) check_host();
     for (int n = 0; n < steps * place_count; n++) printf("%a\n", table[n]);
     return 0;
 }

@@ -23,7 +23,7 @@ import pythonfmu
 from fmus.bundle import BundleError, Module, collect, rewrite
 from fmus.documentation import About, page
 from fmus.icon import icon
-from fmus.loader.loader_build import LoaderError, sources, with_loader
+from fmus.loader.loader_build import DESCRIPTION, LoaderError, sources, with_loader, with_windows_loader
 from fmus.repair import repaired
 
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -268,14 +268,21 @@ def archive(
     """
     gathered = _gather(wanted)
     files = _contents(wanted, gathered)
-    why_not = why_no_loader()
-    if runtime and why_not:
-        raise BuildError(f"{wanted.name} cannot be standalone: {why_not}")
-    if loader and not why_not:
+    if runtime:
+        files = _with_runtime(files, wanted.name, runtime)
+    elif loader and not why_no_loader():
         files = with_loader(files, wanted.name)
-    files |= {f"{RUNTIME}/{name}": data for name, data in (runtime or {}).items()}
     files[MARK] = _mark(gathered.fingerprint, files, origin or {})
     return _zipped(files)
+
+
+def _with_runtime(files: Mapping[str, bytes], name: str, runtime: Mapping[str, bytes]) -> dict[str, bytes]:
+    is_for_windows = b"\nplatform=win64\n" in runtime[DESCRIPTION]
+    try:
+        files = with_windows_loader(files, name) if is_for_windows else with_loader(files, name)
+    except LoaderError as error:
+        raise BuildError(f"{name} cannot be standalone: {error}") from error
+    return {**files, **{f"{RUNTIME}/{inner}": data for inner, data in runtime.items()}}
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:

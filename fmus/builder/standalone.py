@@ -11,7 +11,8 @@ from typing import Final
 
 from fmus.build import RUNTIME, BuildError, archive, recipe
 from fmus.loader.installation import InstallationError, installed_at, own
-from fmus.loader.runtime import DESCRIPTION, Runtime, RuntimeBuildError, make_runtime, write_files
+from fmus.loader.loader_build import DESCRIPTION
+from fmus.loader.runtime import Runtime, RuntimeBuildError, make_runtime, write_files
 
 #: An FMU of each kind: what their runs load is what a runtime holds, the same for all FMUs.
 _KINDS: Final = ("Pantograph_CX", "Pantograph_CX_multibody", "Catenary_generic_simple")

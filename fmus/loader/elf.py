@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Iterator
 from typing import Final
@@ -16,7 +15,6 @@ _DT_NEEDED: Final = 1
 _DT_STRTAB: Final = 5
 _DT_SONAME: Final = 14
 _ENTRY: Final = struct.Struct("<qQ")
-_GLIBC: Final = re.compile(rb"\0GLIBC_2\.(\d+)(?=[.\0])")
 
 
 class ElfError(ValueError):
@@ -41,11 +39,6 @@ def soname(library: bytes) -> str:
     ElfError
     """
     return next(_texts(library, _DT_SONAME), "")
-
-
-def glibc_needed(library: bytes) -> int:
-    """Return the minor version of the oldest glibc 2.x that has all that a library asks for, 0 if it asks for none."""
-    return max((int(minor) for minor in _GLIBC.findall(library)), default=0)
 
 
 def is_aligned(library: bytes) -> bool:

@@ -29,11 +29,13 @@
 #define HIDE(NAME)
 #define SECTION ".section .rdata,\"dr\"\n"
 #define INNER ".pythonfmu.dll"
+#define COMMAND "python"
 #else
 #define EXPORT __attribute__((visibility("default")))
 #define HIDE(NAME) ".hidden " NAME "\n"
 #define SECTION ".section .rodata\n"
 #define INNER ".pythonfmu.so"
+#define COMMAND "python3"
 #endif
 
 /* A file's text as a string of this library. */
@@ -361,7 +363,7 @@ static int python_is_running(void) {
 
 static const char *interpreter_name(void) {
     const char *named = getenv("OPENPANTO_PYTHON");
-    return named && *named ? named : "python3";
+    return named && *named ? named : COMMAND;
 }
 
 static char *next_line(char **rest) {

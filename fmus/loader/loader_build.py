@@ -25,6 +25,7 @@ SOURCES: Final = (
     "loader.c",
     "platform.h",
     "platform_posix.c",
+    "platform_windows.c",
     "python_probe.py",
     "fmu_opening.py",
     "loader_build.py",
@@ -33,8 +34,22 @@ SOURCES: Final = (
 INNER_SUFFIX: Final = ".pythonfmu.so"
 #: The oldest glibc that the loader runs on; tests/fmus/loader compares it with the symbols in the library.
 OLDEST_GLIBC: Final = (2, 17)
+#: The file of a runtime that tells the loader what lies where.
+DESCRIPTION: Final = "runtime.txt"
 _BINARIES: Final = "binaries/linux64"
 _INPUTS: Final = ("loader.c", "platform_posix.c")
+_WINDOWS_INPUTS: Final = ("loader.c", "platform_windows.c")
+_MINGW: Final = "x86_64-w64-mingw32-gcc"
+_WINDOWS_OPTIONS: Final = (
+    "-std=gnu11",
+    "-shared",
+    "-O2",
+    "-Wall",
+    "-Wextra",
+    "-Wno-unused-parameter",
+    "-static-libgcc",
+    "-s",
+)
 #: Not to be unloaded: pythonfmu's library stays in the process as well, and so their place can be used again.
 #: libdl and libpthread are part of libc from glibc 2.34 on; older ones have dlopen in libdl.
 _OPTIONS: Final = (
@@ -67,6 +82,40 @@ def with_loader(binaries: Mapping[str, bytes], name: str) -> dict[str, bytes]:
     if outer not in binaries:
         raise LoaderError("this pythonfmu brings no library for Linux that the loader could stand before")
     return {**binaries, inner: binaries[outer], outer: loader_library()}
+
+
+def with_windows_loader(binaries: Mapping[str, bytes], name: str) -> dict[str, bytes]:
+    """Return an FMU's files with the loader in front of pythonfmu's Windows library, to open a Python beside it.
+
+    Raises
+    ------
+    LoaderError
+        If it cannot be compiled here.
+    """
+    outer, inner = f"binaries/win64/{name}.dll", f"binaries/win64/{name}.pythonfmu.dll"
+    if outer not in binaries:
+        raise LoaderError("this pythonfmu brings no library for Windows that the loader could stand before")
+    return {**binaries, inner: binaries[outer], outer: windows_loader_library()}
+
+
+@cache
+def windows_loader_library() -> bytes:
+    """Return the loader for Windows, made by the compiler in ``CC_WINDOWS`` (mingw-w64's by default).
+
+    Raises
+    ------
+    LoaderError
+    """
+    compiler = shutil.which(os.environ.get("CC_WINDOWS", _MINGW))
+    if compiler is None:
+        raise LoaderError(f"there is no C compiler for the loader for Windows (install {_MINGW}, or set CC_WINDOWS)")
+    with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
+        library = Path(folder) / "loader.dll"
+        command = [compiler, *_WINDOWS_OPTIONS, *_WINDOWS_INPUTS, "-o", str(library)]
+        done = subprocess.run(command, cwd=FOLDER, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise LoaderError(f"the C compiler refused the loader for Windows: {_first_line(done.stderr)}")
+        return library.read_bytes()
 
 
 @cache

@@ -29,12 +29,12 @@ import pythonfmu
 from fmus.loader.elf import is_aligned
 from fmus.loader.installation import PACKAGES, Installation, InstallationError, own
 from fmus.loader.licences import COMPILED_HERE, licences
+from fmus.loader.loader_build import DESCRIPTION
 from fmus.loader.rehearsal import LoadedModules, RehearsalError, rehearse
 from fmus.loader.shared_libraries import BlasError, Libraries, collect_libraries
 
 #: Version of this layout, for the loader.
 FORMAT: Final = 1
-DESCRIPTION: Final = "runtime.txt"
 #: Modules of the standard library that come along though no good run loads them: what other systems and encodings
 #: need, and what puts an error into words.
 _ALWAYS: Final = frozenset(

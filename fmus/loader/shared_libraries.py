@@ -11,8 +11,9 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Final
 
-from fmus.loader.elf import glibc_needed, needed, soname
+from fmus.loader.elf import needed, soname
 from fmus.loader.installation import PACKAGES, Installation, InstallationError
+from fmus.loader.loader_build import needed_versions
 
 #: Libraries of glibc: these are the machine's, whoever brings others breaks it.
 _GLIBC: Final = frozenset(
@@ -100,8 +101,9 @@ def _of_linux(source: Installation, modules: Mapping[str, Path], one_blas: Path 
     preload = [f"lib/{name}" for name in order.static_order()]
     python = f"lib/{soname(source.library.read_bytes()) or source.library.name}"
     files[python] = source.library
-    glibc = max(glibc_needed(path.read_bytes()) for path in (*files.values(), *compiled))
-    return Libraries(files, python, tuple(preload), f"2.{glibc}")
+    versions = (needed_versions(path.read_bytes()) for path in (*files.values(), *compiled))
+    glibc = max(version.get("GLIBC", (0,)) for version in versions)
+    return Libraries(files, python, tuple(preload), ".".join(map(str, glibc)))
 
 
 def _one_blas(found: Mapping[str, Path], folder: Path) -> dict[str, Path]:
@@ -146,15 +148,18 @@ def _find(name: str, asking: Path, source: Installation) -> Path:
 
 
 def _of_windows(source: Installation) -> Libraries:
-    files = {f"packages/{p.parent.name}/{p.name}": p for p in _wheel_libraries(source)}
-    beside = [p for pattern in ("vcruntime*.dll", "python3.dll") for p in sorted(source.root.glob(pattern))]
+    wheels = list(_wheel_libraries(source))
+    files = {f"packages/{p.parent.name}/{p.name}": p for p in wheels}
     # Compiled modules of Python find their libraries (libffi) in their own folder.
     files |= {f"extensions/{p.name}": p for p in sorted(source.extensions.glob("libffi*.dll"))}
-    files |= {f"lib/{p.name}": p for p in beside}
+    # pythonfmu's library needs this one, which Python does without and wheels bring under a name of their own.
+    visual_c = next((p for p in wheels if p.name.startswith("msvcp140-")), None)
+    first = {f"lib/{p.name}": p for p in sorted(source.root.glob("vcruntime*.dll"))}
+    first |= {"lib/msvcp140.dll": visual_c} if visual_c else {}
+    # Names of every version's library, which pythonfmu's asks for; they lead to the version's own.
+    first |= {f"lib/{p.name}": p for p in source.root.glob("python3.dll")}
     python = f"lib/{source.library.name}"
-    files[python] = source.library
-    first = sorted(f"lib/{p.name}" for p in beside if p.name != "python3.dll")
-    return Libraries(files, python, tuple(first), "")
+    return Libraries({**files, **first, python: source.library}, python, tuple(first), "")
 
 
 def _wheel_libraries(source: Installation) -> Iterable[Path]:

@@ -47,5 +47,20 @@ def set_paths(places: str, content: str) -> None:
     setattr(sys, "openpanto_runtime", content)  # noqa: B010 - for another FMU that brings a runtime
 
 
+def other_versions(wanted: str, content: str) -> str:
+    """Return a sentence if the Python that an FMU brought has other versions than the one that it runs in."""
+    if getattr(sys, "openpanto_runtime", "") == content:
+        return ""
+    found = ["%d.%d.%d" % sys.version_info[:3]]
+    found += [str(getattr(sys.modules.get(name), "__version__", "")) for name in ("numpy", "scipy")]
+    rows = zip(("Python", "numpy", "scipy"), wanted.split(), found)  # noqa: B905 - not known to old Pythons
+    pairs = [(name, own, there) for name, own, there in rows if there and own != there]
+    if not pairs:
+        return ""
+    brought = ", ".join(name + " " + own for name, own, _ in pairs)
+    used = ", ".join(name + " " + there for name, _, there in pairs)
+    return "the FMU brought " + brought + ", but runs with " + used + ", which was in this process first"
+
+
 def _place() -> str:
     return sys.executable or sys.prefix

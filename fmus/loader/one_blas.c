@@ -2,7 +2,7 @@
  *
  * Wheels of numpy and scipy bring a copy each, and these are half of a runtime. They differ in the width of integers:
  * numpy's takes 64 bits (names end in 64_), scipy's 32. This library has the names of the former and hands over to the
- * latter; it computes nothing. On x86-64 an argument of 64 bits is read rightly as one of 32, in a register, on the
+ * latter; it computes nothing itself. On x86-64 an argument of 64 bits is read rightly as one of 32, in a register, on the
  * stack and through a pointer, as long as the number fits, and a matrix of 2^31 rows does not fit into an FMU. What comes
  * back through a pointer has 32 bits, so it is widened here.
  */
@@ -29,12 +29,24 @@ static int64_t smaller(P one, P other) {
     __asm__(".globl " #FROM "\n.type " #FROM ", @function\n" #FROM ": jmp *" #TO "@GOTPCREL(%rip)\n");
 #define CBLAS(NAME) JUMP(scipy_cblas_##NAME##64_, scipy_cblas_##NAME)
 #define CBLAS_OF_ALL(NAME) CBLAS(s##NAME) CBLAS(d##NAME) CBLAS(c##NAME) CBLAS(z##NAME)
-#define COPY(T) JUMP(scipy_##T##copy_64_, scipy_##T##copy_)
 
 __asm__(".text\n");
 CBLAS_OF_ALL(gemm) CBLAS_OF_ALL(gemv) CBLAS_OF_ALL(syrk) CBLAS_OF_ALL(axpy)
 CBLAS(sdot) CBLAS(ddot) CBLAS(cdotc_sub) CBLAS(zdotc_sub) CBLAS(cdotu_sub) CBLAS(zdotu_sub)
-COPY(s) COPY(d) COPY(c) COPY(z)
+
+/* numpy counts a negative stride in unsigned numbers: a huge one that makes the right address in 64 bits, and would not
+ * in 32. So vectors are copied here. */
+#define COPY(T, TYPE)                                                                                                \
+    void scipy_##T##copy_64_(const int64_t *n, const TYPE *x, const int64_t *incx, TYPE *y, const int64_t *incy) {   \
+        uint64_t from = first(*n, *incx), to = first(*n, *incy);                                                     \
+        for (int64_t i = 0; i < *n; i++, from += (uint64_t)*incx, to += (uint64_t)*incy)                             \
+            *(TYPE *)((uint64_t)y + to * sizeof *y) = *(const TYPE *)((uint64_t)x + from * sizeof *x);               \
+    }
+
+/* Where the first one lies: with a stride below zero, behind the others. */
+static uint64_t first(int64_t count, int64_t stride) { return stride < 0 ? (uint64_t)((1 - count) * stride) : 0; }
+
+COPY(s, float) COPY(d, double) COPY(c, float _Complex) COPY(z, double _Complex)
 
 /* A function of LAPACK: its parameters, its arguments, and what is done with its results. */
 #define LAPACK(NAME, PARAMETERS, ARGUMENTS, AFTER)                                                                   \

@@ -5,6 +5,7 @@ that Python takes for another one; so such an FMU never reaches it. Old Pythons 
 """
 
 import importlib
+import importlib.machinery
 import os
 import sys
 
@@ -23,7 +24,8 @@ def problem(resources: str, script: str) -> str:
     try:
         importlib.import_module(script)
         with open(path, "rb") as file:
-            compile(file.read(), script, "exec")
+            # What was imported may be an earlier instance's; pythonfmu reads this file, and ends Python if it is none.
+            importlib.machinery.SourceFileLoader(script, path).source_to_code(file.read(), path)
     except ModuleNotFoundError as error:
         name = str(error.name).partition(".")[0]
         if name.startswith(("openpanto_", script)):

@@ -118,6 +118,16 @@ def test_what_is_wrong_with_the_code_is_said(tmp_path, code, text):
     sys.modules.pop("wrong_ab12", None)
 
 
+def test_a_script_that_was_cut_after_an_earlier_instance_is_found(tmp_path):
+    """pythonfmu compiles the file once more, and would end Python."""
+    path = tmp_path / "cut_ab12.py"
+    path.write_text("value = 1\n")
+    assert problem(str(tmp_path), "cut_ab12") == ""
+    path.write_text("value = (\n")
+    assert "the FMU cannot be loaded: '(' was never closed" in problem(str(tmp_path), "cut_ab12")
+    del sys.modules["cut_ab12"]
+
+
 def test_a_path_that_python_takes_for_another_needs_an_alias(tmp_path, monkeypatch):
     assert problem("no UTF-8 \udce4", "x") == "alias"
     monkeypatch.setattr("fmus.loader.fmu_opening.os.fsencode", lambda text: text.encode("latin-1"))

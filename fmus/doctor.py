@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final, Literal
 from xml.etree import ElementTree
 
-from fmus.loader.loader_build import INNER_SUFFIX, PROBE, needed_versions
+from fmus.loader.loader_build import DESCRIPTION, INNER_SUFFIX, PROBE, needed_versions
 
 Level = Literal["ok", "note", "missing"]
 #: (system, machine) -> folder and suffix of an FMU's library.
@@ -127,7 +127,7 @@ def examine(path: Path) -> list[Finding]:
     except _UNREADABLE as error:
         return [Finding("missing", f"{path} is not an FMU of this kind ({error})")]
     python = ask()
-    found = [*_platform(package), *_libraries(package), *_run(package), *_python(python)]
+    found = [*_platform(package), *_libraries(package), *_bundled(package), *_run(package), *_python(python)]
     if python is None or python.lack:
         return found
     found += _trial(package, python)
@@ -189,7 +189,7 @@ def _libraries(package: Package) -> Iterator[Finding]:
     name, version = platform.libc_ver()
     if name != "glibc":
         return
-    here = tuple(int(part) for part in version.split(".") if part.isdigit())
+    here = _numbers(version)
     library = package.library()
     own = {library, library.removesuffix(".so") + INNER_SUFFIX} & package.names
     with zipfile.ZipFile(package.path) as file:
@@ -200,6 +200,26 @@ def _libraries(package: Package) -> Iterator[Finding]:
         yield Finding("missing", f"the FMU's libraries {older}")
     elif own:
         yield Finding("ok", f"the FMU's libraries need glibc {text} or newer; this machine has {version}")
+
+
+def _bundled(package: Package) -> Iterator[Finding]:
+    """Say what Python a standalone FMU brings, and whether this machine is too old for it."""
+    if f"resources/runtime/{DESCRIPTION}" not in package.names:
+        return
+    with zipfile.ZipFile(package.path) as file:
+        text = file.read(f"resources/runtime/{DESCRIPTION}").decode("utf-8")
+    about = dict(line.split("=", 1) for line in text.splitlines() if "=" in line)
+    brought = f"the FMU brings Python {about.get('python')} for {about.get('platform')}"
+    name, version = platform.libc_ver()
+    needed, here = (_numbers(text) for text in (about.get("glibc", "0"), version))
+    if name == "glibc" and needed > here:
+        yield Finding("missing", f"{brought}, which needs glibc {about['glibc']}; this machine has {version}")
+    else:
+        yield Finding("ok", f"{brought}, which tools that are not Python run it with")
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in version.split(".") if part.isdigit())
 
 
 def _run(package: Package) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from master import results
+from master import cli, results
 from master.cli import main
 
 ROOT = Path(__file__).parents[2]
@@ -109,6 +109,30 @@ def test_parameters_that_cannot_be_set(toy, in_folder, capsys, assignment, text)
     assert main([str(toy), "--set", assignment, "--no-build"]) == 2
     assert text in " ".join(capsys.readouterr().err.split())
     assert not (in_folder / "results").exists()
+
+
+def test_a_standalone_archive_holds_one_python_beside_the_fmus(toy, in_folder, monkeypatch):
+    def write(folder):
+        (folder / "lib").mkdir()
+        (folder / "runtime.txt").write_text("format=1\n")
+        (folder / "lib" / "libpython.so").write_bytes(b"library")
+
+    monkeypatch.setattr(cli, "write_runtime", write)
+    assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 0
+    with zipfile.ZipFile("packed.ssp") as file:
+        assert file.read("resources/runtime/lib/libpython.so") == b"library"
+        assert "SystemStructure.ssd" in file.namelist()
+    assert main(["validate", "packed.ssp", "--no-build"]) == 0
+
+
+def test_why_an_archive_cannot_be_standalone_is_said(toy, in_folder, monkeypatch, capsys):
+    def write(folder):
+        raise ValueError("the Python in /usr has no shared library")
+
+    monkeypatch.setattr(cli, "write_runtime", write)
+    assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 1
+    assert "cannot be standalone: the Python in /usr has no shared library" in capsys.readouterr().err
+    assert not (in_folder / "packed.ssp").exists()
 
 
 def test_a_packed_scenario_runs_like_its_folder(toy, in_folder):

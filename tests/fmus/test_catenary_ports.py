@@ -146,6 +146,69 @@ def _strip(n):
     return np.array([[[[121.0 + 0.08 * n, y, 5.08], [80.0, 0.0, 0.0]] for y in (0.7, -0.7)]])
 
 
+def test_names_of_supports_and_droppers_say_what_the_form_finding_says(short, tmp_path):
+    """Every static length by its name: contact wire below messenger wire, lower ends below upper ones, on its side."""
+    part = CatenaryPart(load(short_line_recipe(tmp_path).definition))
+    mesh, positions = part.model.mesh, part.model.static.positions
+    made = Instance(short)
+    made.initialise()
+    for i, node in enumerate(mesh.support_nodes.tolist(), 1):
+        found = made.get([f"support[{i}].{axis}" for axis in "xyz"])
+        assert found == pytest.approx(positions[node].tolist())
+        assert made[f"support[{i}].messenger_wire.z"] == pytest.approx(positions[mesh.sprung[i - 1], 2])
+    for j, (lower, upper) in enumerate(mesh.droppers.tolist(), 1):
+        names = [f"dropper[{j}].{name}" for name in ("x", "lower.y", "lower.z", "upper.z")]
+        below, above = positions[lower], positions[upper]
+        assert made.get(names) == pytest.approx([*below, above[2]])
+        assert made[f"dropper[{j}].length"] == pytest.approx(float(np.linalg.norm(above - below)), rel=1e-3)
+    made.free()
+
+
+def test_a_strip_s_ends_and_velocities_are_told_by_their_own_names(short, tmp_path):
+    """A tilted strip that rolls and runs ahead, named value by named value, presses as the part's own array does."""
+    part = CatenaryPart(load(short_line_recipe(tmp_path).definition))
+    made = Instance(short)
+
+    def strip(n):
+        ends = []
+        for y, tilt, roll in ((0.7, 0.004, 0.3), (-0.7, -0.004, -0.3)):
+            ends.append([[121.0 + 0.08 * n, y, 5.085 + tilt], [80.0, 0.0, roll]])
+        return np.array([ends])
+
+    def tell(n):
+        for k, end in enumerate("AB"):
+            for m, prefix in enumerate(("", "v")):
+                for axis, value in zip("xyz", strip(n)[0, k, m].tolist(), strict=True):
+                    made[f"pantograph[1].{end}.{prefix}{axis}"] = value
+
+    part.initialise(0.0, strip(0))
+    made.slave.setupExperiment(startTime=0.0)
+    made.slave.enterInitializationMode()
+    tell(0)
+    made.slave.exitInitializationMode()
+    for n in range(25):
+        tell(n)
+        made.step(n * 1e-3)
+        part.step(strip(n), 1e-3)
+    names = [f"pantograph[1].contact.{name}" for name in ("force", "x", "y", "z")]
+    assert part.contact_force[0] > 50.0
+    assert made.get(names) == pytest.approx([part.contact_force[0], *part.contact_point[0]])
+    uplifts = made.get([f"support[{i}].uplift" for i in range(1, len(part.supports) + 1)])
+    assert uplifts == pytest.approx(part.support_uplift.tolist())
+    forces = made.get([f"dropper[{j}].force" for j in range(1, len(part.droppers) + 1)])
+    assert forces == pytest.approx(part.dropper_force.tolist())
+    made.free()
+
+
+def test_the_speed_along_the_track_is_what_is_warned_of(short):
+    for speeds, expected in (({"vx": 150.0, "vy": 0.0}, 1), ({"vx": 50.0, "vy": 150.0}, 0)):
+        made = Instance(short)
+        made.initialise(**{f"pantograph[1].A.{name}": value for name, value in speeds.items()})
+        made.step(0.0)
+        assert sum("wave speed" in text for text in made.warnings) == expected
+        made.free()
+
+
 @pytest.mark.parametrize(("value", "text"), [(-1.0, "is outside 0 ... 1e+09 Hz"), (1.0, "leaves no mode")])
 def test_modes_cannot_be_left_out_at_such_frequencies(short, value, text):
     made = Instance(short)

@@ -38,3 +38,40 @@ def test_speed_and_start_position_move_the_strip(instance):
     instance.step(2.0, 1e-2)
     assert instance["A.x"] == pytest.approx(10.5)
     assert instance["A.y"] > instance["B.y"]
+
+
+def test_values_by_name_are_motions_of_the_same_mass(instance):
+    """By the trapezoidal rule over a step: heights change by the mean velocity, velocities by the mean acceleration."""
+    instance.initialise(static_force=150.0, raise_duration=0.0)
+    names = [f"mass[{i}].{key}" for i in (1, 2, 3) for key in ("z", "vz", "az")]
+    h, before = 1e-3, dict(zip(names, instance.get(names), strict=True))
+    for n in range(30):
+        instance["contact.force"] = 60.0 + 20.0 * n
+        instance.step(n * h, h)
+        now = dict(zip(names, instance.get(names), strict=True))
+        for i in (1, 2, 3):
+            for value, rate in (("z", "vz"), ("vz", "az")):
+                change = now[f"mass[{i}].{value}"] - before[f"mass[{i}].{value}"]
+                mean = 0.5 * (now[f"mass[{i}].{rate}"] + before[f"mass[{i}].{rate}"])
+                assert change == pytest.approx(h * mean, rel=1e-6, abs=1e-12)
+        assert instance.get(["A.z", "B.z", "A.vz", "B.vz"]) == [now["mass[3].z"]] * 2 + [now["mass[3].vz"]] * 2
+        before = now
+    assert now["mass[3].vz"] < -0.01  # the contact force has pushed the strip down
+
+
+@pytest.mark.parametrize(("z", "vz"), [(0.05, 0.0), (0.0, 0.4)])
+def test_the_roof_s_height_and_velocity_are_told_by_their_own_names(instance, z, vz):
+    """Height lifts by the lowest spring, velocity by the lowest damper: in the first instant M a = k z + c v."""
+    instance.initialise(static_force=0.0, **{"base.z": z, "base.vz": vz})
+    k, c, m = instance.get(["stage[1].stiffness", "stage[1].damping", "stage[1].mass"])
+    assert instance["mass[1].az"] == pytest.approx((k * z + c * vz) / m)
+    assert instance["mass[3].az"] == 0.0
+    # The inputs of a step count as those of the start do: the same force at its end, nearly the same motion.
+    instance.step(0.0, 1e-4)
+    assert instance["mass[1].vz"] == pytest.approx(1e-4 * (k * z + c * vz) / m, rel=0.01)
+
+
+def test_the_contact_force_of_the_start_pushes_the_strip_down(instance):
+    instance.initialise(static_force=0.0, **{"contact.force": 77.5})
+    assert instance["mass[3].az"] == pytest.approx(-77.5 / instance["stage[3].mass"])
+    assert instance["mass[1].az"] == 0.0

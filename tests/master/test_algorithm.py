@@ -75,6 +75,27 @@ def test_gauss_seidel_order_of_slaves_matters_and_is_honoured(fake_slave):
     assert network.outputs[0] == pytest.approx(1.0 - 0.1 * 0.1 * OMEGA**2)
 
 
+def test_after_a_step_the_inputs_are_what_the_slaves_were_told(fake_slave):
+    """Also what the first of three was told, though its source, the second, has gone on before the third steps."""
+    slaves = [
+        fake_slave(f"s{i}", ("u",), ("y",), np.array([float(i + 1)]), lambda s, u, t, h: s + h * u, lambda s, u: s)
+        for i in range(3)
+    ]
+    network = Network(slaves, [Connection(f"s{(i + 1) % 3}", "y", f"s{i}", "u") for i in range(3)])
+    initialise(network, 0.0, 1.0)
+    GaussSeidel().step(network, 0.0, 0.5)
+    first = 1.0 + 0.5 * 2.0
+    assert network.inputs.tolist() == [2.0, 3.0, first]
+    assert network.outputs.tolist() == [first, 2.0 + 0.5 * 3.0, 3.0 + 0.5 * first]
+
+
+def test_slaves_may_start_at_times_of_their_own(fake_slave, monkeypatch):
+    seen = {}
+    monkeypatch.setattr(fake_slave, "start", lambda slave, start, stop: seen.update({slave.name: (start, stop)}))
+    initialise(oscillator(fake_slave), 1.0, 5.0, {"velocity": 3.0})
+    assert seen == {"position": (1.0, 5.0), "velocity": (3.0, 5.0)}
+
+
 def test_jacobi_does_not_depend_on_the_order_of_slaves(fake_slave):
     a = oscillator(fake_slave)
     b = Network(
@@ -106,6 +127,48 @@ def test_iterative_releases_every_state_it_saves_also_on_failure(fake_slave):
         Iterative(1e-15, max_iterations=3).step(network, 0.0, 0.4)
     for slave in network.slaves:
         assert slave.calls.count("save") == slave.calls.count("release") == 1
+
+
+def _settling(fake_slave):
+    """An oscillation that has been large and is dying out, iterated to a share of how large it has been."""
+    network = oscillator(fake_slave)
+    initialise(network, 0.0, 1.0)
+    scheme = Iterative(1e-3)
+    for n in range(5):
+        scheme.step(network, 0.02 * n, 0.02)
+    for slave in network.slaves:
+        slave.state = 1e-4 * slave.state
+    network.read()
+    return network, scheme
+
+
+def test_an_iterative_scheme_that_recalls_its_memory_repeats_as_often_as_one_that_was_not_interrupted(fake_slave):
+    """What counts as settled is relative to the largest values so far, so it has to come along."""
+    (network, scheme), (other, before) = _settling(fake_slave), _settling(fake_slave)
+    resumed, forgetful = Iterative(1e-3), Iterative(1e-3)
+    resumed.recall(before.memory())
+    started = scheme.iterations
+    for each, net in ((scheme, network), (resumed, other)):
+        for n in range(5, 10):
+            each.step(net, 0.02 * n, 0.02)
+    assert resumed.iterations == scheme.iterations - started
+    assert other.outputs.tolist() == network.outputs.tolist()
+    assert resumed.memory().tolist() == scheme.memory().tolist()
+    third, _ = _settling(fake_slave)
+    for n in range(5, 10):
+        forgetful.step(third, 0.02 * n, 0.02)
+    assert forgetful.iterations > resumed.iterations  # so that the above is not so by itself
+
+
+def test_memory_that_is_handed_out_is_not_changed_by_further_steps(fake_slave):
+    network, scheme = _settling(fake_slave)
+    taken = scheme.memory()
+    kept = taken.copy()
+    for slave in network.slaves:
+        slave.state = 1e6 * slave.state
+    scheme.step(network, 0.1, 0.02)
+    assert taken.tolist() == kept.tolist()
+    assert scheme.memory().max() > 10.0 * kept.max()
 
 
 def test_wires_convert(fake_slave):

@@ -1,5 +1,6 @@
 """Finding a value, and writing it into a parameter file."""
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,6 +25,19 @@ def test_a_curved_relation_is_found_within_few_runs():
 def test_a_kink_is_overcome_by_bisection():
     found = find_value(lambda x: 100.0 if x < 170.0 else 100.0 + 50.0 * (x - 170.0), 120.0, 168.0, 0.5, guess=175.0)
     assert found.value == pytest.approx(170.4, abs=0.02)
+
+
+def test_a_value_once_enclosed_is_looked_for_between_its_nearest_neighbours():
+    """After the target has been passed every further trial lies between the best trials below and above it."""
+    for centre in (3.0, 7.3, 11.0):
+        found = find_value(lambda v, c=centre: 100.0 + 50.0 * np.tanh(4.0 * (v - c)), 120.0, 1.0, 0.01, guess=14.0)
+        assert abs(found.result - 120.0) <= 0.01
+        assert len(found.trials) > 4
+        for n in range(2, len(found.trials)):
+            before = found.trials[:n]
+            below = [t.value for t in before if t.result < 120.0]
+            above = [t.value for t in before if t.result > 120.0]
+            assert max(below) < found.trials[n].value < min(above)
 
 
 def test_nothing_is_run_twice_when_the_start_is_right():

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from master import checkpoint
+from master.algorithm import Iterative, Jacobi
 from master.checkpoint import Continuation, index_at, pack, unpack
 from master.cli import main
 from master.errors import MasterError, RunError, UsageError
 from master.recorder import load
+from master.run import loaded
 from master.scenario import Overrides, open_scenario
 
 
@@ -118,12 +120,36 @@ def test_an_fmu_that_restores_less_than_its_state_is_found_out(toy, saved):
     found = checkpoint.read(saved[1])
     wrong = replace(found, outputs={**found.outputs, "pantograph.A.z": 1.0})
     with open_scenario(toy, Overrides(), build=False) as scenario:
-        from master.algorithm import Jacobi
-        from master.run import loaded
-
         way = Continuation(wrong, "state")
         with loaded(scenario.system) as network, pytest.raises(RunError, match="does not restore its whole state"):
             way.prepare(network, Jacobi(), way.grid(scenario.system))
+
+
+def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
+    """Into the file and out of it: the iterative scheme measures changes by the largest values so far."""
+    go(toy, tmp_path / "whole", "--scheme", "iterative", "--checkpoint", "0.1", "--stop", "0.3")
+    found = checkpoint.read(tmp_path / "whole" / checkpoint.NAME)
+    assert len(found.memory) == len(found.outputs)
+    for name, largest in zip(found.outputs, found.memory, strict=True):
+        assert largest >= abs(found.outputs[name])
+    with open_scenario(toy, Overrides(scheme="iterative"), build=False) as scenario:
+        for renewed, expected in (((), found.memory.tolist()), (("pantograph",), [])):
+            way, scheme = Continuation(found, "state", renewed=renewed), Iterative()
+            with loaded(scenario.system) as network:
+                way.prepare(network, scheme, way.grid(scenario.system))
+                assert scheme.memory().tolist() == expected
+                if not renewed:
+                    assert dict(zip(network.output_names, network.outputs.tolist(), strict=True)) == found.outputs
+                    told = dict(zip(network.input_names, network.inputs.tolist(), strict=True))
+                    assert told == found.inputs
+
+
+def test_a_scheme_does_not_take_another_s_memory(toy, saved):
+    found = replace(checkpoint.read(saved[1]), memory=np.array([1.0, 2.0]))
+    with open_scenario(toy, Overrides(), build=False) as scenario, loaded(scenario.system) as network:
+        way, scheme = Continuation(found, "state"), Iterative()
+        way.prepare(network, scheme, way.grid(scenario.system))
+        assert not scheme.memory().size
 
 
 def test_fmus_that_cannot_serialise_are_named(toy):

@@ -45,6 +45,13 @@ def test_a_part_s_drift_is_judged_by_what_has_passed_through_it():
     assert (event.time, event.duration) == (pytest.approx(0.2), pytest.approx(0.3))
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_energy_that_is_lost_is_as_bad_as_energy_that_is_made_up(sign):
+    off = sign * 2.0 * PART_LIMIT * 200.0
+    (found,) = find_balances([every_step(), recording(0.1, **balance([0.0, 0.0, off, off]))], [])
+    assert (found.exceeded, found.largest, found.drift) == (pytest.approx(0.2), abs(off), off)
+
+
 def test_a_coupling_s_drift_is_what_both_sides_differ_by():
     """Beside the work that goes back and forth: 100 N at 0.1 m/s for a second are 10 J, which add up to next to 0."""
     line = np.array([7.0, 9.0, 8.0])  # it has been running before

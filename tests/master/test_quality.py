@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from master.quality import assess, band_pass, find_losses, interval_mask, judge, low_pass, target_mean_force
+from master.quality import assess, band_pass, find_losses, interval_mask, judge, low_pass, settled, target_mean_force
 
 STEP = 1e-3
 TIME = np.arange(8001) * STEP
@@ -194,6 +194,69 @@ def test_verdict_passes_a_good_run():
 def test_each_limit_can_fail_alone(force, uplifts, height, failed):
     found = verdicts(judge(quality(force, height=height + 0.0 * TIME), uplifts))
     assert [name for name, passed in found.items() if not passed] == [failed]
+
+
+@pytest.mark.parametrize("speed", [120 / 3.6, 190 / 3.6, 230 / 3.6, 300 / 3.6])
+@pytest.mark.parametrize(("off", "passes"), [(-2.6, False), (-2.4, True), (2.4, True), (2.6, False), (-40.0, False)])
+def test_a_mean_may_be_off_its_target_by_so_much_on_either_side(speed, off, passes):
+    """EN 50367's target of the mean by hand, v in km/h: 0.00047 v^2 + 90 N up to 200 km/h, 0.00097 v^2 + 70 N above."""
+    v = 3.6 * speed
+    target = 0.00047 * v * v + 90.0 if v <= 200.0 else 0.00097 * v * v + 70.0
+    assert verdicts(judge(quality(target + off + sine(2.0, 20.0), speed)))["mean force"] == passes
+
+
+@pytest.mark.parametrize(("share", "passes"), [(0.295, True), (0.305, False)])
+def test_sigma_may_be_three_tenths_of_the_mean(share, passes):
+    """A sine's standard deviation is its amplitude over the root of 2."""
+    force = 157.3 * (1.0 + np.sqrt(2.0) * share * np.sin(2.0 * np.pi * 2.0 * TIME))
+    assert verdicts(judge(quality(force)))["sigma / mean"] == passes
+
+
+@pytest.mark.parametrize(("amplitude", "passes"), [(190.0, True), (196.0, False)])
+def test_the_largest_force_is_below_350_newtons(amplitude, passes):
+    force = 157.0 + amplitude * np.exp(-(((TIME - 4.0) / 0.1) ** 2))
+    assert verdicts(judge(quality(force)))["maximum force"] == passes
+
+
+@pytest.mark.parametrize(("uplifts", "passes"), [([0.02, 0.119], True), ([0.121, 0.02], False)])
+def test_the_largest_uplift_is_judged_wherever_it_is(uplifts, passes):
+    assert verdicts(judge(quality(157.5 + sine(2.0, 30.0)), uplifts))["uplift at supports"] == passes
+
+
+@pytest.mark.parametrize(("lost", "passes"), [(11, True), (13, False)])
+def test_arcs_may_take_two_per_mille_of_the_time(lost, passes):
+    """Of the 8 s of record the first and the last are outside the interval: 12 ms are 0.2 % of it."""
+    force = 157.5 + sine(2.0, 30.0)
+    force[4000 : 4000 + lost] = 0.0
+    assert verdicts(judge(quality(force)))["NQ (estimate)"] == passes
+
+
+def test_what_lies_before_the_first_contact_and_two_periods_of_the_filter_is_left_out():
+    force = np.concatenate([np.zeros(300), np.full(700, 100.0)])
+    found = settled(force, STEP)
+    assert int(np.argmax(found)) == 300 + 100  # 2 / 20 Hz
+    assert settled(np.full(10, 100.0), STEP).all()
+    assert not settled(np.zeros(10), STEP).any()
+
+
+def test_raw_extremes_are_of_the_raw_force_and_statistical_ones_three_sigma_away():
+    force = 150.0 + sine(3.0, 20.0) + sine(100.0, 50.0)
+    found = assess(force, 80.0 * TIME, STEP, (160.0, 479.99))
+    assert found.raw_maximum == pytest.approx(force[2001:6000].max())
+    assert found.raw_minimum == pytest.approx(force[2001:6000].min())
+    assert found.maximum == pytest.approx(170.0, abs=0.2)
+    assert found.statistical_maximum == pytest.approx(found.mean + 3.0 * found.sigma)
+    assert found.statistical_minimum == pytest.approx(found.mean - 3.0 * found.sigma)
+
+
+def test_figures_of_an_interval_are_those_of_the_whole_filtered_record_there():
+    """A filter that saw the interval alone would end with it."""
+    force = 150.0 + 30.0 * np.random.default_rng(5).normal(size=len(TIME))
+    found = assess(force, 80.0 * TIME, STEP, (200.0, 280.0))
+    inside = (80.0 * TIME > 200.0 + 1e-6) & (80.0 * TIME <= 280.0 + 1e-6)
+    filtered = low_pass(force, STEP)[inside]
+    figures = (found.mean, found.sigma, found.minimum, found.maximum)
+    assert figures == pytest.approx((filtered.mean(), filtered.std(), filtered.min(), filtered.max()))
 
 
 def test_arcing_fails():

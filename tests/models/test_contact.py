@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.parameters import Contact
+from models.catenary.stepping import local_motion
 from models.contact import continuous_contact, crossing
 
 
@@ -64,6 +66,22 @@ def test_rebound_velocity_is_that_of_the_coefficient_of_restitution(restitution)
     assert -v / impact == pytest.approx(restitution, abs=0.4 * (1.0 - restitution))
 
 
+@pytest.mark.parametrize("restitution", [0.999, 0.99])
+def test_what_a_rebound_lacks_is_what_the_coefficient_says_the_nearer_to_1_the_better(restitution):
+    """(1 - v'/v) / (1 - e) tends to 1: that is what 3/4 (1 - e^2) is chosen for."""
+    law, mass, impact = Contact(stiffness=1e5, restitution=restitution), 5.0, 0.4
+
+    def rate(_, state):
+        return [state[1], -continuous_contact(max(state[0], 1e-300), state[1], impact, law).force / mass]
+
+    def apart(_, state):
+        return state[0]
+
+    apart.terminal, apart.direction = True, -1.0
+    found = solve_ivp(rate, (0.0, 0.1), [1e-12, impact], events=apart, rtol=1e-10, atol=1e-14)
+    assert (1.0 + found.y[1, -1] / impact) / (1.0 - restitution) == pytest.approx(1.0, abs=2.0 * (1.0 - restitution))
+
+
 @pytest.fixture(scope="module")
 def model(short_line):
     return CatenaryModel(short_line)
@@ -119,3 +137,125 @@ def test_contact_is_lost_and_found_again(model):
     assert min(forces[5:20]) > 10.0
     assert max(forces[21:40]) == 0.0
     assert min(forces[45:]) > 1.0
+
+
+def _rolling(x, z, vz, axis, roll_rate):
+    """A level strip that rises with ``vz`` where y is ``axis`` and rolls about that point."""
+    return np.array([[[x, y, z], [80.0, 0.0, vz + roll_rate * (y - axis)]] for y in (0.7, -0.7)])
+
+
+@pytest.mark.parametrize("roll_rate", [-2.0, 1.5])
+def test_a_strip_that_rolls_about_the_contact_presses_like_one_that_does_not(short_line, roll_rate):
+    """The law's velocity is that of the strip where the wire lies on it, 0.2 m beside its middle, not of its ends."""
+    lossy = CatenaryModel(short_line.with_values({"contact.restitution": 0.6}))
+    forces = []
+    for rate in (0.0, roll_rate):
+        state, record = lossy.initial_state(), []
+        axis = float(lossy.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0, 1])
+        assert abs(axis) > 0.19
+        z0 = float(lossy.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0, 2])
+        for n in range(1, 16):
+            strip = _rolling(100.0, z0 + 0.1 * n * 1e-3, 0.1, axis, rate)
+            result = lossy.step(state, 1e-3, StripMotion(strip[None], np.zeros(1)))
+            record.append(float(result.force[0, 0]))
+            axis = float(result.point[0, 0, 1])
+        forces.append(np.array(record))
+    still, rolling = forces
+    assert still.min() > 0.0
+    assert np.abs(rolling - still).max() < 2e-3 * still.max()
+
+
+def test_contact_at_rest_knows_how_a_strip_rolls(short_line):
+    """A strip that leaves the wire at the contact, though one end rises, does not press against a lossy law."""
+    lossy = CatenaryModel(short_line.with_values({"contact.restitution": 0.6}))
+    state = lossy.initial_state()
+    at = lossy.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0]
+    pressed = float(at[2]) + 2e-3
+    law = lossy.definition.contact
+    for roll_rate in (-3.0, 3.0):
+        approaching = lossy.contact_at_rest(state, _rolling(100.0, pressed, 0.05, at[1], roll_rate)[None])
+        leaving = lossy.contact_at_rest(state, _rolling(100.0, pressed, -0.05, at[1], roll_rate)[None])
+        # At its first instant the velocity is that of the impact: 1 + 3/4 (1 - e^2) times the elastic force.
+        assert approaching.force[0, 0] == pytest.approx(law.stiffness * 2e-3 * (1.0 + 0.75 * 0.64), rel=1e-6)
+        assert leaving.force[0, 0] == 0.0
+
+
+def test_a_tilted_strip_presses_with_its_height_at_the_contact(model):
+    """Ends 2 cm apart in height: the penetration is that of the point on the strip where the wire crosses it."""
+    state = model.initial_state()
+    level = _strip(100.0, 6.0)
+    x, y, z = model.contact_at_rest(state, level[None]).point[0, 0]
+    tilted = level.copy()
+    tilted[:, 0, 2] = [z + 3e-3 + 0.01 / 0.7 * (end - y) for end in (0.7, -0.7)]
+    found = model.contact_at_rest(state, tilted[None])
+    assert found.force[0, 0] == pytest.approx(model.definition.contact.stiffness * 3e-3, rel=1e-6)
+    assert x == pytest.approx(100.0)
+
+
+def test_radii_of_wire_and_strip_keep_their_axes_apart(short_line):
+    """A round wire on a round strip: as much penetration as the plain one where the strip is lower by both radii."""
+    plain = CatenaryModel(short_line)
+    thick = CatenaryModel(short_line.with_values({"contact.wire_radius": 6e-3, "contact.strip_radius": 0.1}))
+    z = float(plain.contact_at_rest(plain.initial_state(), _strip(100.0, 6.0)[None]).point[0, 0, 2])
+    bare = plain.contact_at_rest(plain.initial_state(), _strip(100.0, z + 4e-3)[None]).force[0, 0]
+    round_one = thick.contact_at_rest(thick.initial_state(), _strip(100.0, z + 4e-3 - 0.106)[None]).force[0, 0]
+    assert bare > 50.0
+    assert round_one == pytest.approx(bare, rel=1e-6)
+
+
+def test_a_contact_keeps_the_velocity_of_its_impact_until_it_opens(short_line):
+    """Two strokes against the wire, the second twice as fast; each is lossy by its own first velocity [2.47]."""
+    lossy = CatenaryModel(short_line.with_values({"contact.restitution": 0.6}))
+    law, state, dt = lossy.definition.contact, lossy.initial_state(), 1e-3
+    z0 = float(lossy.contact_at_rest(state, _strip(120.0, 6.0)[None]).point[0, 0, 2])
+    z, impact, impacts, closed = z0 - 2e-4, None, [], 0
+    for n in range(60):
+        speed = 0.2 * np.cos(2.0 * np.pi * n / 30.0) * (1.0 if n < 30 else 2.0)
+        z += speed * dt
+        result = lossy.step(state, dt, StripMotion(_strip(120.0, z, vz=speed)[None], np.zeros(1)))
+        force = float(result.force[0, 0])
+        if not state.impact_velocity[0, 0]:
+            impact = None
+            continue
+        depth, rate = _penetration(lossy, state, z, speed)
+        if impact is None:
+            impact = rate
+            impacts.append(rate)
+        closed += 1
+        factor = 1.0 + 0.75 * (1.0 - 0.36) * rate / impact
+        assert force == pytest.approx(law.stiffness * depth * max(factor, 0.0), rel=1e-4, abs=1e-6)
+    assert closed > 15
+    assert len(impacts) == 2
+    assert impacts[1] > 1.3 * impacts[0]
+
+
+def _penetration(model, state, z, speed):
+    """Depth and velocity of the only contact, from where the wire is and how it moves."""
+    ((_, element),), ((xi, _),) = state.loaded.tolist(), state.load.tolist()
+    touch = model.wires[0].touch(element, xi)
+    rise, rate = (float(row @ touch.row) for row in local_motion(touch.interval, state.motion))
+    return z - (touch.height + rise), speed - rate
+
+
+def test_uplift_and_point_of_contact_move_with_the_wire(model):
+    """A force at a support for a while: the rise there by the nodes' own displacement, and a strip that finds it."""
+    state = model.initial_state()
+    for _ in range(30):
+        model.push(state, 1e-3, [(0, 100.0, 200.0)])
+    nodal = model.displacement(state)[model.mesh.support_nodes]
+    lifted = model.uplift(state)
+    assert lifted == pytest.approx(nodal[:, 2])
+    assert int(np.argmax(lifted)) == int(np.argmin(np.abs(model.mesh.points[model.mesh.support_nodes, 0] - 100.0)))
+    assert lifted.max() > 0.01
+    assert abs(nodal[:, 1]).max() > 1e-6
+    rest = model.contact_at_rest(model.initial_state(), _strip(100.0, 6.0)[None]).point[0, 0]
+    moved = model.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0]
+    assert moved[2] - rest[2] == pytest.approx(lifted.max(), abs=1e-5)
+
+
+def test_a_strip_at_rest_presses_with_a_share_where_the_wire_lies_near_its_end(model):
+    """2 cm from the end of the strip: two fifths of the law, whose edge is 5 cm wide."""
+    state = model.initial_state()
+    at = model.contact_at_rest(state, _strip(100.0, 6.0)[None]).point[0, 0]
+    found = model.contact_at_rest(state, _strip(100.0, at[2] + 4e-3, y=at[1] - 0.7 + 0.02)[None])
+    assert found.force[0, 0] == pytest.approx(0.4 * model.definition.contact.stiffness * 4e-3, rel=1e-6)

@@ -29,6 +29,20 @@ def test_a_force_never_pulls_and_a_lost_contact_stays_lost():
     assert extrapolation.at(3e-3) == 0.0
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_lost_contact_has_no_trend(order):
+    """A parabola through 100, 5, 0 N turns upward again, but a contact that is lost is not about to come back."""
+    extrapolation = ForceExtrapolation(order)
+    extrapolation.start(0.0, 100.0)
+    extrapolation.receive(1e-3, 5.0)
+    extrapolation.receive(2e-3, 0.0)
+    assert [extrapolation.at(t) for t in (2e-3, 2.5e-3, 3e-3, 4e-3)] == [0.0] * 4
+    extrapolation.receive(3e-3, 0.0)
+    assert extrapolation.at(4e-3) == 0.0
+    extrapolation.receive(4e-3, 30.0)
+    assert extrapolation.at(4.5e-3) > 30.0
+
+
 def test_a_value_for_the_same_time_replaces_the_last():
     extrapolation = ForceExtrapolation(1)
     extrapolation.start(0.0, 10.0)

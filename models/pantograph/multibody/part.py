@@ -356,7 +356,8 @@ class MultibodyPantographPart:
         roll = math.atan2(across[0, 2], across[0, 1])
         roll_rate = float(across[1, 2] * across[0, 1] - across[1, 1] * across[0, 2]) / length2
         middle = 0.5 * float(ends[0, 0, 1] + ends[1, 0, 1])
-        offset = (self._lateral.at(self.time) - middle) / max(math.cos(roll), 1e-9)
+        # Along the strip, which may roll and yaw.
+        offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
         values = evaluation.constraints
         self._observation[:-6] = bodies.ravel()
         self._observation[-6:] = (

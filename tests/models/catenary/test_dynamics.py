@@ -256,6 +256,37 @@ def test_exact_slack_equals_the_plain_iteration_run_to_convergence(line_maker):
     assert np.abs(np.array(contact) - plain_contact).max() < 1e-6
 
 
+def test_droppers_slacken_far_from_the_contact_as_well(line_maker):
+    """A wave lifts the wire 600 m from a strip that only touches it: droppers slacken there as without the strip.
+
+    So far away that a force under the strip does not reach them within a step.
+    """
+    model = CatenaryModel(line_maker(spans=14))
+    x = model.mesh.points[:, 0]
+    (chain,) = model.mesh.contact_chains()
+    field = np.zeros((len(x), NODE_DOFS))
+    field[chain.nodes, 2] = 3.0 * np.exp(-(((x[chain.nodes] - 660.0) / 8.0) ** 2))
+    field[model.mesh.fixed] = 0.0
+    touching = _below(60.0)
+    touching[..., 0, 2] = model.contact_at_rest(model.initial_state(), touching).point[0, 0, 2] + 1e-3
+    far = model.static.positions[model.mesh.droppers[:, 0], 0] > 620.0
+    records = []
+    for strip in (_below(60.0), touching):
+        state, forces, pressed = model.initial_state(), [], []
+        model.set_velocity(state, field)
+        for _ in range(40):
+            pressed.append(model.step(state, 1e-3, StripMotion(strip, np.zeros(1))).force[0, 0])
+            forces.append(model.dropper_force(state))
+        records.append((np.array(forces), np.array(pressed)))
+    (alone, none), (beside, force) = records
+    assert not none.any()
+    assert force.min() > 1.0
+    assert (alone[:, far] < 1e-9).any(axis=1).sum() > 10
+    assert alone.min() > -1e-9
+    assert beside.min() > -1e-9
+    assert np.abs(beside[:, far] - alone[:, far]).max() < 1e-2
+
+
 def test_stiffness_in_compression_is_the_given_share(line_maker):
     """With a ratio r the force of a compressed dropper is r times that of a bilateral one."""
     line = line_maker(spans=4, alpha=0.00275, dropper={

@@ -8,7 +8,7 @@ import pytest
 from models.catenary.limits import longest_step, slack_warning, speed_warning, step_warning, tangent_stiffness
 from models.catenary.parameters import Contact
 from models.catenary.part import CatenaryPart
-from models.catenary.statics import wave_speed
+from models.catenary.statics import contact_wire_wave_speed, wave_speed
 from models.commands import main
 
 
@@ -18,6 +18,13 @@ def test_the_speed_is_compared_with_the_waves_of_the_longest_span(ln2):
     assert "0.71 of the contact wire's wave speed" in speed_warning(ln2, 0.71 * C)
     assert "operated up to 0.7" in speed_warning(ln2, -0.99 * C)
     assert "no wave runs ahead" in speed_warning(ln2, 1.01 * C)
+
+
+def test_waves_are_taken_where_they_are_slowest(ln2):
+    """Bending speeds up waves of short spans: the speed that a train is compared with is that of the longest."""
+    speeds = [wave_speed(ln2.contact_wire, span.length) for span in ln2.sections[0].spans]
+    assert len(set(speeds)) > 1
+    assert contact_wire_wave_speed(ln2) == min(speeds)
 
 
 def test_usual_steps_are_short_enough(ln2):
@@ -44,6 +51,25 @@ def test_a_wire_takes_up_waves_like_the_damper_of_the_criterion(ln2):
     # Behind the front the string moves with v and is inclined by v / C: kinetic and elastic energy per length.
     power = 2.0 * C * (0.5 * wire.mass * v**2 + 0.5 * wire.tension * (v / C) ** 2)
     assert power == pytest.approx(2.0 * math.sqrt(wire.tension * wire.mass) * v**2)
+
+
+@pytest.mark.parametrize("stiffness", [2e4, 5e4])
+def test_the_longest_step_is_a_quarter_of_the_time_in_which_a_pressed_string_gives_way(ln2, stiffness):
+    """A strip pressed into a long string, which runs away to both sides in d'Alembert's exact differences."""
+    wire, dt, n = ln2.contact_wire, 2.5e-5, 2001
+    cell = math.sqrt(wire.tension / wire.mass) * dt
+    before, now = np.zeros(n), np.zeros(n)
+    depth, time, force = 1e-3, 0.0, stiffness * 1e-3
+    while force > stiffness * depth / math.e:
+        new = np.zeros(n)
+        new[1:-1] = now[2:] + now[:-2] - before[1:-1]
+        new[n // 2] += force * dt**2 / (wire.mass * cell)
+        before, now, time = now, new, time + dt
+        force = stiffness * (depth - now[n // 2])
+    line = ln2.with_values({"contact.stiffness": stiffness})
+    assert longest_step(line) == pytest.approx(0.25 * time, rel=0.02)
+    assert step_warning(line, 0.24 * time) == ""
+    assert step_warning(line, 0.26 * time)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])

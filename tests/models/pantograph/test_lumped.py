@@ -38,6 +38,93 @@ def test_roof_motion_lifts_the_pantograph(cx):
     assert part.strip[0, 0, 2] == pytest.approx(cx.reference_height + 0.05, abs=1e-5)
 
 
+def test_a_pantograph_on_a_rising_roof_rises_with_it(cx):
+    """The lowest damper stands on the roof as the spring does: at constant speed nothing lags behind."""
+    speed, h = 0.02, 5e-3
+    part = LumpedPantographPart(cx.with_values({"speed": 0.0, "static_force": 0.0, "time_step": h}))
+    part.initialise(0.0, 0.0, POINT, np.array([0.0, speed]))
+    for n in range(6000):
+        part.step(0.0, POINT, np.array([speed * n * h, speed]), h)
+    assert part.observation_values()[::3] - cx.reference_height == pytest.approx(speed * part.time, abs=1e-6)
+    assert part.observation_values()[1::3] == pytest.approx(speed, abs=1e-6)
+
+
+def test_only_the_damper_of_the_lowest_stage_feels_a_roof_that_starts_to_move(cx):
+    """In the first instant a moving roof pushes with c1 v: the lowest mass alone, M a = f."""
+    part = LumpedPantographPart(cx.with_values({"static_force": 0.0}))
+    part.initialise(0.0, 0.0, POINT, np.array([0.0, 0.3]))
+    lowest = cx.stage[0]
+    assert part.observation_values()[2::3] == pytest.approx([0.3 * lowest.damping / lowest.mass, 0.0, 0.0])
+
+
+def test_when_a_run_begins_is_of_no_account(cx):
+    """Uplift, travel and contact force count from the start: one that begins at 1000 s moves as one from 0 s."""
+    definition = cx.with_values({"raise_start": 0.05, "raise_duration": 0.1})
+    early, late = LumpedPantographPart(definition), LumpedPantographPart(definition)
+    early.initialise(0.0, 0.0, POINT, BASE)
+    late.initialise(1000.0, 0.0, POINT, BASE)
+    for n in range(300):
+        for part in (early, late):
+            part.step(_force(n * 1e-3) if n > 100 else 0.0, POINT, BASE, 1e-3)
+        if n == 49:
+            assert early.strip[0, 0, 2] == cx.reference_height  # nothing lifts it before the uplift begins
+    assert early.strip[0, 0, 2] > cx.reference_height + 1e-4
+    assert late.strip == pytest.approx(early.strip, abs=1e-9)
+    assert late.observation_values() == pytest.approx(early.observation_values(), abs=1e-7)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3])
+def test_the_uplift_grows_evenly_from_its_beginning_to_its_end(cx, start):
+    definition = cx.with_values({"raise_start": start, "raise_duration": 0.2})
+    share = [definition.raised(start + t) for t in (-0.01, 0.0, 0.05, 0.1, 0.2, 5.0)]
+    assert share == pytest.approx([0.0, 0.0, 0.25, 0.5, 1.0, 1.0])
+    at_once = cx.with_values({"raise_start": start, "raise_duration": 0.0})
+    assert [at_once.raised(start + t) for t in (-1e-9, 0.0, 1.0)] == [0.0, 1.0, 1.0]
+
+
+def test_a_snapshot_knows_when_its_run_began(cx):
+    """In the midst of the ramp, of a run that began at 50 s."""
+    definition = cx.with_values({"raise_start": 0.05, "raise_duration": 0.1})
+    first, second = LumpedPantographPart(definition), LumpedPantographPart(definition)
+    first.initialise(50.0, 0.0, POINT, BASE)
+    for _ in range(80):
+        first.step(0.0, POINT, BASE, 1e-3)
+    second.restore(first.snapshot())
+    for _ in range(40):
+        for part in (first, second):
+            part.step(0.0, POINT, BASE, 1e-3)
+    assert np.array_equal(first.strip, second.strip)
+    assert np.array_equal(first.observation_values(), second.observation_values())
+
+
+def test_observed_heights_velocities_and_accelerations_belong_together(cx):
+    """By the trapezoidal rule, name by name: z' is vz and vz' is az of the same mass, and the strip is the highest."""
+    h = 1e-3
+    part = LumpedPantographPart(cx)
+    names = [name for name, _, _ in part.observed]
+    part.initialise(0.0, 0.0, POINT, BASE)
+    before = dict(zip(names, part.observation_values(), strict=True))
+    for n in range(1, 150):
+        part.step(_force(n * h), POINT, np.array([1e-2 * np.sin(20.0 * n * h), 0.2 * np.cos(20.0 * n * h)]), h)
+        now = dict(zip(names, part.observation_values(), strict=True))
+        for i in (1, 2, 3):
+            for value, rate in (("z", "vz"), ("vz", "az")):
+                change = now[f"mass[{i}].{value}"] - before[f"mass[{i}].{value}"]
+                mean = 0.5 * (now[f"mass[{i}].{rate}"] + before[f"mass[{i}].{rate}"])
+                assert change == pytest.approx(h * mean, rel=1e-6, abs=1e-12)
+        assert part.strip[:, :, 2] == pytest.approx(np.array([[now["mass[3].z"], now["mass[3].vz"]]] * 2))
+        before = now
+    assert max(abs(before[f"mass[{i}].vz"] - before[f"mass[{i}].az"]) for i in (1, 2, 3)) > 0.1
+
+
+def test_the_highest_mass_carries_the_contact_force_and_the_lowest_the_uplift(cx):
+    """At the start, at rest: M a = f, mass by mass."""
+    part = LumpedPantographPart(cx.with_values({"static_force": 90.0, "raise_duration": 0.0}))
+    part.initialise(0.0, 60.0, POINT, BASE)
+    masses = [stage.mass for stage in cx.stage]
+    assert part.observation_values()[2::3] == pytest.approx([90.0 / masses[0], 0.0, -60.0 / masses[2]])
+
+
 def test_no_uplift_no_motion(cx):
     part = LumpedPantographPart(cx.with_values({"static_force": 0.0}))
     part.initialise(0.0, 0.0, POINT, BASE)

@@ -211,3 +211,78 @@ def test_lateral_position_is_continued_but_not_through_a_jump():
     assert lateral.at(0.0015) == pytest.approx(0.10075)
     lateral.receive(0.002, -0.2)
     assert lateral.at(0.0025) == -0.2
+
+
+def named(part):
+    return dict(zip([name for name, _, _ in part.observed], part.observation_values(), strict=True))
+
+
+def test_observed_velocities_and_accelerations_are_rates_of_what_they_are_named_after():
+    """Body by body, and of the roll: central differences of the one are the other."""
+    part, h = generic_part(), 1e-3
+    wander = lambda t: 0.3 * np.sin(9.0 * t)  # noqa: E731
+    drive(part, 0.2, force_at, base_at, wander)
+    before = named(part)
+    now = named(drive(part, h, force_at, base_at, wander, start=200))
+    after = named(drive(part, h, force_at, base_at, wander, start=201))
+    pairs = [(name, name.replace(".vz", ".az")) for name in now if name.endswith(".vz")]
+    pairs += [(name, name.replace(".z", ".vz")) for name in now if name.endswith(".z")]
+    pairs.append(("strip.roll", "strip.roll_rate"))
+    assert len(pairs) > 10
+    for value, rate in pairs:
+        scale = max(abs(now[rate]), 0.01 if rate.endswith(".vz") else 0.1)
+        assert (after[value] - before[value]) / (2.0 * h) == pytest.approx(now[rate], abs=0.05 * scale), value
+    assert abs(now["strip.roll_rate"]) > 0.01
+    assert any(abs(now[a] - now[b]) > 0.05 for a, b in pairs)
+
+
+def test_when_a_run_begins_is_of_no_account_and_a_snapshot_knows_it():
+    """Travel and raising count from the start; the second half goes on from a snapshot in the midst of the ramp."""
+    motions = []
+    for start in (0.0, 200.0):
+        part = MultibodyPantographPart(library("generic_multibody").with_values({"raise_duration": 0.1}))
+        part.initialise(start, 0.0, np.zeros(3), REST)
+        drive(part, 0.06, lambda t: 0.0)
+        other = MultibodyPantographPart(part.definition)
+        other.restore(part.snapshot())
+        motions.append(drive(other, 0.06, lambda t: 0.0, start=60).strip)
+    assert motions[1] == pytest.approx(motions[0], abs=1e-7)
+    assert motions[0][0, 1, 2] > 1e-3
+
+
+def test_a_pantograph_on_a_moving_roof_begins_with_its_velocity():
+    part = MultibodyPantographPart(library("generic_multibody"))
+    part.initialise(0.0, 0.0, np.zeros(3), np.array([0.03, 0.25]))
+    assert part.strip[:, 1, 2] == pytest.approx(0.25)
+    assert part.strip[:, 0, 2] == pytest.approx(part.definition.operation.reference_height + 0.03)
+    velocities = [value for name, value in named(part).items() if name.endswith(".vz")]
+    assert velocities == pytest.approx([0.25] * len(velocities))
+
+
+def test_an_accelerating_roof_is_followed_to_the_second_order():
+    """Of z = a t^2 / 2, received at the beginnings of steps: at their ends it is where it leads, by half the trend."""
+    base, h, a = BaseMotion(), 0.01, 4.0
+    base.start(REST)
+    for n in range(10):
+        base.receive(np.array([0.5 * a * (n * h) ** 2, a * n * h]), h)
+        base.finish(h)
+    np.testing.assert_allclose(base.now, [0.5 * a * (10 * h) ** 2, a * 10 * h], rtol=1e-12)
+
+
+def test_a_contact_that_goes_on_across_the_strip_goes_on_from_a_snapshot_as_well():
+    first, second = LateralExtrapolation(), LateralExtrapolation()
+    first.start(0.0, 0.1)
+    first.receive(0.001, 0.1005)
+    second.restore(first.snapshot())
+    assert second.at(0.0015) == first.at(0.0015) == pytest.approx(0.10075)
+
+
+def test_where_the_contact_lies_on_a_tilted_strip_counts_along_the_strip():
+    """Far out on a strip that rolls and yaws: along it the way is longer than across the track."""
+    part = drive(generic_part(), 0.4, lambda t: 400.0, lateral=lambda t: 0.5)
+    observed = named(part)
+    ends = part.strip[:, 0]
+    middle = ends.mean(axis=0)
+    along = (ends[0] - ends[1]) / np.linalg.norm(ends[0] - ends[1])
+    assert abs(along[2]) > 0.05
+    assert (middle + observed["strip.contact_y"] * along)[1] == pytest.approx(0.5, abs=1e-9)

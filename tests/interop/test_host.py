@@ -38,6 +38,7 @@ class Unpacked:
 
     folder: Path
     name: str
+    fmu: Path
 
     @property
     def library(self):
@@ -45,11 +46,11 @@ class Unpacked:
 
     @property
     def guid(self):
-        return fmpy.read_model_description(str(self.folder)).guid
+        return fmpy.read_model_description(str(self.fmu)).guid
 
     @property
     def references(self):
-        return {v.name: v.valueReference for v in fmpy.read_model_description(str(self.folder)).modelVariables}
+        return {v.name: v.valueReference for v in fmpy.read_model_description(str(self.fmu)).modelVariables}
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +64,7 @@ def system(packed, tmp_path_factory):
 def unpack(fmu, folder):
     with zipfile.ZipFile(fmu) as file:
         file.extractall(folder / fmu.stem)
-    return Unpacked(folder / fmu.stem, fmu.stem)
+    return Unpacked(folder / fmu.stem, fmu.stem, fmu)
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +81,15 @@ def stock(system, tmp_path_factory):
     return [unpack(build(recipe(c.fmu.path.stem), built, loader=False), folder) for c in system.components]
 
 
+def order(*words):
+    """An order of the host with words that may hold blanks."""
+    return "\x01".join(map(str, words))
+
+
 def plan(system, unpacked):
     """The host's orders."""
     pairs = zip(unpacked, system.components, strict=True)
-    lines = [f"fmu\t{u.library}\t{c.fmu.guid}\tfile://{u.folder}/resources" for u, c in pairs]
+    lines = [order("fmu", u.library, c.fmu.guid, f"file://{u.folder}/resources") for u, c in pairs]
     names = [c.name for c in system.components]
     variables = [c.fmu.variables for c in system.components]
     for i, component in enumerate(system.components):

@@ -15,7 +15,7 @@ import pytest
 from fmus.build import build, recipe
 from tests.effort import count
 from tests.fmus.support import short_line_recipe
-from tests.interop.test_host import linux, run_host, unpack
+from tests.interop.test_host import linux, order, run_host, unpack
 
 pytestmark = linux
 _PUNCTUATION = [c for c in string.punctuation if c != "/"]
@@ -59,7 +59,8 @@ def pair(tmp_path_factory):
 def _orders(folder, pair, write):
     """Orders for the host: unpack into the folder, name the resources as ``write`` does."""
     parts = [unpack(fmu, folder) for fmu in pair]
-    return "".join(f"fmu\t{p.library}\t{p.guid}\t{write(p.folder / 'resources')}\n" for p in parts) + _coupling(parts)
+    lines = [order("fmu", p.library, p.guid, write(p.folder / "resources")) + "\n" for p in parts]
+    return "".join(lines) + _coupling(parts)
 
 
 def _coupling(parts):
@@ -144,7 +145,11 @@ def expected_in_fmpy(pair, tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize("name", _sample(NAMES, 5))
+#: FMPy itself reads no model description from a path that is not UTF-8.
+_FOR_FMPY = [name for name in NAMES if "\udce4" not in name]
+
+
+@pytest.mark.parametrize("name", _sample(_FOR_FMPY, 5))
 def test_fmpy_finds_the_same_bits_at_every_path(pair, expected_in_fmpy, tmp_path, name):
     assert _in_fmpy(tmp_path / name, pair) == expected_in_fmpy
 
@@ -202,7 +207,7 @@ _SPOILT = [
 def test_a_broken_fmu_makes_no_instance_and_the_host_lives(host, pair, tmp_path, how):
     part = unpack(pair[1], tmp_path)
     text = _spoil(part, how)
-    orders = f"refuse\t{part.library}\t{part.guid}\t{_uri(part.folder / 'resources')}\n"
+    orders = order("refuse", part.library, part.guid, _uri(part.folder / "resources")) + "\n"
     _refused(run_host(host, orders, OPENPANTO_PYTHON=sys.executable), text)
 
 
@@ -224,14 +229,14 @@ def test_a_broken_fmu_makes_no_instance_and_the_host_lives(host, pair, tmp_path,
 )
 def test_a_wrong_location_is_refused_in_words(host, pair, tmp_path, location, text):
     part = unpack(pair[1], tmp_path)
-    orders = f"refuse\t{part.library}\t{part.guid}\t{location}\n"
+    orders = order("refuse", part.library, part.guid, location) + "\n"
     _refused(run_host(host, orders, OPENPANTO_PYTHON=sys.executable), text)
 
 
 @pytest.mark.parametrize("guid", ["00000000-0000", "-"])
 def test_a_wrong_guid_is_refused_in_words(host, pair, tmp_path, guid):
     part = unpack(pair[1], tmp_path)
-    orders = f"refuse\t{part.library}\t{guid}\t{_uri(part.folder / 'resources')}\n"
+    orders = order("refuse", part.library, guid, _uri(part.folder / "resources")) + "\n"
     _refused(run_host(host, orders, OPENPANTO_PYTHON=sys.executable), "is not that of the FMU in")
 
 
@@ -239,7 +244,7 @@ def test_a_missing_package_is_named(host, pair, tmp_path):
     """numpy is there, scipy is not: found when the code is loaded or before."""
     shutil.copytree(Path(sys.prefix), tmp_path / "env", symlinks=True, ignore=shutil.ignore_patterns("lib*"))
     part = unpack(pair[1], tmp_path)
-    orders = f"refuse\t{part.library}\t{part.guid}\t{_uri(part.folder / 'resources')}\n"
+    orders = order("refuse", part.library, part.guid, _uri(part.folder / "resources")) + "\n"
     python = tmp_path / "env" / "bin" / "python"
     _refused(run_host(host, orders, OPENPANTO_PYTHON=str(python)), "lacks the packages numpy and scipy")
 
@@ -247,7 +252,8 @@ def test_a_missing_package_is_named(host, pair, tmp_path):
 def test_an_initialisation_that_fails_is_an_error(host, pair, tmp_path):
     part = unpack(pair[0], tmp_path)
     reference = part.references["contact_wire.tension"]
-    orders = f"fmu\t{part.library}\t{part.guid}\t{_uri(part.folder / 'resources')}\nparameter 0 {reference} 1.0\n"
+    orders = order("fmu", part.library, part.guid, _uri(part.folder / "resources"))
+    orders += f"\nparameter 0 {reference} 1.0\n"
     done = run_host(host, orders + "run 2 0.001\n", OPENPANTO_PYTHON=sys.executable)
     assert done.returncode == 1
     assert "no static equilibrium of the wanted shape" in done.stderr

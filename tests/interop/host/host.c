@@ -1,7 +1,7 @@
 /* A small FMI 2.0 host in plain C, which drives FMUs as a tool does that is not Python.
  *
  * It reads a plan on standard input, one order a line:
- *     fmu LIBRARY GUID RESOURCES          the next FMU; tabs between, for paths may hold blanks
+ *     fmu LIBRARY GUID RESOURCES          the next FMU; byte 1 between, for paths hold anything else
  *     refuse LIBRARY GUID RESOURCES       an FMU that is to make no instance ("-": NULL); says what it made, twice
  *     parameter FMU REFERENCE VALUE
  *     connect FMU OUTPUT FMU INPUT        FMUs count from 0
@@ -127,9 +127,9 @@ static void read_plan(void) {
         Parameter *p = &parameters[parameter_count];
         Wire *w = &wires[wire_count];
         Place *o = &places[place_count];
-        if (sscanf(line, "fmu\t%4095[^\t]\t%127[^\t]\t%4095[^\n]", path, f->guid, f->resources) == 3)
+        if (sscanf(line, "fmu\1%4095[^\1]\1%127[^\1]\1%4095[^\n]", path, f->guid, f->resources) == 3)
             load(f, path), fmu_count++;
-        else if (sscanf(line, "refuse\t%4095[^\t]\t%127[^\t]\t%4095[^\n]", path, f->guid, f->resources) == 3)
+        else if (sscanf(line, "refuse\1%4095[^\1]\1%127[^\1]\1%4095[^\n]", path, f->guid, f->resources) == 3)
             load(f, path), refuse(f), refuse(f), exit(0);
         else if (sscanf(line, "parameter %d %u %lf", &p->fmu, &p->reference, &p->value) == 3) parameter_count++;
         else if (sscanf(line, "connect %d %u %d %u", &w->from, &w->output, &w->to, &w->input) == 4) wire_count++;

@@ -426,8 +426,9 @@ static int start_python(const char *executable, const char *home, Problem *probl
     void (*set_name)(const wchar_t *) = (void (*)(const wchar_t *))find_in_process("Py_SetProgramName");
     void (*set_home)(const wchar_t *) = (void (*)(const wchar_t *))find_in_process("Py_SetPythonHome");
     void *(*release)(void) = (void *(*)(void))find_in_process("PyEval_SaveThread");
+    void *(*import)(const char *) = (void *(*)(const char *))find_in_process("PyImport_ImportModule");
     if (!prepare || !preinitialize || !configure || !initialize || !clear || !is_exception || !set_name || !set_home ||
-        !release)
+        !release || !import)
         return fail(problem, "the Python library of %s lacks functions that the FMU needs; take Python 3.11 to 3.14",
                     executable);
     PreConfig before;
@@ -447,8 +448,12 @@ static int start_python(const char *executable, const char *home, Problem *probl
     memset(&config, 0, sizeof config);
     configure(&config);
     config.install_signal_handlers = 0; /* they are the host's */
+    platform_keep_interrupt();
     status = initialize(&config);
     clear(&config);
+    /* This module takes SIGINT as it is first imported, whatever was configured; so that is now. */
+    if (!is_exception(status)) import("_signal");
+    platform_restore_interrupt();
     if (is_exception(status))
         return fail(problem, "Python does not start: %s", status.message ? status.message : "no reason given");
     release(); /* whoever needs Python from now on takes its lock */

@@ -36,6 +36,10 @@ char *platform_ask(const char *program, const char *text);
 char *platform_alias(const char *folder, int *handle);
 void platform_close_alias(int handle);
 
+/* Remember how the process takes an interrupt from the keyboard, and make it so again. */
+void platform_keep_interrupt(void);
+void platform_restore_interrupt(void);
+
 /* Decode UTF-8 for functions of Python that want wide characters; never freed, as Python keeps it. */
 wchar_t *platform_wide(const char *text);
 

@@ -123,6 +123,12 @@ void platform_close_alias(int handle) {
     if (handle >= 0) close(handle);
 }
 
+static struct sigaction interrupt;
+
+void platform_keep_interrupt(void) { sigaction(SIGINT, NULL, &interrupt); }
+
+void platform_restore_interrupt(void) { sigaction(SIGINT, &interrupt, NULL); }
+
 wchar_t *platform_wide(const char *text) {
     /* By hand: what mbstowcs makes of it depends on the locale, which is the host's. Bytes that are no UTF-8 become
      * what Python calls surrogate escapes. */

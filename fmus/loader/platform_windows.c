@@ -1,6 +1,7 @@
 /* See platform.h. */
 #include "platform.h"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <windows.h>
@@ -162,3 +163,14 @@ char *platform_alias(const char *folder, int *handle) {
 }
 
 void platform_close_alias(int handle) { (void)handle; }
+
+static void (*interrupt)(int);
+
+void platform_keep_interrupt(void) {
+    interrupt = signal(SIGINT, SIG_IGN);
+    platform_restore_interrupt();
+}
+
+void platform_restore_interrupt(void) {
+    if (interrupt != SIG_ERR) signal(SIGINT, interrupt);
+}

@@ -50,8 +50,6 @@ _WINDOWS_OPTIONS: Final = (
     "-static-libgcc",
     "-s",
 )
-#: Not to be unloaded: pythonfmu's library stays in the process as well, and so their place can be used again.
-#: libdl and libpthread are part of libc from glibc 2.34 on; older ones have dlopen in libdl.
 _OPTIONS: Final = (
     "-std=gnu11",
     "-shared",
@@ -62,6 +60,8 @@ _OPTIONS: Final = (
     "-Wextra",
     "-Wno-unused-parameter",
 )
+#: Not to be unloaded: pythonfmu's library stays in the process as well, and so their place can be used again.
+#: libdl and libpthread are part of libc from glibc 2.34 on; older ones have dlopen in libdl.
 _LIBRARIES: Final = ("-Wl,-z,nodelete", "-Wl,--no-as-needed", "-l:libdl.so.2", "-lpthread")
 _VERSION: Final = re.compile(rb"\0(GLIBC|GLIBCXX)_(\d+(?:\.\d+)+)(?=\0)")
 

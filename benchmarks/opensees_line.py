@@ -149,12 +149,13 @@ class OpenSeesLine:
                 ops.mass(node, mass, mass, mass, 0.0, 0.0, 0.0)
 
     def _beams(self) -> None:
-        """Create wires and steady arms; as in our model the arms have no geometric stiffness."""
+        """Create wires and steady arms; both are held back across their axes by their tension, if ours are."""
         mesh, definition = self.model.mesh, self.model.definition
         properties = beam_properties(definition, mesh)
         _, length = self._frames()
         ops.geomTransf("PDelta", _TRANSFORMATION_WIRE, 0.0, 0.0, 1.0)
-        ops.geomTransf("Linear", _TRANSFORMATION_ARM, 0.0, 0.0, 1.0)
+        swing = definition.dynamics.geometric_stiffness
+        ops.geomTransf("PDelta" if swing else "Linear", _TRANSFORMATION_ARM, 0.0, 0.0, 1.0)
         for k, (i, j) in enumerate(mesh.beams.tolist()):
             tension, EI = float(properties.tension[k]), float(properties.EI[k])
             E = getattr(definition, COMPONENTS[mesh.component[k]]).youngs_modulus
@@ -170,7 +171,11 @@ class OpenSeesLine:
                 ops.element("elasticBeamColumn", k, i, j, *section, transformation, *mass)
 
     def _droppers(self) -> None:
-        """Create the droppers: trusses strained at rest by their static force, with consistent mass."""
+        """Create the droppers: trusses strained at rest by their static force, with consistent mass.
+
+        Where ours are held back across their axes, springs N/L do it, in x and y: droppers hang nearly upright.
+        Corotational trusses would too, but do not find the equilibrium from wires that are only being stretched.
+        """
         mesh, static, definition = self.model.mesh, self.model.static, self.model.definition
         stiffness = dropper_stiffness(definition, mesh, static.positions)
         ratio = compression_ratio(definition, mesh)
@@ -183,6 +188,17 @@ class OpenSeesLine:
             ops.uniaxialMaterial("InitStrainMaterial", tag + 1, tag, float(static.elastic_force[j]) / EA)
             mass = ("-rho", float(per_length[j]), "-cMass", 1, "-doRayleigh", 1)
             ops.element("Truss", len(mesh.beams) + j, lower, upper, 1.0, tag + 1, *mass)
+
+        if definition.dynamics.geometric_stiffness:
+            self._swing(2 * len(mesh.droppers) + 1, len(mesh.beams) + len(mesh.droppers))
+
+    def _swing(self, material: int, element: int) -> None:
+        """Hold droppers back across their axes; the first tags of materials and elements that are free are given."""
+        mesh, static = self.model.mesh, self.model.static
+        for j, (lower, upper) in enumerate(mesh.droppers.tolist()):
+            ops.uniaxialMaterial("Elastic", material + j, max(static.dropper_force[j], 0.0) / static.dropper_length[j])
+            materials = (material + j, material + j)
+            ops.element("zeroLength", element + j, lower, upper, "-mat", *materials, "-dir", 1, 2)
 
     def _stretch(self) -> None:
         """Stretch the wires by their tension: their nodes move along the track, and with them the arms' far ends."""
@@ -201,6 +217,7 @@ class OpenSeesLine:
         moved |= {end: moved[node] for end, node in mesh.arms.tolist()}
         for node, value in moved.items():
             ops.setNodeDisp(node, 1, value, "-commit")
+        self._moved = moved
 
     def _weight(self) -> None:
         """Apply our static load but for the tension, which here is inside the elements."""
@@ -211,8 +228,18 @@ class OpenSeesLine:
         np.add.at(load[:, :3], mesh.beams[:, 1], pull)
         ops.timeSeries("Constant", _WEIGHT)
         ops.pattern("Plain", _WEIGHT, _WEIGHT)
+        if self.model.definition.dynamics.geometric_stiffness:
+            self._upright(load)
         for node, values in enumerate(load.tolist()):
             ops.load(node, *values)
+
+    def _upright(self, load: FloatArray) -> None:
+        """Let droppers hang upright between the stretched wires: the springs across them count from there."""
+        mesh, static = self.model.mesh, self.model.static
+        for j, (lower, upper) in enumerate(mesh.droppers.tolist()):
+            pull = static.dropper_force[j] / static.dropper_length[j] * (self._moved[upper] - self._moved[lower])
+            load[lower, 0] -= pull
+            load[upper, 0] += pull
 
     def _settle(self) -> None:
         """Find the equilibrium, from which time begins."""
@@ -312,7 +339,7 @@ class OpenSeesLine:
         ops.analysis("Transient", "-noWarnings")
 
     def _damp(self, stiffness: str) -> None:
-        """Damp each component; a dropper that is slack goes on damping, as in our model."""
+        """Damp each component; a dropper that is slack goes on damping, as in our model by the law "elastic_only"."""
         mesh, damping = self.model.mesh, self.model.definition.damping
         rayleigh = beam_properties(self.model.definition, mesh)
         alpha, beta = float(rayleigh.alpha[0]), float(rayleigh.beta[0])
@@ -356,3 +383,6 @@ def _check(model: CatenaryModel) -> None:
         raise NotImplementedError("lines with stitch wires or elastic supports are not translated for OpenSees")
     if np.ptp(beams.alpha) > 0.0 or np.ptp(beams.beta) > 0.0:
         raise NotImplementedError("lines whose beams are damped differently are not translated for OpenSees")
+    hung = [item for item in (definition.dropper, definition.hanger) if item is not None]
+    if any(item.slack_law != "elastic_only" for item in hung) and definition.damping.of("dropper").alpha > 0.0:
+        raise NotImplementedError("slack droppers keep their dampers in OpenSees: take slack_law = \"elastic_only\"")

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from fmus.adapter import Adapter
 from fmus.ports import Port, Ports, Signal, energy_ports, vector
-from models.catenary.limits import slack_warning, speed_warning, step_warning
+from models.catenary.limits import slack_law_warning, slack_warning, speed_warning, step_warning
 from models.catenary.parameters import CatenaryDefinition, load
 from models.catenary.part import CatenaryPart
 from models.part import FloatArray
@@ -35,6 +35,11 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Displacements are small against the spans: geometry is linearised about the static shape.",
+        "Droppers and steady arms are held back across their axes by their tension at rest, unless "
+        "dynamics.geometric_stiffness is 0; a dropper that goes slack in the run keeps that, an error of second order "
+        "in a lateral force.",
+        "What a slack dropper does is the definition's slack_law: with tension it carries nothing, with elastic_only, "
+        "the form of the 2012 thesis, its damper goes on acting, beside the elastic force that dropper[...].force is.",
         "The contact is unilateral, without friction along the strip.",
         "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
@@ -56,7 +61,13 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
             local=(_dropper_port(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
-            calculated=(*_geometry_ports(part), *_section_ports(part), *_period_ports(part), _wave_port()),
+            calculated=(
+                *_geometry_ports(part),
+                *_section_ports(part),
+                *_period_ports(part),
+                _wave_port(),
+                _elasticity_port(),
+            ),
         )
 
     def _initialise(self, part: CatenaryPart, time: float, inputs: FloatArray) -> None:
@@ -68,6 +79,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     def _doubts(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
         along_track = inputs.reshape(self.pantographs, 2, 2, 3)[:, :, 1, 0]
         yield slack_warning(part.droppers, part.model.static.dropper_force)
+        yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 
     def _step_doubt(self, part: CatenaryPart, step: float) -> str:
@@ -168,6 +180,15 @@ def _period_ports(part: CatenaryPart) -> tuple[Port, ...]:
 def _wave_port() -> Port:
     signal = Signal("contact_wire.wave_speed", "m/s", "speed of transverse waves in the contact wire, longest span")
     return Port((signal,), attrgetter("contact_wire_wave_speed"))
+
+
+def _elasticity_port() -> Port:
+    text = "static uplift per force under 100 N in the middle span"
+    signals = (
+        Signal("elasticity.mid_span", "m/N", f"{text}, at its middle"),
+        Signal("elasticity.support", "m/N", f"{text}, at its first support"),
+    )
+    return Port(signals, attrgetter("elasticity"))
 
 
 def _length_port(thing: str, count: int, name: str, attribute: str, text: str) -> Port:

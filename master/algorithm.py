@@ -145,7 +145,8 @@ class Iterative:
         end = start.copy()
         for _ in range(self._max_iterations):
             self.iterations += 1
-            network.gather((1.0 - self._weight) * start + self._weight * end)
+            mean = (1.0 - self._weight) * start + self._weight * end
+            network.gather(np.where(network.is_discrete, end, mean))
             self._attempt(network, time, step)
             change = self._change(network.outputs, end)
             if change.max(initial=0.0) <= self._tolerance:

@@ -274,6 +274,9 @@ def _check_serialisable(system: System, option: str) -> None:
     cannot = [c.name for c in system.components if not c.fmu.can_serialise]
     if cannot:
         raise UsageError(f"{option}: the FMU of {', '.join(cannot)} cannot serialise its state")
+    texts = [f"{c.name}.{name}" for c in system.components for name in c.texts]
+    if texts:
+        raise UsageError(f"{option}: '{texts[0]}' is a text that is exchanged, which a checkpoint cannot hold")
 
 
 def take(
@@ -386,7 +389,7 @@ def _unpack_body(header: dict[str, Any], raw: bytes) -> Checkpoint:
 
 
 def _identity(component: Component) -> dict[str, Any]:
-    return {"guid": component.fmu.guid, "parameters": component.parameters}
+    return {"guid": component.fmu.guid, "parameters": component.parameters, "tolerance": component.tolerance}
 
 
 def _differences(component: Component, saved: dict[str, Any] | None) -> list[str]:
@@ -395,6 +398,10 @@ def _differences(component: Component, saved: dict[str, Any] | None) -> list[str
         return [f"it holds no component '{name}' (--renew {name} starts it anew)"]
     if saved["guid"] != component.fmu.guid:
         return [f"the FMU of '{name}' is another one now (--renew {name} starts it anew)"]
+    told = (saved.get("tolerance"), component.tolerance)
+    if told[0] != told[1]:
+        was, now_is = ("none" if value is None else f"{value:g}" for value in told)
+        return [f"the tolerance that '{name}' is told was {was}, is {now_is} (--renew {name} starts it anew)"]
     now, then = component.parameters, saved["parameters"]
     changed = sorted(n for n in {*now, *then} if now.get(n) != then.get(n))
     return [

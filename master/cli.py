@@ -9,7 +9,7 @@ import argparse
 import math
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +28,7 @@ from master.results import Results
 from master.run import Manner, run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.ssp.annotation import SCHEMES, Calibration
-from master.ssp.archive import SSD_NAME, Package
+from master.ssp.archive import SSD_NAME, Package, Sources
 from master.ssp.pack import pack
 from master.ssp.ssd import read_structure
 from master.ssp.xml import Reader
@@ -79,7 +79,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     _add_run(verbs)
-    _add(verbs, "validate", "check a scenario without running it", _validate, scenario=True)
+    checking = _add(verbs, "validate", "check a scenario without running it", _validate, scenario=True)
+    _add_overrides(checking)
+    _add_tolerance(checking)
     packing = _add(verbs, "pack", "write a scenario as a .ssp archive, FMUs included", _pack, scenario=True)
     packing.add_argument("--out", type=Path, metavar="FILE", help="default: dist/NAME.ssp")
     packing.add_argument(
@@ -107,6 +109,7 @@ def _add(verbs: Any, name: str, text: str, verb: Callable[..., int], scenario: b
 def _add_run(verbs: Any) -> None:
     parser = _add(verbs, "run", "run a scenario", _run, scenario=True)
     _add_overrides(parser)
+    _add_tolerance(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="results folder, default: results/NAME")
     parser.add_argument("--quiet", action="store_true", help="no progress bar, no tables")
     parser.add_argument("--no-report", action="store_true", help="no plots, no report.html")
@@ -140,7 +143,21 @@ def _add_run(verbs: Any) -> None:
     )
 
 
+def _add_tolerance(parser: argparse.ArgumentParser) -> None:
+    text = "relative tolerance for all FMUs, default: that of their default experiments"
+    parser.add_argument("--tolerance", dest="fmu_tolerance", type=_positive, metavar="R", help=text)
+
+
 def _add_overrides(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--strict", action="store_true", help="warnings of the scenario are errors")
+    parser.add_argument(
+        "--allow-outside",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="DIR",
+        help="the scenario may name files in this folder outside of it, such as FMUs that scenarios share",
+    )
     parser.add_argument("--stop", type=_number, metavar="T", help="stop time [s]")
     parser.add_argument("--step", type=_positive, metavar="H", help="macro step [s]")
     parser.add_argument("--scheme", choices=SCHEMES, help="coupling scheme")
@@ -193,7 +210,19 @@ def _assignment(text: str) -> tuple[str, str]:
 
 
 def _overrides(options: argparse.Namespace) -> Overrides:
-    return Overrides(options.stop, options.step, options.scheme, dict(options.set))
+    outside = tuple(options.allow_outside)
+    for folder in outside:
+        if not folder.is_dir():
+            raise MasterError(f"--allow-outside {folder}: there is no such folder")
+    return Overrides(
+        options.stop,
+        options.step,
+        options.scheme,
+        dict(options.set),
+        tolerance=getattr(options, "fmu_tolerance", None),
+        strict=options.strict,
+        outside=outside,
+    )
 
 
 def _tell(text: str, console: Console | None = None) -> None:
@@ -207,6 +236,7 @@ def _run(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, overrides, tell, not options.no_build) as scenario:
         folder = _folder(options, scenario.system)
         _protect(folder, scenario.package)
+        _tell_warnings(scenario.system, tell)
         try:
             done = _run_shown(scenario.system, folder, options.quiet, manner)
         except RunError:
@@ -303,7 +333,9 @@ def _show(done: Results) -> None:
         console.print(report.figures_table([a.quality for a in assessments], heads))
     for assessment in assessments:
         console.print(report.verdict_table(assessment))
-    if not assessments:
+    if not report.has_contacts(done):
+        console.print(report.outputs_table(done))
+    elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
     if line := report.uplift_line(done):
         console.print(line)
@@ -325,6 +357,8 @@ def _closing_lines(done: Results) -> list[str]:
         for p in done.summary["interface_power"]
     ]
     lines += _energy_lines(done.summary["energy"])
+    if tolerance := _told_tolerance({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
+        lines.append(tolerance.removeprefix(", "))
     return [*lines, *_punctuality_lines(performance.get("real_time")), f"results in {done.folder}"]
 
 
@@ -351,18 +385,38 @@ def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
 
 
 def _validate(options: argparse.Namespace) -> int:
-    with open_scenario(options.scenario, tell=_tell, build=not options.no_build, is_check=True) as scenario:
+    with open_scenario(
+        options.scenario, _overrides(options), _tell, build=not options.no_build, is_check=True
+    ) as scenario:
         system = scenario.system
+        _tell_warnings(system, _tell)
         counts = f"{len(system.components)} components, {len(system.connections)} connections"
         times = f"{system.start:g} s to {system.stop:g} s in steps of {system.step:g} s"
         for text in limits.warnings(system):
             _tell(f"warning: {text}")
-        print(f"{system.name}: valid; {counts}, {times}, {system.settings.coupling.scheme}")
+        tolerance = _told_tolerance({c.name: c.tolerance for c in system.components})
+        print(f"{system.name}: valid; {counts}, {times}, {system.settings.coupling.scheme}{tolerance}")
     return 0
+
+
+def _tell_warnings(system: System, tell: Callable[[str], None]) -> None:
+    for text in system.warnings:
+        tell(f"warning: {text}")
+
+
+def _told_tolerance(told: Mapping[str, float | None]) -> str:
+    """Return in words which tolerance the FMUs are told, by their components' names; empty if none is."""
+    values = set(told.values())
+    if values <= {None}:
+        return ""
+    if len(values) == 1:
+        return f", tolerance {values.pop():g} for all FMUs"
+    return ", tolerance " + ", ".join(f"{value:g} for {name}" for name, value in told.items() if value is not None)
 
 
 def _pack(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, tell=_tell, build=not options.no_build) as scenario:
+        _tell_warnings(scenario.system, _tell)
         archive = options.out or Path("dist") / f"{scenario.system.name}.ssp"
         if archive.is_dir():
             raise UsageError(f"{archive} is a folder; choose another name with --out")
@@ -384,6 +438,7 @@ def _runtime(folder: Path) -> Path:
 def _calibrate(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
         system = scenario.system
+        _tell_warnings(system, _tell)
         task = _task(options, system)
         place = None if options.dry_run or options.set else _place(scenario.package, task.parameter)
         found = calibrate.find_value(
@@ -443,7 +498,7 @@ def _place(package: Package, parameter: str) -> tuple[Path, str]:
     """Return the ``.ssv`` file that holds a parameter, and its name there."""
     if not package.writable:
         raise UsageError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
-    structure = read_structure(package.root, Reader(SSD_NAME))
+    structure = read_structure(Sources(package.root), Reader(SSD_NAME))
     for c in structure.components:
         for binding in c.bindings:
             for p in binding.parameters.parameters:

@@ -13,6 +13,7 @@ from typing import Any, Final
 import fmpy
 
 from master.ssp.archive import read_member
+from master.ssp.units import BASE_UNITS, Unit
 from master.ssp.xml import XmlError, safe_root
 from master.system import Fmu, Variable
 
@@ -58,6 +59,8 @@ def read_fmu(path: Path) -> Fmu:
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         tool=description.generationTool or "",
         can_serialise=bool(description.coSimulation.canSerializeFMUstate),
+        units=_units(description.unitDefinitions, f"{path.name} ({_DESCRIPTION})"),
+        tolerance=_tolerance(description.defaultExperiment),
     )
 
 
@@ -70,6 +73,32 @@ def lacking_binary(path: Path, identifier: str) -> str:
     folders = sorted({name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1})
     held = f"binaries for {' and '.join(folders)} only" if folders else "no binaries"
     return f"holds {held}; this machine needs one for {fmpy.platform}"
+
+
+def _tolerance(experiment: Any | None) -> float | None:
+    """Return the relative tolerance of the default experiment, None if it has none that means anything."""
+    try:
+        value = float(experiment.tolerance) if experiment is not None and experiment.tolerance is not None else 0.0
+    except ValueError:
+        return None
+    return value if 0.0 < value < math.inf else None
+
+
+def _units(defined: Sequence[Any], file: str) -> dict[str, Unit]:
+    """Return the units that an FMU defines in SI units; of others it tells no more than the name."""
+    found = {}
+    for unit in defined or ():
+        base = unit.baseUnit
+        if base is None:
+            continue
+        try:
+            dimension = tuple(int(getattr(base, name) or 0) for name in BASE_UNITS)
+            factor, offset = (float(default if v is None else v) for v, default in ((base.factor, 1), (base.offset, 0)))
+        except ValueError:
+            continue
+        if factor and math.isfinite(factor) and math.isfinite(offset):
+            found[unit.name] = Unit(unit.name, dimension, factor, offset, file)  # type: ignore[arg-type]
+    return found
 
 
 def _check_variables(root: Any) -> None:
@@ -102,7 +131,17 @@ def _variable(v: Any) -> Variable:
         minimum=_limit(v, "min"),
         maximum=_limit(v, "max"),
         description=v.description or "",
+        initial=v.initial or "",  # FMPy knows the defaults of the standard
+        items=_items(v),
     )
+
+
+def _items(v: Any) -> tuple[tuple[str, int], ...]:
+    items = getattr(v.declaredType, "items", None) or ()
+    try:
+        return tuple((item.name, int(item.value)) for item in items) if v.type == "Enumeration" else ()
+    except ValueError:
+        raise ValueError(f"declares an item of the enumeration '{v.declaredType.name}' that is no number") from None
 
 
 def _limit(v: Any, name: str) -> float | None:

@@ -18,6 +18,7 @@ from fmpy.fmi2 import FMU2Slave
 from master import fmi_log
 from master.arrays import FloatArray
 from master.errors import SlaveError, one_line
+from master.fmu.typed_values import TypedValues
 from master.ssp.ssv import Value
 from master.system import Component, Variable
 from master.unpacked import Unpacked
@@ -58,7 +59,7 @@ class Cautious(Protocol):
 
 
 class Group:
-    """Real variables of an instance that are read or written with one call.
+    """Variables of an instance that are read or written with one call if all are Real, with one for every type else.
 
     Attributes
     ----------
@@ -77,15 +78,25 @@ class Group:
         self._arguments = (c_void_p(instance.handle), self._references, c_size_t(n), self._buffer)
         self._get, self._set = instance.bare_function("fmi2GetReal"), instance.bare_function("fmi2SetReal")
         self._instance = instance
+        kinds = [instance.component.fmu.variables[name].type for name in names]
+        self._typed = (
+            None
+            if all(kind == "Real" for kind in kinds)
+            else TypedValues(kinds, references, self.values, instance.exchange)
+        )
 
     def read(self) -> None:
         """Fill `values` from the FMU."""
-        if self.names and (status := self._get(*self._arguments)) > _WARNING:
+        if self._typed is not None:
+            self._typed.read()
+        elif self.names and (status := self._get(*self._arguments)) > _WARNING:
             raise self._instance.error("reading its variables", status)
 
     def write(self) -> None:
         """Set the FMU's variables to `values`."""
-        if self.names and (status := self._set(*self._arguments)) > _WARNING:
+        if self._typed is not None:
+            self._typed.write()
+        elif self.names and (status := self._set(*self._arguments)) > _WARNING:
             raise self._instance.error("setting its inputs", status)
 
 
@@ -133,6 +144,17 @@ class Instance:
         function: Callable[..., int] = self._fmu.dll[name]
         return function
 
+    def exchange(self, function: str, references: Any, count: int, buffer: Any) -> None:
+        """Read or write variables of one type with an FMI function.
+
+        Raises
+        ------
+        SlaveError
+            If the FMU refuses.
+        """
+        doing = "setting its inputs" if function.startswith("fmi2Set") else "reading its variables"
+        self._call(doing, function, references, count, buffer)
+
     def group(self, names: Sequence[str]) -> Group:
         """Return a group for further variables, e.g. for recording."""
         return Group(self, names)
@@ -145,7 +167,9 @@ class Instance:
     def start(self, start: float, stop: float) -> None:
         """Set up the experiment, set the parameters, enter initialization mode."""
         self.time = start
-        self._call("setting up the experiment", "fmi2SetupExperiment", 0, 0.0, start, 1, stop)
+        tolerance = self.component.tolerance
+        told = (0, 0.0) if tolerance is None else (1, tolerance)
+        self._call("setting up the experiment", "fmi2SetupExperiment", *told, start, 1, stop)
         for name, value in self.component.parameters.items():
             self._set(self.component.fmu.variables[name], value)
         self._call("entering initialization", "fmi2EnterInitializationMode")

@@ -6,12 +6,12 @@ functions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
-from master.arrays import FloatArray, IntArray
+from master.arrays import BoolArray, FloatArray, IntArray
 from master.errors import RunError
 from master.system import Connection
 
@@ -66,6 +66,8 @@ class Network:
         The components.
     connections : sequence of Connection
         Wires; every input has exactly one.
+    discrete : collection of str
+        Outputs that are not Real, between whose values there is nothing.
 
     Attributes
     ----------
@@ -77,14 +79,19 @@ class Network:
         ``component.variable`` for each entry.
     is_plain : bool
         Whether no wire converts what passes through it.
+    is_discrete : ndarray, shape (n_outputs,)
+        Which outputs are not Real.
     """
 
-    def __init__(self, slaves: Sequence[Slave], connections: Sequence[Connection]) -> None:
+    def __init__(
+        self, slaves: Sequence[Slave], connections: Sequence[Connection], discrete: Collection[str] = ()
+    ) -> None:
         self.slaves = tuple(slaves)
         self.input_names = tuple(f"{s.name}.{n}" for s in slaves for n in s.input_names)
         self.output_names = tuple(f"{s.name}.{n}" for s in slaves for n in s.output_names)
         self.inputs: FloatArray = np.zeros(len(self.input_names))
         self.outputs: FloatArray = np.zeros(len(self.output_names))
+        self.is_discrete: BoolArray = np.array([name in discrete for name in self.output_names], dtype=np.bool_)
         self._factor: FloatArray = np.ones_like(self.inputs)
         self._offset: FloatArray = np.zeros_like(self.inputs)
         self._from: IntArray = np.zeros(len(self.inputs), dtype=np.intp)

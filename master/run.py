@@ -185,7 +185,7 @@ def loaded(system: System, isolation: Isolation | None = None) -> Iterator[Netwo
             # One by one: those loaded so far must be freed on failure.
             instance = Instance(component) if isolation is None else IsolatedInstance(component, isolation)
             instances.append(instance)
-        yield Network(instances, system.connections)
+        yield Network(instances, system.connections, system.discrete)
     finally:
         for instance in reversed(instances):
             instance.close()
@@ -194,8 +194,8 @@ def loaded(system: System, isolation: Isolation | None = None) -> Iterator[Netwo
 def recording_plans(system: System) -> tuple[Plan, ...]:
     """Return what is recorded how often besides the exchanged outputs; the plan for every step comes first.
 
-    Exchanged outputs are always recorded at every step, all other Real outputs too unless an entry of the
-    settings says otherwise, and local variables only if an entry names them.
+    Exchanged outputs are always recorded at every step, all other outputs too unless an entry of the settings says
+    otherwise, and local variables only if an entry names them; texts are not recorded.
     """
     by_rate: dict[int, dict[str, list[str]]] = {1: {}}
     for component in system.components:
@@ -208,7 +208,7 @@ def recording_plans(system: System) -> tuple[Plan, ...]:
 
 def _steps_between_rows(component: Component, variable: Variable, system: System) -> int:
     """Return how often a variable is recorded, 0 for never (or with the exchanged ones)."""
-    if variable.type != "Real" or variable.causality not in _MEASURED or variable.name in component.outputs:
+    if variable.type == "String" or variable.causality not in _MEASURED or variable.name in component.outputs:
         return 0
     record = _last_match(f"{component.name}.{variable.name}", system.settings.records)
     if record is None:
@@ -320,6 +320,7 @@ class _Session:
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
             "warnings": [asdict(w) for w in self._cautions.warnings],
+            "scenario_warnings": list(self._system.warnings),
         }
         results.write_json(self._folder / results.SUMMARY, summary)
         return replace(done, summary=summary)
@@ -354,7 +355,7 @@ def _recorder(
     system: System, network: Network, plan: Plan, folder: Path, made: int | None, is_steady: bool
 ) -> Recorder:
     """Return the recorder of a plan; ``made`` are the steps whose rows are in its file already."""
-    sources = [Source(network.output_names, network.outputs)] if plan.every == 1 else []
+    sources = [_exchanged(system, network)] if plan.every == 1 else []
     units: dict[str, str] = {}
     for component, slave in zip(system.components, network.slaves, strict=True):
         units |= {f"{component.name}.{v.name}": v.unit for v in component.fmu.variables.values()}
@@ -364,6 +365,20 @@ def _recorder(
             sources.append(Source([f"{component.name}.{n}" for n in names], group.values, group.read))
     keep = 0 if made is None else made // plan.every + 1
     return Recorder(folder / recording_name(plan, system.step), sources, units, plan.every, keep, is_steady)
+
+
+def _exchanged(system: System, network: Network) -> Source:
+    """Return the exchanged outputs as a source; of texts there is no column."""
+    texts = {f"{c.name}.{n}" for c in system.components for n in c.texts}
+    places = [i for i, name in enumerate(network.output_names) if name not in texts]
+    if len(places) == len(network.output_names):
+        return Source(network.output_names, network.outputs)
+    values = network.outputs[places]
+
+    def read() -> None:
+        values[:] = network.outputs[places]
+
+    return Source([network.output_names[i] for i in places], values, read)
 
 
 def _last_match(name: str, records: Sequence[Record]) -> Record | None:
@@ -398,6 +413,7 @@ def _component(component: Component) -> dict[str, Any]:
         "sha256": fmu.sha256,
         "tool": fmu.tool,
         "parameters": component.parameters,
+        "tolerance": component.tolerance,
         "inputs": [_input(component, v) for v in fmu.variables.values() if v.causality == "parameter"],
     }
 

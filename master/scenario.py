@@ -15,10 +15,12 @@ from master.errors import Problem, ScenarioError, UsageError
 from master.fmu_file import lacking_binary, read_fmu
 from master.pattern import matcher
 from master.ssp.annotation import DEFAULT_RECORDS, Record, RunSettings, Scheme
-from master.ssp.archive import SSD_NAME, Package, inside, open_package
+from master.ssp.archive import SSD_NAME, Package, Sources, open_package
 from master.ssp.elements import Component as SsdComponent
-from master.ssp.ssd import Structure, read_structure
-from master.ssp.validation import Checker, out_of_range, settable
+from master.ssp.ssd import EMPTY, Structure, read_structure
+from master.ssp.ssm import NOTE
+from master.ssp.start_values import out_of_range, settable
+from master.ssp.validation import Checker
 from master.ssp.xml import Reader
 from master.system import Component, Fmu, System, Variable
 
@@ -45,6 +47,12 @@ class Overrides:
         Values as text by ``component.parameter``, in the FMU's own units.
     energy : bool
         Whether every FMU that can is to keep its energy balance, and that is to be recorded.
+    tolerance : float, optional
+        Relative tolerance for all FMUs, instead of that of their default experiments.
+    strict : bool
+        Whether a warning is a problem.
+    outside : tuple of Path
+        Folders outside the scenario whose files it may name.
     """
 
     stop: float | None = None
@@ -52,6 +60,9 @@ class Overrides:
     scheme: Scheme | None = None
     parameters: Mapping[str, str] = field(default_factory=dict)
     energy: bool = False
+    tolerance: float | None = None
+    strict: bool = False
+    outside: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -108,20 +119,27 @@ def load_system(
 ) -> System:
     """Read and check the files of ``package``; FMUs are built into ``scratch`` if there is one."""
     reader = Reader(SSD_NAME)
-    structure = read_structure(package.root, reader)
+    sources = Sources(package.root, overrides.outside)
+    structure = read_structure(sources, reader)
+    if structure is EMPTY:  # without it everything would be missing
+        raise ScenarioError(reader.problems)
     provision = _Provision(build and package.writable, tell, scratch)
-    fmus = _fmus(package, structure.components, reader.problems, provision)
-    checker = Checker(structure, fmus, reader.problems)
+    fmus = _fmus(sources, structure.components, reader.problems, provision)
+    checker = Checker(structure, fmus, reader.problems, reader.warnings)
     connections = checker.connections()
     components = checker.components(connections)
     times = _times(structure, overrides, reader.problems)
     settings = _settings(structure, overrides, components, reader.problems)
-    if reader.problems:
-        raise ScenarioError(_sorted(reader.problems))
+    problems = reader.problems or ([w for w in reader.warnings if w.rule != NOTE] if overrides.strict else [])
+    if problems:
+        raise ScenarioError(_sorted(problems))
     components = _override(components, overrides.parameters)
+    if overrides.tolerance is not None:
+        components = tuple(replace(c, tolerance=overrides.tolerance) for c in components)
     if overrides.energy:
         components, settings = _with_energy(components, settings)
-    return System(package.name, components, connections, *times, settings)
+    warnings = tuple(str(w) for w in _sorted(reader.warnings))
+    return System(package.name, components, connections, *times, settings, warnings)
 
 
 def _sorted(problems: Iterable[Problem]) -> list[Problem]:
@@ -129,7 +147,7 @@ def _sorted(problems: Iterable[Problem]) -> list[Problem]:
 
 
 def _fmus(
-    package: Package,
+    sources: Sources,
     components: Iterable[SsdComponent],
     problems: list[Problem],
     provision: _Provision,
@@ -137,12 +155,14 @@ def _fmus(
     found: dict[str, Fmu] = {}
     by_path: dict[Path, Fmu | str] = {}
     for c in components:
-        path = inside(package.root, c.source)
+        path = sources.find(c.source)
         if path is None:
-            problems.append(Problem(SSD_NAME, c.line, "source", f"'{c.source}' does not lie inside the scenario"))
+            text = f"'{c.source}' does not lie inside the scenario; --allow-outside DIR allows a folder beside it"
+            problems.append(Problem(SSD_NAME, c.line, "source", text))
             continue
         if path not in by_path:
-            by_path[path] = _provide(path, provision)
+            may_build = provision.build and sources.is_inside(path)
+            by_path[path] = _provide(path, replace(provision, build=may_build))
         fmu = by_path[path]
         if isinstance(fmu, str):
             problems.append(Problem(SSD_NAME, c.line, "fmu", f"component '{c.name}': {c.source} {fmu}"))
@@ -178,6 +198,8 @@ def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) 
     if stop is None:
         problems.append(Problem(SSD_NAME, 0, "stop", "no stopTime in ssd:DefaultExperiment; give --stop"))
         stop = start + step
+    if math.isnan(start) or math.isnan(stop):
+        return 0.0, step, step  # told where it is written
     if not (math.isfinite(start) and start < stop < math.inf):
         problems.append(Problem(SSD_NAME, 0, "stop", f"stop time {stop:g} s must lie after start time {start:g} s"))
     elif text := _step_problem(start, stop, step):
@@ -227,11 +249,11 @@ def _settings(
 def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterator[str]:
     """Yield what the settings name and no component has; a pattern that fits nothing is a typing error."""
     variables = {f"{c.name}.{v.name}": v for c in components for v in c.fmu.variables.values()}
-    recordable = [n for n, v in variables.items() if v.type == "Real" and v.causality in _MEASURED]
+    recordable = [n for n, v in variables.items() if v.type != "String" and v.causality in _MEASURED]
     for record in settings.records:
         for pattern in record.variables if record not in DEFAULT_RECORDS else ():
             if not any(map(matcher(pattern), recordable)):
-                yield f"Record variables: '{pattern}' fits no Real output or local variable of the components"
+                yield f"Record variables: '{pattern}' fits no output or local variable of the components"
     wanted = settings.calibration
     if wanted is not None and (wanted.parameter not in variables or settable(variables[wanted.parameter], "Real")):
         yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components"
@@ -291,8 +313,9 @@ def _typed(variable: Variable, full: str, text: str) -> float | int | bool | str
         if text.lower() not in ("true", "false", "1", "0"):
             raise UsageError(f"parameter '{full}': '{text}' is neither true nor false")
         return text.lower() in ("true", "1")
+    items = dict(variable.items)
     try:
-        number = float(text) if variable.type == "Real" else int(text)
+        number = items[text] if text in items else float(text) if variable.type == "Real" else int(text)
     except ValueError:
         raise UsageError(f"parameter '{full}': '{text}' is not a number") from None
     reason = out_of_range(variable, number)

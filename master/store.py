@@ -232,5 +232,10 @@ def _matches(fingerprint: str, guid: str) -> bool:
 
 def _fmus(*arguments: str, seconds: float) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "fmus", *arguments]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(_places())}
     return subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False, env=environment)
+
+
+def _places() -> list[str]:
+    """Return where modules come from, without the FMUs that ran here: they leave their folders, with a pythonfmu each."""
+    return [place for place in sys.path if not (Path(place) / "slavemodule.txt").is_file()]

@@ -9,7 +9,7 @@ from typing import Final
 
 from master.ssp.annotation import RunSettings
 from master.ssp.ssv import Value
-from master.ssp.units import Conversion
+from master.ssp.units import Conversion, Unit
 
 #: Share of a step by which the stop time may miss a whole number of steps for want of digits.
 _ROUNDING: Final = 1e-6
@@ -17,7 +17,10 @@ _ROUNDING: Final = 1e-6
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of an FMU, as its modelDescription.xml declares it."""
+    """A variable of an FMU, as its modelDescription.xml declares it.
+
+    ``initial`` is that of the standard where the file leaves it open; ``items`` are those of an enumeration.
+    """
 
     name: str
     reference: int
@@ -29,6 +32,8 @@ class Variable:
     minimum: float | None
     maximum: float | None
     description: str = ""
+    initial: str = ""
+    items: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,10 @@ class Fmu:
         Hash of the file.
     tool : str
         Generation tool.
+    units : dict
+        Units that it defines, by name.
+    tolerance : float, optional
+        Of its default experiment.
     """
 
     path: Path
@@ -61,17 +70,28 @@ class Fmu:
     sha256: str
     tool: str
     can_serialise: bool = False
+    units: dict[str, Unit] = field(default_factory=dict)
+    tolerance: float | None = None
 
 
 @dataclass(frozen=True)
 class Component:
-    """An FMU in the system: its name, parameter values (in the FMU's units) and exchanged variables."""
+    """An FMU in the system: its name, parameter values (in the FMU's units) and exchanged variables.
+
+    ``tolerance`` is what the FMU is told when the experiment is set up, None for nothing.
+    """
 
     name: str
     fmu: Fmu
     parameters: dict[str, Value]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    tolerance: float | None = None
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Exchanged variables that are strings."""
+        return tuple(n for n in (*self.inputs, *self.outputs) if self.fmu.variables[n].type == "String")
 
 
 @dataclass(frozen=True)
@@ -101,6 +121,8 @@ class System:
         Start time, stop time and macro step [s].
     settings : RunSettings
         Coupling, interval of interest, calibration, recording.
+    warnings : tuple of str
+        What in the scenario can be run but may not be meant.
     """
 
     name: str
@@ -110,6 +132,14 @@ class System:
     stop: float
     step: float
     settings: RunSettings
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def discrete(self) -> frozenset[str]:
+        """Names of exchanged outputs that are not Real, between whose values there is nothing."""
+        return frozenset(
+            f"{c.name}.{n}" for c in self.components for n in c.outputs if c.fmu.variables[n].type != "Real"
+        )
 
     def component(self, name: str) -> Component:
         """Return a component by its name."""

@@ -207,6 +207,7 @@ def describe(component: Component, is_paced: bool) -> bytes:
         "parameters": component.parameters,
         "inputs": component.inputs,
         "outputs": component.outputs,
+        "tolerance": component.tolerance,
         "paced": is_paced,
     }
     return json.dumps(told).encode()
@@ -218,4 +219,5 @@ def _component(told: dict[str, Any]) -> Component:
         for name, reference, kind in told["variables"]
     }
     fmu = Fmu(Path(told["path"]), told["guid"], told["identifier"], variables, True, "", "", True)
-    return Component(told["name"], fmu, told["parameters"], tuple(told["inputs"]), tuple(told["outputs"]))
+    inputs, outputs = tuple(told["inputs"]), tuple(told["outputs"])
+    return Component(told["name"], fmu, told["parameters"], inputs, outputs, told["tolerance"])

@@ -127,6 +127,11 @@ class IsolatedInstance:
         self._owed: _Owed | None = None
         self._where = ""
         self._dead = False
+        if component.texts:
+            raise SlaveError(
+                f"{self._who} exchanges the text '{component.texts[0]}': between processes only numbers are exchanged; "
+                "run it without --isolate"
+            )
         try:
             self._process = Process()
         except OSError as error:

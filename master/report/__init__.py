@@ -6,6 +6,7 @@ from pathlib import Path
 
 from master import plots, results
 from master.report.measured import Comparison, comparison_rows
+from master.report.output_charts import has_contacts, output_plots, outputs_table
 from master.report.page import page
 from master.report.tables import CLAUSES, figure_rows, figures_table, headlines, uplift_line, verdict_table
 from master.results import Results
@@ -15,7 +16,9 @@ __all__ = [
     "comparison_rows",
     "figure_rows",
     "figures_table",
+    "has_contacts",
     "headlines",
+    "outputs_table",
     "page",
     "uplift_line",
     "verdict_table",
@@ -27,7 +30,8 @@ def write(done: Results, measured: Comparison | None = None) -> Path:
     """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
     path = done.folder / results.REPORT
     path.write_text(page(done, measured), encoding="utf-8")
-    for name, figure in plots.all_plots(done).items():
+    figures = plots.all_plots(done) if has_contacts(done) else output_plots(done)
+    for name, figure in figures.items():
         figure.savefig(done.folder / f"{name}.svg", metadata={"Date": None})
         figure.savefig(done.folder / f"{name}.png", dpi=130)
     return path

@@ -105,6 +105,8 @@ def quality_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("coupling scheme", str(coupling.get("scheme", "-"))),
         ("macro step", f"{1e3 * settings.get('step', 0):g} ms"),
     ]
+    told = {c["name"]: c["tolerance"] for c in summary.get("components", []) if c.get("tolerance") is not None}
+    rows += [(f"tolerance told to the FMU of {name}", f"{value:g}") for name, value in told.items()]
     if coupling.get("scheme") == "iterative":
         rows.append(("tolerance of the iteration", f"{coupling.get('tolerance'):g}"))
     for p in summary.get("interface_power", []):

@@ -12,6 +12,7 @@ from master.report.charts import Chart, run_charts
 from master.report.inputs import Input, inputs_of, provenance_rows, quality_rows
 from master.report.measured import Comparison, comparison_chart, comparison_rows
 from master.report.movie import Movie, make_movie
+from master.report.output_charts import HEADS, has_contacts, output_charts, output_rows
 from master.report.signals import Signals, all_signals
 from master.report.tables import figure_rows
 from master.results import Assessment, Results
@@ -19,6 +20,7 @@ from master.trains import Following
 
 _CONTENTS: Final = (
     ("verdict", "Verdict"),
+    ("outputs", "Outputs"),
     ("figures", "Figures"),
     ("measured", "Measured"),
     ("force", "Contact force"),
@@ -41,39 +43,54 @@ def page(done: Results, measured: Comparison | None = None) -> str:
         A measured contact force beside it.
     """
     summary, signals, assessments = done.summary, all_signals(done), done.assessments()
-    charts = run_charts(done, signals)
+    is_coupling = has_contacts(done)
+    charts = run_charts(done, signals) if is_coupling else output_charts(done)
     extra = [comparison_chart(measured)] if measured is not None else []
     movie = make_movie(done, signals)
     body = [
-        _head(summary, assessments),
+        _head(summary, assessments, is_coupling),
+        *([] if is_coupling else _outputs(done, charts)),
         _figures(assessments, done.followings if assessments else ()),
         *(_measured(measured, extra[0]) if measured is not None else ()),
-        *_section("force", "Contact force", [c for c in charts if not c.key.startswith(_LINE_CHARTS)]),
+        *_section("force", "Contact force", [c for c in charts if is_coupling and not c.key.startswith(_LINE_CHARTS)]),
         *(_movie(movie, signals) if movie is not None else ()),
         *_section("line", "Line and droppers", [c for c in charts if c.key.startswith(_LINE_CHARTS)]),
         _inputs(summary),
         _computed(summary),
     ]
     contents = "".join(f"<a href='#{k}'>{t}</a>" for k, t in _CONTENTS if any(f"id='{k}'" in part for part in body))
-    title = f"{summary.get('scenario', '')}: pantograph-catenary interaction"
+    title = f"{summary.get('scenario', '')}: {_subject(is_coupling)}"
     return markup.document(title, [f"<nav>{contents}</nav>", *body], [*charts, *extra], movie)
 
 
-def _head(summary: dict[str, Any], assessments: tuple[Assessment, ...]) -> str:
+def _subject(is_coupling: bool) -> str:
+    return "pantograph-catenary interaction" if is_coupling else "outputs of the run"
+
+
+def _outputs(done: Results, charts: list[Chart]) -> list[str]:
+    """Return the section of a run that has nothing but outputs."""
+    table = f"<div class='scroll'>{markup.table(HEADS, output_rows(done))}</div>"
+    return ["<section id='outputs'><h2>Outputs</h2>", table, *map(markup.chart, charts), "</section>"]
+
+
+def _head(summary: dict[str, Any], assessments: tuple[Assessment, ...], is_coupling: bool = True) -> str:
     complete = summary.get("status") == "complete"
     name = markup.text(summary.get("scenario", ""))
-    parts = [f"<section id='verdict'><h1>{name}: pantograph-catenary interaction</h1>", status_note(summary)]
+    key = "verdict" if is_coupling else "run"
+    parts = [f"<section id='{key}'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
     parts.append(_cautions(summary))
     parts += [markup.verdict(a, a.contact.pantograph, complete) for a in assessments]
-    if not assessments:
+    if not assessments and is_coupling:
         parts.append("<p class='warning'>No contact-quality figures: no contact force in the interval of interest.</p>")
     return "".join([*parts, "</section>"])
 
 
 def _cautions(summary: dict[str, Any]) -> str:
-    """Return what FMUs have warned of."""
+    """Return what FMUs have warned of, and what in the scenario may not be meant."""
     said = ((markup.text(w["component"]), markup.text(w["text"])) for w in summary.get("warnings", []))
-    return "".join(f"<p class='warning'>{component} warns: {text}</p>" for component, text in said)
+    found = [f"<p class='warning'>{component} warns: {text}</p>" for component, text in said]
+    of_files = (markup.text(text) for text in summary.get("scenario_warnings", []))
+    return "".join([*found, *(f"<p class='warning'>{text}</p>" for text in of_files)])
 
 
 def status_note(summary: dict[str, Any]) -> str:

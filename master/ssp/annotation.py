@@ -182,11 +182,24 @@ def _check_plain(node: Any, reader: Reader, name: str) -> None:
 
 
 def check_places(root: Any, read: list[Any], reader: Reader) -> None:
-    """Report annotations of ours that stand where nobody reads them."""
+    """Report annotations of ours that stand where nobody reads them, and elements of ours in those of others."""
     for node in root.iter(f"{{{SSC}}}Annotation"):
         if node.get("type") == NAMESPACE and node.getparent() not in read:
             text = "is not read here; put it into the ssd:Annotations of the description or its DefaultExperiment"
             reader.problem(node, "annotation", f"an annotation of type {NAMESPACE} {text}")
+    for node in root.iter(f"{{{NAMESPACE}}}*"):
+        if _is_stray(node):
+            holder = next(node.iterancestors(f"{{{SSC}}}Annotation"), None)
+            written = "no annotation" if holder is None else f"an annotation of type '{holder.get('type', '')}'"
+            text = f"{tag(node)} of {NAMESPACE} stands in {written}, so nobody reads it; the type is {NAMESPACE}"
+            reader.problem(node, "annotation", text)
+
+
+def _is_stray(node: Any) -> bool:
+    """Whether an element of ours, not inside another one, stands in no annotation of ours."""
+    ancestors = list(node.iterancestors(etree.Element))
+    within = any(namespace(a) == NAMESPACE for a in ancestors)
+    return not within and not any(a.tag == f"{{{SSC}}}Annotation" and a.get("type") == NAMESPACE for a in ancestors)
 
 
 def parse_section(node: Any, reader: Reader) -> _Settings | None:

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Final
+from urllib.parse import unquote, urlsplit
 
 from master.errors import Problem, ScenarioError
 
@@ -127,20 +128,52 @@ def read_member(archive: Path, name: str) -> bytes:
         raise ValueError(f"is not a readable archive ({error})") from error
 
 
-def inside(root: Path, source: str) -> Path | None:
-    """Return the file that a relative URI names, None if it is absolute or lies outside ``root``.
+@dataclass(frozen=True)
+class Sources:
+    """Where the files lie that a scenario may name.
 
-    A name that no file can have (too long, a circle of links) is one that lies nowhere.
+    Attributes
+    ----------
+    root : Path
+        The scenario's own folder, to which URIs are relative.
+    outside : tuple of Path
+        Folders beside it that the user has allowed.
     """
-    pure = PurePosixPath(source)
-    if not _is_tame(pure) or ":" in source.split("/")[0] or "\\" in source:
-        return None
-    try:
-        path = (root / pure).resolve()
-        path.is_file()
-    except (OSError, RuntimeError, ValueError):
-        return None
-    return path if path.is_relative_to(root.resolve()) else None
+
+    root: Path
+    outside: tuple[Path, ...] = ()
+
+    def find(self, source: str) -> Path | None:
+        """Return the file that a URI names, None if it lies neither in the scenario nor in an allowed folder.
+
+        The URI is relative, or of scheme ``file``; ``%20`` and the like stand for the characters they encode. A name
+        that no file can have (too long, a circle of links) is one that lies nowhere.
+        """
+        try:
+            name = _decoded(source)
+            path = (self.root / PurePosixPath(name)).resolve()
+            path.is_file()
+            homes = [folder.resolve() for folder in (self.root, *self.outside)]
+        except (OSError, RuntimeError, ValueError):
+            return None
+        return path if any(path.is_relative_to(home) for home in homes) else None
+
+    def is_inside(self, path: Path) -> bool:
+        """Whether a file is one of the scenario's own."""
+        return path.is_relative_to(self.root.resolve())
+
+
+def _decoded(source: str) -> str:
+    """Return the path that a URI names; ValueError if it names no file."""
+    parts = urlsplit(source)
+    if parts.scheme not in ("", "file") or parts.netloc not in ("", "localhost"):
+        raise ValueError(source)
+    name = unquote(source.partition(":")[2] if parts.scheme else source, errors="strict")
+    if parts.scheme or parts.netloc:
+        name = name.removeprefix("//localhost").removeprefix("//")
+    if "\\" in name or "\0" in name or ":" in name.split("/")[0]:
+        raise ValueError(source)
+    return name
 
 
 class UnsafeArchiveError(Exception):

@@ -10,13 +10,17 @@ from master.ssp.units import Conversion
 
 @dataclass(frozen=True)
 class Connector:
-    """A declared variable of a component or system; ``type`` is empty when the file leaves it to the FMU."""
+    """A declared variable of a component or system; ``type`` is empty when the file leaves it to the FMU.
+
+    ``enumeration`` names the declared enumeration that an Enumeration is of.
+    """
 
     name: str
     kind: str
     type: str
     unit: str
     line: int
+    enumeration: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,49 @@ class Connection:
 
 
 @dataclass(frozen=True)
+class Stop:
+    """A system's connector that leads to a component's.
+
+    Attributes
+    ----------
+    system : str
+        Path of the system, empty for the whole.
+    connector : Connector
+    legs : tuple of Leg
+        From there to the component; the last one ends at the component's connector.
+    """
+
+    system: str
+    connector: Connector
+    legs: tuple[Leg, ...]
+
+    @property
+    def full_name(self) -> str:
+        """Name of the connector as parameter sets write it."""
+        return f"{self.system}.{self.connector.name}" if self.system else self.connector.name
+
+
+@dataclass(frozen=True)
+class Feed:
+    """What leads to a component's input or parameter through connectors of systems.
+
+    Attributes
+    ----------
+    element, connector : str
+        Component, and its connector.
+    stops : tuple of Stop
+        Connectors of systems on the way, the outermost first.
+    is_fed : bool
+        Whether a component's output stands at its beginning.
+    """
+
+    element: str
+    connector: str
+    stops: tuple[Stop, ...]
+    is_fed: bool
+
+
+@dataclass(frozen=True)
 class SystemNode:
     """A system with what is in it."""
 
@@ -86,6 +133,7 @@ class SystemNode:
     systems: tuple[SystemNode, ...]
     connections: tuple[Connection, ...]
     bindings: tuple[Binding, ...]
+    line: int = 0
 
 
 NO_SYSTEM = SystemNode("", (), (), (), (), ())

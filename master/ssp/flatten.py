@@ -8,21 +8,35 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from master.ssp.elements import Binding, Component, Connection, Connector, Leg, SystemNode
+from master.ssp.elements import Binding, Component, Connection, Connector, Feed, Leg, Stop, SystemNode
 from master.ssp.xml import Reader
 
 #: Owner (its path, empty for the whole) and connector.
 _Place = tuple[str, str]
-_THROUGH = ("input", "output")
+#: Kinds of connectors whose values go on during the run, and of those that have theirs before it.
+_SIGNALS = ("input", "output")
+_PARAMETERS = ("parameter", "calculatedParameter")
+_GIVING = ("output", "calculatedParameter")
 
 
 @dataclass(frozen=True)
 class Flat:
-    """A system without nesting."""
+    """A system without nesting.
+
+    Attributes
+    ----------
+    components, connections, bindings : tuple
+    feeds : tuple of Feed
+        What leads to components through the connectors of systems, fed or not.
+    connectors : dict
+        The systems' own connectors, by their full names.
+    """
 
     components: tuple[Component, ...]
     connections: tuple[Connection, ...]
     bindings: tuple[Binding, ...]
+    feeds: tuple[Feed, ...]
+    connectors: dict[str, Connector]
 
 
 @dataclass(frozen=True)
@@ -39,7 +53,9 @@ def flatten(root: SystemNode, reader: Reader) -> Flat:
     systems = dict(_systems(root, ""))
     components = tuple(replace(c, name=_join(path, c.name)) for path, s in systems.items() for c in s.components)
     direct, edges = _connections(systems, reader)
-    return Flat(components, (*direct, *_followed(edges, systems, reader)), _bindings(systems))
+    followed, feeds = _followed(edges, systems, reader)
+    own = {_join(path, x.name): x for path, s in systems.items() for x in s.connectors}
+    return Flat(components, (*direct, *followed), _bindings(systems), feeds, own)
 
 
 def _systems(system: SystemNode, path: str) -> Iterator[tuple[str, SystemNode]]:
@@ -94,12 +110,17 @@ def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Read
             what = f"'{element}' has no connector '{name}'" if element else f"the system has no connector '{name}'"
             reader.report(c.line, "connection", what)
             return None
-        if connector.kind not in _THROUGH:
-            reader.report(c.line, "unsupported", f"connects '{name}' of kind '{connector.kind}'; use a binding instead")
+        if connector.kind not in (*_SIGNALS, *_PARAMETERS):
+            text = f"connects '{name}' of kind '{connector.kind}', which is not supported"
+            reader.report(c.line, "unsupported", text)
             return None
         # Seen from inside, a system's own input gives values and its own output takes them.
-        ends.append((place, (connector.kind == "output") == bool(element)))
-    (first, first_gives), (second, second_gives) = ends
+        ends.append((place, connector.kind, (connector.kind in _GIVING) == bool(element)))
+    (first, one, first_gives), (second, other, second_gives) = ends
+    if (one in _PARAMETERS) != (other in _PARAMETERS):
+        kinds = f"'{first[1]}' of kind '{one}' and '{second[1]}' of kind '{other}'"
+        reader.report(c.line, "connection", f"connects {kinds}, which do not fit")
+        return None
     if first_gives == second_gives:
         both = "give" if first_gives else "take"
         reader.report(c.line, "connection", f"'{first[1]}' and '{second[1]}' both {both} values")
@@ -116,53 +137,77 @@ def _connector(path: str, element: str, name: str, systems: dict[str, SystemNode
     return next((x for x in connectors if x.name == name), None)
 
 
-def _followed(edges: list[_Edge], systems: dict[str, SystemNode], reader: Reader) -> Iterator[Connection]:
-    """Yield a connection for every component's input that is reached through systems' connectors."""
+def _followed(
+    edges: list[_Edge], systems: dict[str, SystemNode], reader: Reader
+) -> tuple[list[Connection], tuple[Feed, ...]]:
+    """Return a connection for every connector of a component that others reach through systems, and what leads there.
+
+    A way that begins at a connector of a system, which nothing feeds, makes no connection: its values hold.
+    """
     into: dict[_Place, list[_Edge]] = {}
     for edge in edges:
         into.setdefault(edge.target, []).append(edge)
-    for edge in edges:
-        if edge.target[0] not in systems:
-            yield from _trace(edge, into, systems, reader)
+    connections, feeds = [], []
+    for last in edges:
+        if last.target[0] in systems or (chain := _chain(last, into, systems, reader)) is None:
+            continue
+        is_fed = chain[0].source[0] not in systems
+        feeds.append(Feed(*last.target, _stops(chain, systems), is_fed))
+        if is_fed:
+            connections.append(_whole(chain, systems))
+    return connections, tuple(feeds)
 
 
-def _trace(
+def _chain(
     last: _Edge, into: dict[_Place, list[_Edge]], systems: dict[str, SystemNode], reader: Reader
-) -> Iterator[Connection]:
+) -> list[_Edge] | None:
+    """Return the connections that lead to a component one after the other, None if they are not sound."""
     chain = [last]
-    while chain[0].source[0] in systems:
-        before = into.get(chain[0].source, [])
+    while chain[0].source[0] in systems and (before := into.get(chain[0].source, [])):
         if len(before) != 1 or len(chain) > len(into):
-            _report_end(chain[0], len(before), systems, reader)
-            return
+            _report_end(chain[0], before, systems, reader)
+            return None
         chain.insert(0, before[0])
-    yield replace(
+    return chain
+
+
+def _whole(chain: list[_Edge], systems: dict[str, SystemNode]) -> Connection:
+    first, last = chain[0], chain[-1]
+    return replace(
         last.connection,
-        start_element=chain[0].source[0],
-        start_connector=chain[0].source[1],
+        start_element=first.source[0],
+        start_connector=first.source[1],
         end_element=last.target[0],
         end_connector=last.target[1],
         before=tuple(_leg(e, systems) for e in chain[:-1]),
     )
 
 
+def _stops(chain: list[_Edge], systems: dict[str, SystemNode]) -> tuple[Stop, ...]:
+    """Return the systems' connectors on the way, each with what is left of it."""
+    legs = [_leg(e, systems) for e in chain]
+    found = []
+    for i, edge in enumerate(chain):
+        path, name = edge.source
+        if path in systems:
+            found.append(Stop(path, next(x for x in systems[path].connectors if x.name == name), tuple(legs[i:])))
+    return tuple(found)
+
+
 def _leg(edge: _Edge, systems: dict[str, SystemNode]) -> Leg:
-    """Return a connection that ends at a system's connector, whose unit its value has from there on."""
+    """Return a connection; where it ends at a system's connector, its value has that one's unit from there on."""
     path, name = edge.target
-    unit = next(x.unit for x in systems[path].connectors if x.name == name)
+    unit = next(x.unit for x in systems[path].connectors if x.name == name) if path in systems else ""
     c = edge.connection
     return Leg(unit, c.transformation, c.suppress_unit_conversion, c.line)
 
 
-def _report_end(edge: _Edge, count: int, systems: dict[str, SystemNode], reader: Reader) -> None:
+def _report_end(edge: _Edge, before: list[_Edge], systems: dict[str, SystemNode], reader: Reader) -> None:
     path, name = edge.source
     where = f"connector '{name}' of system '{path or systems[''].name}'"
-    if count > 1:
-        text = f"{where} has {count} connections; one is allowed"
-    elif count == 1:
-        text = f"{where} is fed by itself: the connections of systems form a circle, into which no component leads"
-    elif path:
-        text = f"{where} is connected to nothing"
+    if len(before) > 1:
+        text = f"{where} has {len(before)} connections; one is allowed"
     else:
-        text = f"{where} is an input from outside, which nothing feeds here; connect '{edge.target[1]}' to a component"
-    reader.report(edge.connection.line, "connection", text)
+        text = f"{where} is fed by itself: the connections of systems form a circle, into which no component leads"
+    # At the first of those that feed it, so that a connector that leads to many components is told once.
+    reader.report(before[0].connection.line, "connection", text)

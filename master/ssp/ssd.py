@@ -5,13 +5,13 @@ What the master does not honour is reported with its line, never skipped silentl
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from master.ssp.annotation import Annotations, RunSettings, check_places, parse_annotations
-from master.ssp.archive import SSD_NAME, inside
-from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, SystemNode
+from master.ssp.archive import SSD_NAME, Sources
+from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, Feed, SystemNode
+from master.ssp.enumerations import Items, parse_enumerations
 from master.ssp.flatten import flatten
 from master.ssp.ssm import Entry, apply, parse_mapping, parse_transformation, read_mapping_file
 from master.ssp.ssv import Parameter, ParameterSet, parse_parameter_set, read_parameter_file
@@ -39,32 +39,34 @@ class Structure:
     start: float
     stop: float | None
     annotations: Annotations
+    enumerations: dict[str, Items] = field(default_factory=dict)
+    feeds: tuple[Feed, ...] = ()
+    connectors: dict[str, Connector] = field(default_factory=dict)
 
 
 EMPTY: Final = Structure("", (), (), (), {}, 0.0, None, Annotations(RunSettings(), None))
 
 
-def read_structure(root: Path, reader: Reader) -> Structure:
-    """Read ``SystemStructure.ssd`` in the folder ``root``; problems are collected in ``reader``."""
-    node = reader.parse(root / SSD_NAME)
+def read_structure(sources: Sources, reader: Reader) -> Structure:
+    """Read the ``SystemStructure.ssd`` of a scenario; problems are collected in ``reader``."""
+    node = reader.parse(sources.root / SSD_NAME)
     if node is None:
         return EMPTY
-    reader.check_schema(node, "ssd")
     if tag(node) != "SystemStructureDescription" or node.get("version") not in VERSIONS:
         text = f"is not an SSP description of version {' or '.join(VERSIONS)} (version='{node.get('version')}')"
         reader.problem(node, "version", text)
-    return parse_structure(node, root, reader)
+        return EMPTY  # what another version means by its words would be a guess
+    reader.check_schema(node, "ssd")
+    return parse_structure(node, sources, reader)
 
 
-def parse_structure(node: Any, root: Path, reader: Reader) -> Structure:
+def parse_structure(node: Any, sources: Sources, reader: Reader) -> Structure:
     """Parse ``ssd:SystemStructureDescription``; nested systems are flattened."""
     system = child(node, SSD, "System")
     experiment = child(node, SSD, "DefaultExperiment")
-    if child(node, SSD, "Enumerations") is not None:
-        reader.problem(child(node, SSD, "Enumerations"), "unsupported", "enumerations are not supported")
     annotated = [a for n in (experiment, node) if n is not None for a in children(n, SSD, "Annotations")]
     check_places(node, annotated, reader)
-    flat = flatten(NO_SYSTEM if system is None else parse_system(system, root, reader), reader)
+    flat = flatten(NO_SYSTEM if system is None else parse_system(system, sources, reader), reader)
     return Structure(
         reader.text(node, "name"),
         flat.components,
@@ -74,10 +76,13 @@ def parse_structure(node: Any, root: Path, reader: Reader) -> Structure:
         0.0 if experiment is None else reader.number(experiment, "startTime", 0.0),
         None if experiment is None or experiment.get("stopTime") is None else reader.number(experiment, "stopTime"),
         parse_annotations(annotated, reader),
+        parse_enumerations(child(node, SSD, "Enumerations"), reader),
+        flat.feeds,
+        flat.connectors,
     )
 
 
-def parse_system(node: Any, root: Path, reader: Reader) -> SystemNode:
+def parse_system(node: Any, sources: Sources, reader: Reader) -> SystemNode:
     """Parse ``ssd:System``; signal dictionaries are refused."""
     if (found := child(node, SSD, "SignalDictionaries")) is not None:
         reader.problem(found, "unsupported", "signal dictionaries are not supported; connect components directly")
@@ -90,14 +95,15 @@ def parse_system(node: Any, root: Path, reader: Reader) -> SystemNode:
     return SystemNode(
         reader.text(node, "name"),
         parse_connectors(node, reader),
-        tuple(parse_component(e, root, reader) for e in inside_it if tag(e) == "Component"),
-        tuple(parse_system(e, root, reader) for e in inside_it if tag(e) == "System"),
+        tuple(parse_component(e, sources, reader) for e in inside_it if tag(e) == "Component"),
+        tuple(parse_system(e, sources, reader) for e in inside_it if tag(e) == "System"),
         tuple(parse_connection(c, reader) for c in children(child(node, SSD, "Connections"), SSD, "Connection")),
-        parse_bindings(node, root, reader),
+        parse_bindings(node, sources, reader),
+        int(node.sourceline or 0),
     )
 
 
-def parse_component(node: Any, root: Path, reader: Reader) -> Component:
+def parse_component(node: Any, sources: Sources, reader: Reader) -> Component:
     """Parse ``ssd:Component``."""
     name = reader.text(node, "name")
     if (kind := reader.text(node, "type", FMU_TYPES[0])) not in FMU_TYPES:
@@ -116,7 +122,7 @@ def parse_component(node: Any, root: Path, reader: Reader) -> Component:
         name,
         reader.text(node, "source"),
         parse_connectors(node, reader),
-        parse_bindings(node, root, reader),
+        parse_bindings(node, sources, reader),
         int(node.sourceline or 0),
     )
 
@@ -137,6 +143,7 @@ def parse_connector(node: Any, reader: Reader) -> Connector:
         "" if typed is None else tag(typed),
         "" if typed is None else reader.text(typed, "unit"),
         int(node.sourceline or 0),
+        "" if typed is None or tag(typed) != "Enumeration" else reader.text(typed, "name"),
     )
 
 
@@ -156,35 +163,35 @@ def parse_connection(node: Any, reader: Reader) -> Connection:
     )
 
 
-def parse_bindings(node: Any | None, root: Path, reader: Reader) -> tuple[Binding, ...]:
+def parse_bindings(node: Any | None, sources: Sources, reader: Reader) -> tuple[Binding, ...]:
     """Parse the ``ssd:ParameterBindings`` of a component or system, in order."""
     nodes = children(child(node, SSD, "ParameterBindings"), SSD, "ParameterBinding")
-    parsed = (parse_binding(b, root, reader) for b in nodes)
+    parsed = (parse_binding(b, sources, reader) for b in nodes)
     return tuple(b for b in parsed if b is not None)
 
 
-def parse_binding(node: Any, root: Path, reader: Reader) -> Binding | None:
+def parse_binding(node: Any, sources: Sources, reader: Reader) -> Binding | None:
     """Parse ``ssd:ParameterBinding``, inline or with its ``.ssv`` file, and apply its mapping if it has one."""
     if not _beside_the_ssd(node, reader):
         return None
-    found = _inline_set(node, reader) if node.get("source") is None else _file_set(node, root, reader)
+    found = _inline_set(node, reader) if node.get("source") is None else _file_set(node, sources, reader)
     if found is None:
         return None
     binding = Binding(reader.text(node, "prefix"), found, int(node.sourceline or 0))
     mapping = child(node, SSD, "ParameterMapping")
-    return binding if mapping is None else _mapped(binding, mapping, root, reader)
+    return binding if mapping is None else _mapped(binding, mapping, sources, reader)
 
 
-def _mapped(binding: Binding, node: Any, root: Path, reader: Reader) -> Binding | None:
+def _mapped(binding: Binding, node: Any, sources: Sources, reader: Reader) -> Binding | None:
     """Return the binding with its parameters under the names that the mapping gives them."""
-    entries = _mapping(node, root, reader)
+    entries = _mapping(node, sources, reader)
     if entries is None:
         return None
-    parameters = replace(binding.parameters, parameters=apply(entries, parameter_names(binding), reader))
+    parameters = replace(binding.parameters, parameters=apply(entries, binding.parameters, binding.prefix, reader))
     return replace(binding, prefix="", parameters=parameters)
 
 
-def _mapping(node: Any, root: Path, reader: Reader) -> tuple[Entry, ...] | None:
+def _mapping(node: Any, sources: Sources, reader: Reader) -> tuple[Entry, ...] | None:
     if not _beside_the_ssd(node, reader):
         return None
     source = node.get("source")
@@ -194,11 +201,11 @@ def _mapping(node: Any, root: Path, reader: Reader) -> tuple[Entry, ...] | None:
             reader.problem(node, "mapping", "the mapping has neither a source nor an inline ssm:ParameterMapping")
             return None
         return parse_mapping(inline, reader)
-    path = inside(root, source)
+    path = sources.find(source)
     if path is None or not path.is_file():
         reader.problem(node, "mapping", f"mapping file '{source}' does not exist in the scenario")
         return None
-    return read_mapping_file(path, Reader(source, reader.problems))
+    return read_mapping_file(path, reader.beside(source))
 
 
 def _beside_the_ssd(node: Any, reader: Reader) -> bool:
@@ -221,10 +228,10 @@ def _inline_set(node: Any, reader: Reader) -> ParameterSet | None:
     return parse_parameter_set(inline, reader)
 
 
-def _file_set(node: Any, root: Path, reader: Reader) -> ParameterSet | None:
+def _file_set(node: Any, sources: Sources, reader: Reader) -> ParameterSet | None:
     source = reader.text(node, "source")
-    path = inside(root, source)
+    path = sources.find(source)
     if path is None or not path.is_file():
         reader.problem(node, "binding", f"parameter file '{source}' does not exist in the scenario")
         return None
-    return read_parameter_file(path, Reader(source, reader.problems))
+    return read_parameter_file(path, reader.beside(source))

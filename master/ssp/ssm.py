@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from master.ssp.ssv import Parameter
+from master.ssp.ssv import Parameter, ParameterSet
 from master.ssp.units import Conversion
 from master.ssp.xml import SSC, SSM, Reader, child, children
 
+#: Rule of what is only worth knowing: it is no problem of a strict check either.
+NOTE: Final = "note"
 _REFUSED: Final = (
     "BooleanMappingTransformation",
     "IntegerMappingTransformation",
@@ -35,12 +37,12 @@ def read_mapping_file(path: Path, reader: Reader) -> tuple[Entry, ...] | None:
     root = reader.parse(path)
     if root is None:
         return None
-    reader.check_schema(root, "ssm")
     return parse_mapping(root, reader)
 
 
 def parse_mapping(node: Any, reader: Reader) -> tuple[Entry, ...]:
-    """Parse ``ssm:ParameterMapping``."""
+    """Check and parse ``ssm:ParameterMapping``, of a file or inline."""
+    reader.check_schema(node, "ssm")
     return tuple(parse_entry(e, reader) for e in children(node, SSM, "MappingEntry"))
 
 
@@ -75,24 +77,27 @@ def _check_targets(entries: tuple[Entry, ...], reader: Reader) -> None:
         seen.add(entry.target)
 
 
-def apply(entries: tuple[Entry, ...], parameters: Mapping[str, Parameter], reader: Reader) -> tuple[Parameter, ...]:
+def apply(entries: tuple[Entry, ...], given: ParameterSet, prefix: str, reader: Reader) -> tuple[Parameter, ...]:
     """Return the parameters that a mapping makes of a set; what it does not name is not used.
 
     Parameters
     ----------
     entries : tuple of Entry
-    parameters : mapping
-        The set's parameters by name, prefix included.
+    given : ParameterSet
+    prefix : str
+        Put before the names of the set's parameters.
     reader : Reader
-        Is told of entries without a parameter, and of transformations of what is no number.
+        Is told of transformations of what is no number, and warned, in one sentence each, of entries without a
+        parameter and of parameters without an entry.
     """
     mapped = []
     _check_targets(entries, reader)
+    parameters = {prefix + p.name: p for p in given.parameters}
     for entry in entries:
         parameter = parameters.get(entry.source)
         if parameter is None:
-            reader.report(entry.line, "mapping", f"the parameter set holds no '{entry.source}'", entry.file)
-        elif not entry.transformation.is_identity and isinstance(parameter.value, str | bool):
+            continue
+        if not entry.transformation.is_identity and isinstance(parameter.value, str | bool):
             text = f"'{entry.source}' is {parameter.type}, which cannot be transformed"
             reader.report(entry.line, "mapping", text, entry.file)
         else:
@@ -102,6 +107,34 @@ def apply(entries: tuple[Entry, ...], parameters: Mapping[str, Parameter], reade
                     name=entry.target,
                     transformation=entry.transformation,
                     suppress_unit_conversion=entry.suppress_unit_conversion,
+                    name_file=entry.file,
+                    name_line=entry.line,
                 )
             )
+    _warn_of_rest(entries, {*parameters, *(prefix + name for name in given.unreadable)}, reader)
     return tuple(mapped)
+
+
+def _warn_of_rest(entries: tuple[Entry, ...], known: set[str], reader: Reader) -> None:
+    """Warn of entries whose source is empty or not in the set, and of parameters that no entry names."""
+    without = [e for e in entries if e.source not in known]
+    if without:
+        targets = several([e.target for e in without])
+        text = f"the parameter set holds no {several([e.source for e in without])}: nothing is set for {targets}"
+        reader.warn(without[0].line, "mapping", text, without[0].file)
+    unused = sorted(known - {e.source for e in entries})
+    if unused and entries and not without:
+        text = f"the mapping names no {several(unused)} of the parameter set: not used"
+        reader.warn(entries[0].line, NOTE, text, entries[0].file)
+
+
+def several(names: Sequence[str], most: int = 5) -> str:
+    """Return names in quotes, the first few of many.
+
+    Examples
+    --------
+    >>> several(["a", ""]), several(["a", "b", "c"], most=1)
+    ("'a', ''", "'a' and 2 more")
+    """
+    shown = ", ".join(f"'{name}'" for name in names[:most])
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")

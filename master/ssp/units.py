@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from master.ssp.xml import SSC, Reader, child, children
 
 #: Exponents of kg, m, s, A, K, mol, cd, rad.
 Dimension = tuple[int, int, int, int, int, int, int, int]
+#: Relative difference that is no more than a matter of digits (0.27778 for 1/3.6).
+_DIGITS: Final = 1e-5
 BASE_UNITS: Final = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit: value in base units = factor * value + offset."""
+    """A unit: value in base units = factor * value + offset; ``file`` and ``line`` say where it is declared."""
 
     name: str
     dimension: Dimension
     factor: float = 1.0
     offset: float = 0.0
+    file: str = field(default="", compare=False)
+    line: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True)
@@ -98,15 +103,44 @@ def parse_units(node: Any | None, reader: Reader) -> dict[str, Unit]:
 def parse_unit(node: Any, reader: Reader) -> Unit:
     """Parse ``ssc:Unit``."""
     base = child(node, SSC, "BaseUnit")
-    name = reader.text(node, "name")
+    name, line = reader.text(node, "name"), int(node.sourceline or 0)
     if base is None:
-        return Unit(name, (0,) * 8)
+        return Unit(name, (0,) * 8, file=reader.file, line=line)
     powers = tuple(_power(base, b, reader) for b in BASE_UNITS)
     factor = reader.number(base, "factor", 1.0)
     if factor == 0.0:
         reader.problem(base, "unit", f"unit '{name}': factor='0' would make every value 0")
         factor = 1.0
-    return Unit(name, powers, factor, reader.number(base, "offset", 0.0))  # type: ignore[arg-type]
+    offset = reader.number(base, "offset", 0.0)
+    return Unit(name, powers, factor, offset, reader.file, line)  # type: ignore[arg-type]
+
+
+def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
+    """Yield units that are declared otherwise before, or mean something else everywhere, and what that is.
+
+    Of a unit that everybody knows only factor and offset are compared: whether angles have a dimension is a matter
+    of taste, and so is whether a percentage is a hundredth.
+    """
+    first: dict[str, Unit] = {}
+    for unit in declared:
+        other, usual = first.setdefault(unit.name, unit), COMMON.get(unit.name)
+        where = f"{other.file}, line {other.line}" if other.line else other.file
+        if other.dimension != unit.dimension and other.line:  # many tools tell no more of an FMU's unit than its name
+            yield unit, f"measures something else in {where}"
+        elif other.dimension == unit.dimension and not _agree(other, unit):
+            yield unit, f"is declared with {_scale(unit)} here, with {_scale(other)} in {where}"
+        elif usual and unit.name != "%" and usual.dimension == unit.dimension and not _agree(usual, unit):
+            yield unit, f"is declared with {_scale(unit)}; everywhere else it has {_scale(usual)}"
+
+
+def _agree(one: Unit, other: Unit) -> bool:
+    """Whether two declarations of a unit mean the same, but for the digits that were written."""
+    near = math.isclose(one.factor, other.factor, rel_tol=_DIGITS)
+    return near and math.isclose(one.offset, other.offset, rel_tol=_DIGITS, abs_tol=_DIGITS)
+
+
+def _scale(unit: Unit) -> str:
+    return f"factor {unit.factor:g}" + (f" and offset {unit.offset:g}" if unit.offset else "")
 
 
 def conversion(source: Unit, target: Unit) -> Conversion | None:

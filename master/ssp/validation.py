@@ -1,21 +1,26 @@
-"""Checking a scenario as a whole: structure, FMUs, connections, units, parameters.
+"""Checking a scenario as a whole: structure, FMUs, connections, units, start values.
 
-Problems are collected in a list (file, line, rule, text) instead of stopping at the first.
+Problems are collected in a list (file, line, rule, text) instead of stopping at the first, and what only follows from
+one of them is not told besides.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from master.errors import Problem
 from master.ssp.archive import SSD_NAME
-from master.ssp.elements import Binding, Component, Connection, Connector, Leg
-from master.ssp.ssd import Structure, parameter_names
-from master.ssp.ssv import Parameter, Value, fits_integer
-from master.ssp.units import COMMON, Conversion, Unit, conversion
+from master.ssp.elements import Component, Connection, Connector, Leg
+from master.ssp.enumerations import Items
+from master.ssp.ssd import Structure
+from master.ssp.start_values import StartValues, listed
+from master.ssp.unit_checks import UnitChecks, unit_problems
+from master.ssp.units import Conversion
 from master.system import Component as SystemComponent
 from master.system import Connection as SystemConnection
 from master.system import Fmu, Variable
@@ -28,7 +33,13 @@ _CAUSALITIES = {
     "calculatedParameter": ("calculatedParameter",),
     "inout": (),
 }
-_SETTABLE = ("parameter", "input", "structuralParameter")
+#: Types of variables that can be connected.
+_EXCHANGED: Final = ("Real", "Integer", "Boolean", "String", "Enumeration")
+#: A pantograph's input that tells it the force, and a line's inputs that tell it the strip.
+_FORCE: Final = re.compile(r"contact\.(?:force|[xyz])")
+_STRIP: Final = re.compile(r"(?P<port>(?:pantograph\[\d+\]\.)?)[AB]\.v?[xyz]")
+#: Unconnected inputs of a component that are told by name.
+_MOST_TOLD: Final = 5
 
 
 @dataclass(frozen=True)
@@ -42,81 +53,127 @@ class _Endpoint:
 
 
 class Checker:
-    """Turns a structure and its FMUs into components and connections, collecting problems on the way."""
+    """Turns a structure and its FMUs into components and connections, collecting problems on the way.
 
-    def __init__(self, structure: Structure, fmus: Mapping[str, Fmu], problems: list[Problem]) -> None:
+    Parameters
+    ----------
+    structure : Structure
+    fmus : mapping
+        FMUs that could be read, by components' names.
+    problems, warnings : list of Problem
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        fmus: Mapping[str, Fmu],
+        problems: list[Problem],
+        warnings: list[Problem] | None = None,
+    ) -> None:
         self._structure = structure
         self._fmus = fmus
         self._problems = problems
+        self._warnings = [] if warnings is None else warnings
         # The first of a name counts; that there is a second one is reported elsewhere.
         self._named = {c.name: c for c in reversed(structure.components)}
         self._connectors = {(c.name, x.name): x for c in self._named.values() for x in reversed(c.connectors)}
+        self._units = UnitChecks(structure, fmus.values(), problems)
+        self._faulty: set[Connector] = set()
 
     def connections(self) -> tuple[SystemConnection, ...]:
         """Return the connections that are sound, in the order of the SSD."""
         self._check_names()
+        self._problems += unit_problems(self._structure, self._fmus.values())
+        for component in self._known:
+            for connector in component.connectors:
+                self._check_connector(component, connector)
         checked = (self._connection(c) for c in self._structure.connections)
         sound = tuple(c for c in checked if c is not None)
-        self._check_inputs(sound)
+        self._check_counts(sound)
         return sound
 
     def components(self, connections: tuple[SystemConnection, ...]) -> tuple[SystemComponent, ...]:
-        """Return the components whose FMUs could be read, with their parameters and exchanged variables."""
-        known = [c for c in self._structure.components if c.name in self._fmus]
-        for component in known:
-            for connector in component.connectors:
-                self._check_connector(component, connector)
-        return tuple(self._component(c, connections) for c in known)
+        """Return the components whose FMUs could be read, with their start values and exchanged variables."""
+        values = StartValues(self._structure, self._fmus, self._units, self._problems, self._warnings)
+        found = tuple(self._component(c, connections, values) for c in self._known)
+        self._check_inputs(found)
+        return found
 
-    def _component(self, c: Component, connections: tuple[SystemConnection, ...]) -> SystemComponent:
+    @property
+    def _known(self) -> list[Component]:
+        return [c for c in self._structure.components if c.name in self._fmus]
+
+    def _component(
+        self, c: Component, connections: tuple[SystemConnection, ...], values: StartValues
+    ) -> SystemComponent:
         outputs = dict.fromkeys(x.output for x in connections if x.source == c.name)
         inputs = dict.fromkeys(x.input for x in connections if x.target == c.name)
-        return SystemComponent(c.name, self._fmus[c.name], self._parameters(c), tuple(inputs), tuple(outputs))
+        fmu = self._fmus[c.name]
+        return SystemComponent(c.name, fmu, values.of(c), tuple(inputs), tuple(outputs), fmu.tolerance)
 
     def _report(self, line: int, rule: str, text: str, file: str = SSD_NAME) -> None:
         self._problems.append(Problem(file, line, rule, text))
 
     def _check_names(self) -> None:
-        counts = Counter(c.name for c in self._structure.components)
-        for component in self._structure.components:
-            if counts[component.name] > 1:
-                self._report(
-                    component.line,
-                    "name",
-                    f"component name '{component.name}' is used {counts[component.name]} times",
-                )
+        # Elements of one system with one name are told where they are read.
+        known = any(p.rule == "name" for p in self._problems)
+        counts = Counter() if known else Counter(c.name for c in self._structure.components)
+        for name, count in counts.items():
+            if count > 1:
+                line = next(c.line for c in self._structure.components if c.name == name)
+                self._report(line, "name", f"component name '{name}' is used {count} times")
         if not self._structure.components:
             self._report(0, "system", "the system has no components")
 
     def _check_connector(self, component: Component, connector: Connector) -> None:
         variable = self._fmus[component.name].variables.get(connector.name)
         where = f"connector '{component.name}.{connector.name}'"
+        before = len(self._problems)
         if variable is None:
             self._report(connector.line, "connector", f"{where}: the FMU {component.source} has no such variable")
-            return
+        else:
+            self._compare(connector, variable, where)
+        if len(self._problems) > before:
+            self._faulty.add(connector)
+
+    def _compare(self, connector: Connector, variable: Variable, where: str) -> None:
         if connector.kind == "inout":
             self._report(connector.line, "unsupported", f"{where}: kind 'inout' is not supported")
         elif variable.causality not in _CAUSALITIES.get(connector.kind, ()):
-            self._report(
-                connector.line,
-                "connector",
-                f"{where}: kind is '{connector.kind}', in the FMU '{variable.causality}'",
-            )
+            text = f"{where}: kind is '{connector.kind}', in the FMU '{variable.causality}'"
+            self._report(connector.line, "connector", text)
         if connector.type and connector.type != variable.type:
             self._report(connector.line, "type", f"{where}: type is {connector.type}, in the FMU {variable.type}")
+        elif connector.enumeration:
+            self._compare_items(connector, variable, where)
         if connector.unit and variable.unit:
-            self._convert(connector.unit, variable.unit, self._structure.units, connector.line, where)
+            self._units.convert(connector.unit, variable.unit, where, connector.line)
+
+    def _compare_items(self, connector: Connector, variable: Variable, where: str) -> None:
+        name = connector.enumeration
+        declared = self._structure.enumerations.get(name)
+        if declared is None:
+            text = f"{where}: enumeration '{name}' is not declared in ssd:Enumerations"
+            self._report(connector.line, "enumeration", text)
+        elif variable.items and declared != dict(variable.items):
+            text = f"{where}: enumeration '{name}' has the items {listed(declared)}"
+            self._report(connector.line, "enumeration", f"{text}, the FMU's type {listed(dict(variable.items))}")
 
     def _connection(self, c: Connection) -> SystemConnection | None:
         source = self._endpoint(c.start_element, c.start_connector, c.line)
         target = self._endpoint(c.end_element, c.end_connector, c.line)
-        if source is None or target is None:
-            return None
+        if source is None or target is None or self._faulty & {source.connector, target.connector}:
+            return None  # what is wrong with a connector is told there
         if source.connector.kind == "input" and target.connector.kind == "output":
             source, target = target, source
-        if (source.connector.kind, target.connector.kind) != ("output", "input"):
-            kinds = f"'{source.connector.kind}' to '{target.connector.kind}'"
-            self._report(c.line, "connection", f"connects kind {kinds}; an output must be connected to an input")
+        kinds = (source.connector.kind, target.connector.kind)
+        if "calculatedParameter" in kinds and "parameter" in kinds:
+            text = "connections from calculated parameters to parameters are not supported; bind a value instead"
+            self._report(c.line, "unsupported", text)
+            return None
+        if kinds != ("output", "input"):
+            text = f"connects kind '{kinds[0]}' to '{kinds[1]}'; an output must be connected to an input"
+            self._report(c.line, "connection", text)
             return None
         return self._directed(c, source, target)
 
@@ -134,15 +191,48 @@ class Checker:
 
     def _directed(self, c: Connection, source: _Endpoint, target: _Endpoint) -> SystemConnection | None:
         variables = [self._variable(end) for end in (source, target)]
-        for end, variable in zip((source, target), variables, strict=True):
-            if (variable.type if variable else end.connector.type) not in ("Real", ""):
-                name = f"'{end.full_name}'"
-                self._report(c.line, "unsupported", f"{name} is not Real; only Real variables can be connected")
-                return None
+        if not self._has_one_type(c, source, target, variables):
+            return None
         total = self._conversion(c, source, target, variables)
         return SystemConnection(
             source.component.name, source.connector.name, target.component.name, target.connector.name, total
         )
+
+    def _has_one_type(
+        self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
+    ) -> bool:
+        """Whether both ends are of the same type, which can be exchanged; reports what is not so."""
+        ends = [(end, v.type if v else end.connector.type) for end, v in zip((source, target), variables, strict=True)]
+        told = [kind for _, kind in ends if kind]
+        if len(set(told)) > 1:
+            text = " and ".join(f"'{end.full_name}' is {kind}" for end, kind in ends)
+            self._report(c.line, "type", f"{text}; only variables of the same type can be connected")
+            return False
+        kind = told[0] if told else "Real"
+        if kind not in _EXCHANGED:
+            self._report(c.line, "unsupported", f"'{source.full_name}' is {kind}, which cannot be exchanged")
+            return False
+        changed = any(not x.is_identity for x in (c.transformation, *(leg.transformation for leg in c.before)))
+        if kind != "Real" and changed:
+            text = f"'{source.full_name}' is {kind}; only Real values can have a LinearTransformation"
+            self._report(c.line, "type", text)
+            return False
+        return kind != "Enumeration" or self._has_same_items(c, source, target, variables)
+
+    def _has_same_items(
+        self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
+    ) -> bool:
+        known = [self._items(end, v) for end, v in zip((source, target), variables, strict=True)]
+        if known[0] is None or known[1] is None or known[0] == known[1]:
+            return True
+        text = f"'{source.full_name}' has the items {listed(known[0])}, '{target.full_name}' {listed(known[1])}"
+        self._report(c.line, "enumeration", f"{text}; connected enumerations must have the same ones")
+        return False
+
+    def _items(self, end: _Endpoint, variable: Variable | None) -> Items | None:
+        if variable is not None and variable.items:
+            return dict(variable.items)
+        return self._structure.enumerations.get(end.connector.enumeration)
 
     def _conversion(
         self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
@@ -151,15 +241,10 @@ class Checker:
         # The FMU's own unit is what the number is in; the connector's unit is what the SSD talks in.
         fmu_units = [v.unit if v else "" for v in variables]
         written = [end.connector.unit or u for end, u in zip((source, target), fmu_units, strict=True)]
-        units = self._structure.units
-        total = self._convert(fmu_units[0], written[0], units, c.line, where)
-        unit = written[0]
-        for leg in (*c.before, Leg(written[1], c.transformation, c.suppress_unit_conversion, c.line)):
-            wanted = leg.unit or unit
-            if not leg.suppress_unit_conversion:
-                total = total.then(self._convert(unit, wanted, units, leg.line, where))
-            total, unit = total.then(leg.transformation), wanted
-        total = total.then(self._convert(unit, fmu_units[1], units, c.line, where))
+        total = self._units.convert(fmu_units[0], written[0], where, c.line)
+        legs = (*c.before, Leg(written[1], c.transformation, c.suppress_unit_conversion, c.line))
+        way, unit = self._units.along(written[0], legs, where)
+        total = total.then(way).then(self._units.convert(unit, fmu_units[1], where, c.line))
         if not (math.isfinite(total.factor) and math.isfinite(total.offset)):
             text = f"{where}: factor {total.factor:g} and offset {total.offset:g} are not finite"
             self._report(c.line, "number", text)
@@ -169,106 +254,74 @@ class Checker:
         fmu = self._fmus.get(end.component.name)
         return fmu.variables.get(end.connector.name) if fmu else None
 
-    def _convert(self, source: str, target: str, units: Mapping[str, Unit], line: int, where: str) -> Conversion:
-        if source == target or not source or not target:
-            return Conversion()
-        known = {**COMMON, **units}
-        for name in (source, target):
-            if name not in known:
-                self._report(line, "unit", f"{where}: unit '{name}' is not declared in ssd:Units")
-                return Conversion()
-        found = conversion(known[source], known[target])
-        if found is None:
-            self._report(line, "unit", f"{where}: '{source}' and '{target}' do not measure the same thing")
-            return Conversion()
-        return found
-
-    def _check_inputs(self, connections: tuple[SystemConnection, ...]) -> None:
+    def _check_counts(self, connections: tuple[SystemConnection, ...]) -> None:
         counts = Counter((c.target, c.input) for c in connections)
+        counts.update((f.element, f.connector) for f in self._structure.feeds if not f.is_fed)
         for component in self._structure.components:
             for connector in component.connectors:
                 count = counts[component.name, connector.name]
-                where = f"input '{component.name}.{connector.name}'"
-                if connector.kind == "input" and count == 0:
-                    self._report(connector.line, "connection", f"{where} is declared but not connected")
                 if count > 1:
-                    self._report(connector.line, "connection", f"{where} has {count} connections; one is allowed")
+                    what = f"{connector.kind} '{component.name}.{connector.name}'"
+                    self._report(connector.line, "connection", f"{what} has {count} connections; one is allowed")
 
-    def _parameters(self, component: Component) -> dict[str, Value]:
-        values: dict[str, Value] = {}
-        for binding in component.bindings:
-            self._apply(component, binding, parameter_names(binding), values)
-        for binding in self._structure.bindings:  # the system's bindings take priority [SSP 1.0, ParameterBindings]
-            self._apply(component, binding, self._of_component(component, binding), values)
-        return values
+    def _inputs(self) -> Iterator[tuple[Component, Connector]]:
+        for component in self._structure.components:
+            for connector in component.connectors:
+                if connector.kind == "input":
+                    yield component, connector
 
-    def _of_component(self, component: Component, binding: Binding) -> dict[str, Parameter]:
-        start = f"{component.name}."
-        full = parameter_names(binding)
-        names = [c.name for c in self._structure.components]
-        if component is self._structure.components[0]:
-            for name, parameter in full.items():
-                if not any(name.startswith(f"{n}.") for n in names):
-                    self._report(parameter.line, "parameter", f"'{name}' belongs to no component", parameter.file)
-        return {name[len(start) :]: p for name, p in full.items() if name.startswith(start)}
+    def _check_inputs(self, components: tuple[SystemComponent, ...]) -> None:
+        """Warn of inputs that nothing feeds; a pantograph without its line, or the reverse, is a problem."""
+        touched = {(c.start_element, c.start_connector) for c in self._structure.connections}
+        touched |= {(c.end_element, c.end_connector) for c in self._structure.connections}
+        outside = {(f.element, f.connector): f.stops[0].full_name for f in self._structure.feeds if not f.is_fed}
+        for component in components:
+            open_inputs = [x for c, x in self._inputs() if c.name == component.name and (c.name, x.name) not in touched]
+            # What is wrong with a connector is told already.
+            sound = [x for x in open_inputs if x not in self._faulty]
+            free = [x for x in sound if not self._is_own_port(component, x)]
+            self._warn_of(component, [x for x in free if (component.name, x.name) not in outside])
+            self._warn_of_outside(component, [x for x in free if (component.name, x.name) in outside], outside)
 
-    def _apply(
-        self,
-        component: Component,
-        binding: Binding,
-        parameters: Mapping[str, Parameter],
-        values: dict[str, Value],
+    def _is_own_port(self, component: SystemComponent, connector: Connector) -> bool:
+        """Report an input by which a pantograph and its line are coupled; returns whether it is one."""
+        name, strip = connector.name, _STRIP.fullmatch(connector.name)
+        partner = f"{strip['port']}contact.force" if strip else "A.z" if _FORCE.fullmatch(name) else ""
+        variable = component.fmu.variables.get(partner)
+        if variable is None or variable.causality != "output":
+            return False
+        if any(p.rule == "connection" for p in self._problems):
+            return True  # a connection that is not sound may be the one
+        text = f"input '{component.name}.{name}' is declared but not connected; pantograph and line need each other"
+        self._report(connector.line, "connection", text)
+        return True
+
+    def _warn_of(self, component: SystemComponent, free: list[Connector]) -> None:
+        if len(free) == 1:
+            what = f"input '{component.name}.{free[0].name}' is declared but not connected; it keeps"
+            self._warn(free[0].line, f"{what} {_start(component, free[0])}")
+        elif free:
+            told = ", ".join(f"'{x.name}' {_start(component, x)}" for x in free[:_MOST_TOLD])
+            more = f" and {len(free) - _MOST_TOLD} more" if len(free) > _MOST_TOLD else ""
+            self._warn(free[0].line, f"inputs of '{component.name}' are declared but not connected; {told}{more}")
+
+    def _warn_of_outside(
+        self, component: SystemComponent, free: list[Connector], outside: Mapping[tuple[str, str], str]
     ) -> None:
-        units = {**self._structure.units, **binding.parameters.units}
-        for name, parameter in parameters.items():
-            value = self._parameter(component, name, parameter, units)
-            if value is not None:
-                values[name] = value
+        for x in free:
+            source = outside[component.name, x.name]
+            connector = self._structure.connectors[source]
+            text = f"nothing feeds '{source}', an {connector.kind} of a system; '{component.name}.{x.name}' keeps"
+            self._warn(connector.line, f"{text} {_start(component, x)}")
 
-    def _parameter(self, component: Component, name: str, p: Parameter, units: Mapping[str, Unit]) -> Value | None:
-        variable = self._fmus[component.name].variables.get(name)
-        where = f"parameter '{component.name}.{name}'"
-        if variable is None:
-            self._report(p.line, "parameter", f"{where}: the FMU {component.source} has no such variable", p.file)
-            return None
-        text = settable(variable, p.type)
-        if text:
-            self._report(p.line, "parameter", f"{where} {text}", p.file)
-            return None
-        if isinstance(p.value, str | bool):
-            return p.value
-        before = len(self._problems)
-        unit = "" if p.suppress_unit_conversion else p.unit
-        value = p.transformation(self._convert(unit, variable.unit, units, p.line, where)(p.value))
-        if len(self._problems) > before:
-            return None
-        text = out_of_range(variable, value)
-        if text:
-            self._report(p.line, "range", f"{where} {text}", p.file)
-            return None
-        return value if variable.type == "Real" else int(value)
+    def _warn(self, line: int, text: str) -> None:
+        self._warnings.append(Problem(SSD_NAME, line, "connection", text))
 
 
-def settable(variable: Variable, kind: str) -> str:
-    """Return why a parameter of type ``kind`` cannot be set on the variable, empty if it can."""
-    if variable.causality not in _SETTABLE:
-        return f"cannot be set: in the FMU it is of causality '{variable.causality}'"
-    if variable.variability == "constant":
-        return "cannot be set: in the FMU it is constant"
-    accepted = {"Real": ("Real", "Integer"), "Integer": ("Integer",), "Enumeration": ("Integer",)}
-    if kind not in accepted.get(variable.type, (variable.type,)):
-        return f"is written as {kind}, in the FMU it is {variable.type}"
-    return ""
-
-
-def out_of_range(variable: Variable, value: float) -> str:
-    """Return how a value violates its type, the declared minimum or maximum; empty if it does not."""
-    if variable.type != "Real" and not (fits_integer(value) and float(value).is_integer()):
-        return f"= {value} is not a whole number of 32 bits"
-    if not math.isfinite(value):
-        return f"= {value:g} is not finite"
-    if variable.minimum is not None and value < variable.minimum:
-        return f"= {value:g} {variable.unit} is below its minimum {variable.minimum:g}"
-    if variable.maximum is not None and value > variable.maximum:
-        return f"= {value:g} {variable.unit} is above its maximum {variable.maximum:g}"
-    return ""
+def _start(component: SystemComponent, connector: Connector) -> str:
+    """Return in words which value an input keeps, and whose it is."""
+    if connector.name in component.parameters:
+        value = component.parameters[connector.name]
+        return f"its start value {str(value).lower() if isinstance(value, bool) else value} of the scenario"
+    start = component.fmu.variables[connector.name].start
+    return "its start value of the FMU" if start is None else f"its start value {start} of the FMU"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.resources
 import math
+import re
 from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -29,6 +30,12 @@ SCHEMAS: Final = {
     "ssm": "SystemStructureParameterMapping.xsd",
 }
 _VERSIONED: Final = ("SystemStructureDescription", "ParameterSet", "ParameterMapping")
+#: What 2.0 calls the types that 1.0 has; its further types are refused.
+_RENAMED: Final = {"Float64": "Real", "Int32": "Integer"}
+#: What 2.0 may say about a file or an element beside what is run.
+_REMARKS: Final = (f"{{{SSC}}}MetaData", f"{{{SSC}}}Signature")
+#: Types of which XML Schema says no more than that a value is none.
+_TYPE_ERROR: Final = re.compile(r"is not a valid value of the (?:local )?atomic type")
 
 
 class XmlError(ValueError):
@@ -66,12 +73,17 @@ class Reader:
     ----------
     file : str
         Its name in messages.
-    problems : list of Problem
-        Shared by all documents of a scenario.
+    problems, warnings : list of Problem
+        What is wrong, and what can be run but may not be meant; shared by all documents of a scenario.
     """
 
     file: str
     problems: list[Problem] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
+
+    def beside(self, file: str) -> Reader:
+        """Return a reader of another file of the same scenario."""
+        return Reader(file, self.problems, self.warnings)
 
     def problem(self, node: Any, rule: str, text: str) -> None:
         """Record a problem at ``node`` (None: at the file as a whole)."""
@@ -81,10 +93,14 @@ class Reader:
         """Record a problem in a line of this file, or of another one of the scenario."""
         self.problems.append(Problem(file or self.file, line, rule, text))
 
+    def warn(self, line: int, rule: str, text: str, file: str | None = None) -> None:
+        """Record what can be run but may not be meant."""
+        self.warnings.append(Problem(file or self.file, line, rule, text))
+
     def parse(self, path: Path) -> Any | None:
         """Return the root element of ``path``; None (and a problem) if it is not well-formed XML."""
         try:
-            return safe_root(path.read_bytes())
+            return _in_first_words(safe_root(path.read_bytes()))
         except OSError as error:
             self.report(0, "file", f"cannot be read ({error.strerror})")
         except XmlError as error:
@@ -92,15 +108,21 @@ class Reader:
         return None
 
     def check_schema(self, root: Any, kind: str) -> None:
-        """Validate against the official SSP 1.0 schema of ``kind`` ('ssd', 'ssv' or 'ssm').
+        """Validate a document, or an element inside one, against the official SSP 1.0 schema of ``kind``.
 
-        A document of version 2.0 has to be one of 1.0 but for its version: what 2.0 added is not supported.
+        ``kind`` is 'ssd', 'ssv' or 'ssm'. What is of version 2.0 has to be of 1.0 but for its version and the names
+        of types: what 2.0 added is not supported.
         """
         if root.get("version") == "2.0":
             root = _as_first_version(root)
         schema = _schema(kind)
         schema.validate(root)
+        told: set[tuple[int, str]] = set()
         for entry in schema.error_log:
+            where = (int(entry.line), str(entry.path))
+            if where in told and _TYPE_ERROR.search(entry.message):
+                continue  # the same value again: first which rule it breaks, then that it is none of the type
+            told.add(where)
             self.problems.append(Problem(self.file, entry.line, "schema", _plain(entry.message)))
 
     def text(self, node: Any, name: str, default: str = "") -> str:
@@ -123,7 +145,7 @@ class Reader:
         raw = node.get(name)
         if raw is None:
             if default is None:
-                self.problem(node, "attribute", f"attribute '{name}' is missing")
+                self.replace_problem(node, name, "attribute", f"attribute '{name}' is missing")
                 return math.nan
             return default
         try:
@@ -132,9 +154,15 @@ class Reader:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            self.problem(node, "number", f"{name}='{raw}' is not a finite number")
+            self.replace_problem(node, raw, "number", f"{name}='{raw}' is not a finite number")
             return math.nan
         return value
+
+    def replace_problem(self, node: Any, what: str, rule: str, text: str) -> None:
+        """Record a problem with a name or value, in place of what the schema check has said of it in this line."""
+        place = (self.file, int(node.sourceline or 0), "schema")
+        self.problems[:] = [p for p in self.problems if (p.file, p.line, p.rule) != place or f"'{what}'" not in p.text]
+        self.problem(node, rule, text)
 
     def flag(self, node: Any, name: str, default: bool = False) -> bool:
         """Return an attribute of type xs:boolean."""
@@ -142,7 +170,7 @@ class Reader:
         if raw is None:
             return default
         if raw not in ("true", "false", "1", "0"):
-            self.problem(node, "boolean", f"{name}='{raw}' is neither true nor false")
+            self.replace_problem(node, raw, "boolean", f"{name}='{raw}' is neither true nor false")
         return raw in ("true", "1")
 
 
@@ -176,6 +204,18 @@ def elements(node: Any | None) -> Iterator[Any]:
     """Iterate over the child elements, leaving out comments and processing instructions."""
     if node is not None:
         yield from node.iterchildren(etree.Element)
+
+
+def _in_first_words(root: Any) -> Any:
+    """Give types of version 2.0 the names that they had in 1.0, and leave out what it says beside; in place."""
+    if root.get("version") != "2.0":
+        return root
+    for node in list(root.iter(etree.Element)):
+        if node.tag in _REMARKS and node.getparent() is not None:
+            node.getparent().remove(node)
+        elif namespace(node) in (SSC, SSV) and tag(node) in _RENAMED:
+            node.tag = f"{{{namespace(node)}}}{_RENAMED[tag(node)]}"
+    return root
 
 
 def _as_first_version(root: Any) -> Any:

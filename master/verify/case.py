@@ -38,10 +38,13 @@ class Run(_Data):
         Name of one that ships, or the path of one, relative to the case file, ending in ``.ssp``.
     start_only : bool
         Whether its first instant is enough (static figures).
+    set : dict of str to float
+        Parameters of components that are given other values, as with ``--set``: "catenary.contact.stiffness".
     """
 
     scenario: str = Field(min_length=1)
     start_only: bool = False
+    set: dict[str, float] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod

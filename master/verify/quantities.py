@@ -12,7 +12,7 @@ import numpy as np
 from master.arrays import BoolArray, FloatArray
 from master.contacts import track_position
 from master.errors import MasterError
-from master.line import Uplift, lies_within
+from master.line import Uplift, indexed, lies_within
 from master.quality import Quality, interval_mask
 from master.recorder import Recording
 from master.results import Assessment, Results
@@ -185,6 +185,30 @@ def _wave_speed(results: Results, choice: Choice) -> Measured:
     return Measured((3.6 * found[0],))
 
 
+def _elasticity(name: str) -> Callable[[Results, Choice], Measured]:
+    """Return what reads a static elasticity of the line [mm/N]."""
+
+    def measure(results: Results, choice: Choice) -> Measured:
+        found = [values[name] for values in results.geometry.values() if name in values]
+        if not found:
+            raise MissingQuantityError(f"no component tells '{name}'")
+        return Measured((1e3 * found[0],))
+
+    return measure
+
+
+def _dropper_length_range(results: Results, choice: Choice) -> Measured:
+    """Longest less shortest unstressed length of the droppers in the interval of interest."""
+    lengths = np.concatenate([
+        indexed(values, "dropper", "length")[interval_mask(indexed(values, "dropper", "x"), *results.interval)]
+        for values in results.geometry.values()
+    ] or [np.zeros(0)])  # fmt: skip
+    if not lengths.size:
+        raise MissingQuantityError("there is no dropper in the interval of interest")
+    remark = f"{len(lengths)} droppers, {lengths.max():.3f} to {lengths.min():.3f} m"
+    return Measured((1e3 * float(np.ptp(lengths)),), remark=remark)
+
+
 #: Every quantity by its key in a case file.
 QUANTITIES: Final[dict[str, Quantity]] = {
     "mean": Quantity("mean force", "N", 1, _figure(lambda q: q.mean)),
@@ -203,6 +227,9 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "uplift": Quantity("uplift at the supports, largest", "mm", 1, _largest_uplift),
     "uplift_at": Quantity("uplift at the supports, each", "mm", 1, _uplift_at, ("at",)),
     "uplift_spread": Quantity("spread of the supports' uplift", "%", 2, _uplift_spread, ("at",)),
+    "elasticity_mid_span": Quantity("elasticity, mid-span", "mm/N", 3, _elasticity("elasticity.mid_span")),
+    "elasticity_support": Quantity("elasticity, support", "mm/N", 3, _elasticity("elasticity.support")),
+    "dropper_length_range": Quantity("dropper lengths, longest less shortest", "mm", 0, _dropper_length_range),
     "slack_share": Quantity("droppers slack at passage", "%", 0, _slack_share, ("within",)),
     "en50367": Quantity("passes EN 50367", "", 0, _en50367, is_verdict=True),
     "wave_speed": Quantity("wave speed", "km/h", 1, _wave_speed),

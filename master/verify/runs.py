@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from master.errors import InterruptedRunError, MasterError
 from master.results import Results
 from master.run import run
-from master.scenario import open_scenario
+from master.scenario import Overrides, open_scenario
 from master.simulation import Observer
 from master.system import System
 from master.verify.case import Case
@@ -40,6 +40,14 @@ def first_instant(system: System) -> System:
     return replace(system, stop=system.start + system.step)
 
 
+class _Wanted(NamedTuple):
+    """A run as a case asks for it: scenario, whether its first instant is enough, parameters and their values."""
+
+    path: Path
+    start_only: bool
+    values: tuple[tuple[str, float], ...]
+
+
 @dataclass
 class Runs:
     """Makes runs and keeps them as long as the verification lasts.
@@ -61,7 +69,7 @@ class Runs:
     tell: Callable[[str], None] = lambda _: None
     build: bool = True
     _done: dict[str, Results | MasterError] = field(default_factory=dict)
-    _opened: dict[tuple[Path, bool], str] = field(default_factory=dict)
+    _opened: dict[_Wanted, str] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
 
     def get(self, case: Case, name: str) -> Results:
@@ -74,23 +82,24 @@ class Runs:
         InterruptedRunError
             If the user stops it.
         """
-        place = (case.scenario_path(name), case.runs[name].start_only)
-        if place not in self._opened:
-            self._opened[place] = self._make(*place)
-        outcome = self._done[self._opened[place]]
+        wanted = _Wanted(case.scenario_path(name), case.runs[name].start_only, tuple(case.runs[name].set.items()))
+        if wanted not in self._opened:
+            self._opened[wanted] = self._make(wanted)
+        outcome = self._done[self._opened[wanted]]
         if isinstance(outcome, MasterError):
             raise outcome
         return outcome
 
-    def _make(self, path: Path, start_only: bool) -> str:
+    def _make(self, wanted: _Wanted) -> str:
         """Make a run, unless there is one, and return the key under which it is kept."""
         try:
-            with open_scenario(path, tell=self.tell, build=self.build) as scenario:
-                return self._run(scenario.system, start_only)
+            overrides = Overrides(parameters={name: f"{value:.17g}" for name, value in wanted.values})
+            with open_scenario(wanted.path, overrides, self.tell, self.build) as scenario:
+                return self._run(scenario.system, wanted.start_only)
         except InterruptedRunError:
             raise
         except MasterError as error:
-            key = f"{path}, {start_only}"
+            key = str(wanted)
             self._done[key] = error
             return key
 

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from models.catenary.elements import (
     NODE_DOFS,
+    bar_geometric_stiffness,
     beam_geometric_stiffness,
     beam_mass,
     beam_stiffness,
@@ -120,6 +121,59 @@ def element_dofs(nodes: IntArray) -> IntArray:
     return (nodes[:, :, None] * NODE_DOFS + np.arange(NODE_DOFS)).reshape(len(nodes), 2 * NODE_DOFS)
 
 
+def pendulum_stiffness(bars: IntArray, tension: FloatArray, points: FloatArray) -> sp.csc_matrix:
+    """Return the stiffness of bars across their axes, from their tension, over all degrees of freedom (fixed ones too).
+
+    Parameters
+    ----------
+    bars : ndarray, shape (n, 2)
+        Their end nodes: droppers, steady arms.
+    tension : ndarray, shape (n,)
+        [N].
+    points : ndarray, shape (n_nodes, 3)
+        Where the nodes are [m].
+
+    Returns
+    -------
+    sparse, shape (6 n_nodes, 6 n_nodes)
+    """
+    along = points[bars[:, 1]] - points[bars[:, 0]]
+    length = np.linalg.norm(along, axis=1)
+    return _assembled(
+        bar_geometric_stiffness(along / length[:, None], tension, length),
+        _translations(bars),
+        NODE_DOFS * len(points),
+    )
+
+
+def _translations(bars: IntArray) -> IntArray:
+    """Return the translations of the ends of bars among the degrees of freedom, shape (n, 6)."""
+    return (bars[:, :, None] * NODE_DOFS + np.arange(3)).reshape(len(bars), 6)
+
+
+def steady_arm_tension(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, displacement: FloatArray
+) -> FloatArray:
+    """Return the axial force of every steady arm from its elongation [N], shape (n_arms,); negative where it pushes.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Reference positions [m].
+    displacement : ndarray, shape (6 n,)
+        From there [m, rad].
+    """
+    if definition.steady_arm is None:
+        return np.zeros(0)
+    end, node = mesh.arms.T
+    along = points[node] - points[end]
+    length = np.linalg.norm(along, axis=1)
+    move = displacement.reshape(-1, NODE_DOFS)[:, :3]
+    EA = definition.steady_arm.youngs_modulus * definition.steady_arm.area
+    tension: FloatArray = EA / length**2 * np.einsum("ij,ij->i", along, move[node] - move[end])
+    return tension
+
+
 def dropper_rows(mesh: CatenaryMesh, points: FloatArray) -> sp.csr_matrix:
     """Return the rows b with elongation of dropper j = b_j . d, shape (n_droppers, 6 n)."""
     lower, upper = mesh.droppers.T
@@ -153,6 +207,19 @@ def compression_ratio(definition: CatenaryDefinition, mesh: CatenaryMesh) -> Flo
     result = np.full(len(mesh.droppers), definition.dropper.compression_ratio)
     if definition.hanger is not None:
         result[mesh.is_hanger] = definition.hanger.compression_ratio
+    return result
+
+
+def slack_delay(definition: CatenaryDefinition, mesh: CatenaryMesh) -> FloatArray:
+    """Return how much of its rate counts with a dropper's elongation when it comes to slack [s], shape (n_droppers,).
+
+    Under the law "tension" spring and damper go slack together, k (e + alpha e') < 0: alpha. Under "elastic_only" the
+    spring does so alone: 0.
+    """
+    alpha = definition.damping.of("dropper").alpha
+    result = np.full(len(mesh.droppers), alpha if definition.dropper.slack_law == "tension" else 0.0)
+    if definition.hanger is not None:
+        result[mesh.is_hanger] = alpha if definition.hanger.slack_law == "tension" else 0.0
     return result
 
 
@@ -199,8 +266,7 @@ def _dropper_mass(definition: CatenaryDefinition, mesh: CatenaryMesh, points: Fl
         per_length[mesh.is_hanger] = definition.hanger.mass
     mass = per_length * dropper_lengths(mesh, points)
     pattern = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
-    dofs = (mesh.droppers[:, :, None] * NODE_DOFS + np.arange(3)).reshape(len(mass), 6)
-    return _assembled(mass[:, None, None] * pattern, dofs, size)
+    return _assembled(mass[:, None, None] * pattern, _translations(mesh.droppers), size)
 
 
 def _dropper_mass_damping(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:

@@ -31,7 +31,7 @@ class Columns:
     dropper_index : ndarray, shape (k,)
         Droppers that they stretch.
     dropper_force : ndarray, shape (k, n)
-        What that adds to their elastic forces [N/N].
+        What that adds to their pulls [N/N].
     """
 
     rows: slice | IntArray
@@ -61,7 +61,7 @@ class Compliance:
     B : sparse, shape (n_droppers, n_attached)
         Rows of dropper elongation.
     stiffness : ndarray, shape (n_droppers,)
-        Dropper force per elongation [N/m].
+        Pull of a dropper per elongation, within a step per change of it [N/m].
     """
 
     def __init__(self, factor: Factor, B: sp.csr_matrix, stiffness: FloatArray) -> None:

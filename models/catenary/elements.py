@@ -64,6 +64,26 @@ def beam_geometric_stiffness(tension: FloatArray, length: FloatArray) -> FloatAr
     return K
 
 
+def bar_geometric_stiffness(direction: FloatArray, tension: FloatArray, length: FloatArray) -> FloatArray:
+    """Return the stiffness N/L across bars under tension, by which they swing back as pendulums do.
+
+    (N/L) [[P, -P], [-P, P]] on the translations of both ends, with P = I - e e' what is left of them across the bar.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (n, 3)
+        Unit vectors e along the bars.
+    tension, length : ndarray, shape (n,)
+        Axial tension N [N], length L [m].
+
+    Returns
+    -------
+    ndarray, shape (n, 6, 6)
+    """
+    across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
+    return np.kron(np.array([[1.0, -1.0], [-1.0, 1.0]]), (tension / length)[:, None, None] * across)
+
+
 def beam_mass(mass: FloatArray, gyration: FloatArray, length: FloatArray) -> FloatArray:
     """Return the local consistent mass matrix of beams [2.6].
 

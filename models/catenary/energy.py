@@ -20,7 +20,9 @@ class LineBalance:
     """Steps a line and adds up the work of the contact forces on it and what its dampers take.
 
     Droppers are stored as if they carried compression, too; the forces that take it off them again belong to what the
-    line stores, not to the work done on it.
+    line stores, not to the work done on it. So are they damped; what takes that off them belongs to what is dissipated.
+    A dropper that is slack before its spring is loses what that still holds, and one that pulls before its spring is
+    taut is a damper.
 
     Parameters
     ----------
@@ -55,12 +57,15 @@ class LineBalance:
         np.copyto(self._modal, state.motion.modal[0])
         np.copyto(self._attached, state.motion.attached[0])
         loads, slack = [(state.loaded, state.load)], [(state.slack, state.compensation)]
+        released = self._released(state)
         result = self._model.step(state, step, motion)
         np.subtract(state.motion.modal[0], self._modal, out=self._modal)
         np.subtract(state.motion.attached[0], self._attached, out=self._attached)
         self._ledger.dissipated += self._damping.form(self._modal, self._attached) / step
         self._ledger.work += self._work([*loads, (state.loaded, state.load)])
-        self._compensated += self._compensation([*slack, (state.slack, state.compensation)])
+        undamped = self._undamped(released, self._released(state))
+        self._ledger.dissipated += undamped
+        self._compensated += undamped + self._compensation([*slack, (state.slack, state.compensation)])
         self._follow(motion.strip, result)
         return result
 
@@ -99,6 +104,24 @@ class LineBalance:
         self._stretch.add(self._attached, stretch)
         lacking = sum(0.5 * float(force @ stretch[slack]) for slack, force in instants)
         return float(rest @ stretch) - lacking
+
+    def _released(self, state: CatenaryState) -> FloatArray:
+        """Return what slack takes off the droppers besides their springs' compression [N], shape (n_droppers,)."""
+        model = self._model
+        released = np.zeros(len(model.slack_delay))
+        if model.slack_delay.any():
+            released[state.slack] = state.compensation
+            released -= model.unilateral * np.maximum(-model.spring_force(state), 0.0)
+            released[model.slack_delay == 0.0] = 0.0
+        return released
+
+    def _undamped(self, *instants: FloatArray) -> float:
+        """Return the work over a step of what is `_released`."""
+        if not any(released.any() for released in instants):
+            return 0.0
+        stretch = np.zeros(len(instants[0]))
+        self._stretch.add(self._attached, stretch)
+        return sum(0.5 * float(released @ stretch) for released in instants)
 
     def _follow(self, strips: FloatArray, result: ContactResult) -> None:
         """Add what the strips have done against the contacts since the last step."""

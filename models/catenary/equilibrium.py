@@ -22,6 +22,8 @@ from models.catenary.assembly import (
     dropper_lengths,
     dropper_rows,
     dropper_stiffness,
+    pendulum_stiffness,
+    steady_arm_tension,
 )
 from models.catenary.elements import NODE_DOFS
 from models.catenary.intervals import attachments
@@ -56,6 +58,8 @@ class StaticState:
         Static displacement from the reference: axial stretch, rotations of the wires [m, rad].
     dropper_force, dropper_length, unstrained_length : ndarray, shape (n_droppers,)
         Tension [N], length under tension and without it [m].
+    arm_force : ndarray, shape (n_arms,)
+        Tension of the steady arms [N].
     elastic_force : ndarray, shape (n_droppers,)
         Stiffness times stretch [N]: the tension, but negative where a given length leaves the dropper slack.
     matrices : Matrices
@@ -69,6 +73,7 @@ class StaticState:
     dropper_force: FloatArray
     dropper_length: FloatArray
     unstrained_length: FloatArray
+    arm_force: FloatArray
     elastic_force: FloatArray
     matrices: Matrices
     residual: float
@@ -102,14 +107,16 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
         matrices = assemble(definition, mesh, points)
         # Moving a reference point re-defines a wire's length, so it does not stretch the wire.
         stretch = axial_stiffness(definition, mesh, points) @ sp.diags(unstretched.ravel())
-        K = matrices.K - stretch + _swing(mesh, points, force)
+        # So do the guides act on moves of the reference alone, and vanish from the result with these.
+        guides = _swing(mesh, points, force) @ sp.diags(unstretched.ravel())
+        K = matrices.K - stretch + guides
         conditions = _conditions(definition, mesh, points, slack)
         displacement, force = _solve(definition, mesh, points, K, matrices.load, conditions)
         move = np.where(movable, displacement.reshape(-1, NODE_DOFS)[:, :3], 0.0)
         _check_move(definition, points, move)
         now_slack = _slack(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
         if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
-            # Without the guides of the iteration: what is left of them is below its tolerance, now it is gone.
+            # Without the guides: what is left of them is below the tolerance of the iteration, now it is gone.
             displacement, force = _solve(definition, mesh, points, matrices.K, matrices.load, conditions)
             return _static_state(definition, mesh, points, matrices, displacement, force, slack)
         _straighten(mesh, points, move)
@@ -234,17 +241,11 @@ def _solve(
 
 
 def _swing(mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> sp.csc_matrix:
-    """Return the lateral stiffness N/L of the droppers as pendulums.
+    """Return the stiffness N/L of the droppers across their axes, as pendulums.
 
-    It guides the iteration where nothing but the droppers holds a wire laterally, and vanishes from its result:
-    there the lateral displacements of the droppers' ends are zero.
+    It guides the iteration where nothing but the droppers holds a wire laterally.
     """
-    stiffness = np.maximum(force, 1.0) / dropper_lengths(mesh, points)
-    lower, upper = (mesh.droppers[:, k] * NODE_DOFS + 1 for k in (0, 1))
-    rows = np.concatenate([lower, upper, lower, upper])
-    columns = np.concatenate([lower, upper, upper, lower])
-    values = np.concatenate([stiffness, stiffness, -stiffness, -stiffness])
-    return sp.csc_matrix((values, (rows, columns)), shape=(mesh.fixed.size, mesh.fixed.size))
+    return pendulum_stiffness(mesh.droppers, np.maximum(force, 1.0), points)
 
 
 def _static_state(
@@ -257,6 +258,8 @@ def _static_state(
     slack: np.ndarray,
 ) -> StaticState:
     _check_tension(definition, mesh, points, force)
+    arm_force = steady_arm_tension(definition, mesh, points, displacement)
+    _check_arms(definition, mesh, points, arm_force)
     length = dropper_lengths(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
     stiffness = dropper_stiffness(definition, mesh, points)
     given = ~np.isnan(mesh.given_length)
@@ -269,6 +272,7 @@ def _static_state(
         dropper_force=force,
         dropper_length=length,
         unstrained_length=unstrained,
+        arm_force=arm_force,
         elastic_force=elastic,
         matrices=matrices,
         residual=_residual(mesh, points, matrices, displacement, force),
@@ -290,6 +294,22 @@ def _check_tension(definition: CatenaryDefinition, mesh: CatenaryMesh, points: F
         raise EquilibriumError(
             f"line '{definition.name}': {slack.size} dropper(s) would have to push to give the wanted profile: "
             f"{listed}; reduce the pre-sag or the rise to the anchors, or move the droppers"
+        )
+
+
+def _check_arms(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> None:
+    """Refuse steady arms that push; one that nothing but its own weight presses has the sign of no wire's pull."""
+    arm = definition.steady_arm
+    if arm is None:
+        return
+    pushing = np.flatnonzero(force < -GRAVITY * arm.mass * arm.length)
+    if pushing.size:
+        x = points[mesh.arms[pushing, 1], 0]
+        listed = ", ".join(
+            f"the arm at {a:.2f} m pushes with {-f:.1f} N" for a, f in list(zip(x, force[pushing], strict=True))[:8]
+        )
+        raise EquilibriumError(
+            f"line '{definition.name}': {listed}: it must pull; change its side or the stagger"
         )
 
 

@@ -22,6 +22,11 @@ _STEPS_PER_PERIOD: Final = 20.0
 _NAMED: Final = 8
 
 
+#: Longest delay of slack [s], and the rate of a dropper's elongation that it is told for [m/s].
+_LONGEST_DELAY: Final = 1e-3
+_STRETCHING: Final = 0.5
+
+
 class Named(Protocol):
     """A dropper: its name and where it is."""
 
@@ -120,3 +125,18 @@ def slack_warning(droppers: Sequence[Named], force: FloatArray) -> str:
     more = f" and {len(slack) - _NAMED} more" if len(slack) > _NAMED else ""
     is_one = len(slack) == 1
     return f"{'dropper' if is_one else 'droppers'} {listed}{more} {'is' if is_one else 'are'} slack at rest"
+
+
+def slack_law_warning(definition: CatenaryDefinition) -> str:
+    """Say so if droppers pull well before they are taut: N = max(0, k e + alpha k e') with a large alpha."""
+    alpha = definition.damping.of("dropper").alpha
+    hung = (("dropper", definition.dropper), ("hanger", definition.hanger))
+    named = [f"[{name}]" for name, item in hung if item is not None and item.slack_law == "tension"]
+    if not named or alpha <= _LONGEST_DELAY:
+        return ""
+    return (
+        f"with slack_law = \"tension\" and alpha = {alpha:g} s a dropper that lengthens at {_STRETCHING:g} m/s pulls "
+        f"{1e3 * alpha * _STRETCHING:.2g} mm before it is taut: give droppers a damping of their own, "
+        f"[damping.dropper] with alpha up to {_LONGEST_DELAY:g} s, or write slack_law = \"elastic_only\" in "
+        f"{' and '.join(named)}"
+    )

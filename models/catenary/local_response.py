@@ -1,11 +1,14 @@
 """Slack droppers and contacts: the few unknowns of a step that are not linear.
 
 The response of the line to dropper and contact forces is linear, so a step is one free solution of the whole line and
-then a small problem in the forces alone [1]_: with e the droppers' elastic force, f what a slack dropper must add
-to it, delta the penetrations and F the contact forces,
+then a small problem in the forces alone [1]_: with T what droppers would pull if they could push as well, f what a
+slack one must add to that, delta the penetrations and F the contact forces,
 
-    e = e_free - A_dd f + A_dc F,          f = max(0, -(1 - r) e),
+    T = T_free - A_dd f + A_dc F,          f = max(0, -(1 - r) T),
     delta = delta_free - A_cc F + A_cd f,  F = law(delta, delta').
+
+T is the elastic force, k e, where the spring goes slack alone, and k e + c e' where its damper does so too: within a
+step the rate is a1 times the change of the elongation, plus what is known, so that both are linear in f and F.
 
 It is solved by Newton's method on these max-functions: each iteration is exact for its set of slack droppers and
 closed contacts, so it ends when the set repeats.
@@ -121,7 +124,7 @@ class LocalProblem:
         Parameters
         ----------
         free_force : ndarray, shape (n_droppers,)
-            Elastic dropper forces of the free solution [N].
+            Pulls T of the droppers in the free solution [N].
         contacts : sequence of OpenContact
         strip_compliance : ndarray, shape (n_contacts, n_contacts)
             Retreat of the strips per contact force within the step [m/N]; zero for prescribed strips.
@@ -149,9 +152,9 @@ class LocalProblem:
             new_forces, compensation = coupling.newton_step(free_force, laws, forces, slack, compensation)
             change = np.abs(new_forces - forces).max(initial=0.0)
             forces = new_forces
-            elastic = coupling.dropper_force(free_force, forces, slack, compensation)
+            pull = coupling.dropper_force(free_force, forces, slack, compensation)
             penetration, velocity = coupling.penetration(forces, slack, compensation)
-            now_slack = np.flatnonzero(elastic < 0.0)
+            now_slack = np.flatnonzero(pull < 0.0)
             signature = (now_slack.tobytes(), (penetration > 0.0).tobytes())
             settled = change <= _TOLERANCE * (1.0 + forces.max(initial=0.0))
             same = np.array_equal(now_slack, slack)
@@ -203,9 +206,9 @@ class LocalProblem:
             return True
         if free_force.min(initial=0.0) >= 0.0:
             return False
-        elastic = free_force.copy()  # one that would be slack without the force may be near
-        elastic[columns.dropper_index] = near
-        return bool(elastic.min() < 0.0)
+        pull = free_force.copy()  # one that would be slack without the force may be near
+        pull[columns.dropper_index] = near
+        return bool(pull.min() < 0.0)
 
 
 class _Coupling:
@@ -227,11 +230,11 @@ class _Coupling:
                 self.contact_contact[i, j] += target.meeting.point.moved_by(point)
 
     def by_slack(self, slack: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what forces of slack droppers do to the elastic forces of all droppers and to the penetrations.
+        """Return what forces of slack droppers do to the pulls of all droppers and to the penetrations.
 
         Returns
         -------
-        d(-e)/df : ndarray, shape (n_droppers, n_slack)
+        d(-T)/df : ndarray, shape (n_droppers, n_slack)
         d(delta)/df : ndarray, shape (n_contacts, n_slack)
         """
         if slack is not self._slack:  # the set rarely changes
@@ -257,7 +260,7 @@ class _Coupling:
     def dropper_force(
         self, free: FloatArray, forces: FloatArray, slack: IntArray, compensation: FloatArray
     ) -> FloatArray:
-        """Return the elastic dropper forces under given forces."""
+        """Return the droppers' pulls under given forces."""
         return free + self.dropper_contact @ forces - self.by_slack(slack)[0] @ compensation
 
     def laws(self, forces: FloatArray, slack: IntArray, compensation: FloatArray) -> list[NormalForce]:
@@ -278,7 +281,7 @@ class _Coupling:
     ) -> tuple[FloatArray, FloatArray]:
         """Solve the problem linearised at the present forces, for the present set of slack droppers.
 
-        Contacts: F - slope (delta(F, f) - delta) = law; droppers of the set: f + (1 - r) e(F, f) = 0.
+        Contacts: F - slope (delta(F, f) - delta) = law; droppers of the set: f + (1 - r) T(F, f) = 0.
         """
         n, m = len(forces), slack.size
         system = np.eye(n + m)

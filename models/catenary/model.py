@@ -10,7 +10,13 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.assembly import compression_ratio, dropper_rows, dropper_stiffness
+from models.catenary.assembly import (
+    compression_ratio,
+    dropper_rows,
+    dropper_stiffness,
+    pendulum_stiffness,
+    slack_delay,
+)
 from models.catenary.compiled import make_stepper
 from models.catenary.compliance import Compliance
 from models.catenary.contact_wire import ContactWire, WireInterval
@@ -55,7 +61,7 @@ class CatenaryState:
     slack : ndarray of int
         Slack droppers.
     compensation : ndarray
-        What each of them lacks to its elastic force [N].
+        What each of them lacks to the force that it would carry if it could push [N].
     element : ndarray of int, shape (n_pantographs, n_sections)
         Element of the contact wire met last.
     impact_velocity : ndarray, shape (n_pantographs, n_sections)
@@ -122,9 +128,10 @@ class StripMotion:
 
 @dataclass(frozen=True)
 class _Step:
-    """What belongs to one step size."""
+    """What belongs to one step size; ``pull`` finds what a change of the attachments in it adds to droppers' pulls."""
 
     stepper: Stepper
+    pull: Product
     compliance: Compliance
     local: LocalProblem
     reactions: dict[tuple[int, int], Reaction] = field(default_factory=dict)
@@ -153,6 +160,7 @@ class CatenaryModel:
         #: What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
         self.rest_compensation = self.static.dropper_force - self.static.elastic_force
         self.unilateral = 1.0 - compression_ratio(definition, self.mesh)
+        self.slack_delay = slack_delay(definition, self.mesh)
         attached = attachments(self.mesh)
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
         self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.points)
@@ -161,8 +169,12 @@ class CatenaryModel:
             self.modes = self._modes([part for parts in by_wire for part in parts])
         self.B = self._dropper_rows()
         self._rest_load = self.B.T @ self.rest_compensation
-        #: Elastic forces of the droppers from the attachments' displacements.
+        #: Elastic forces of the droppers from the attachments' displacements; from velocities what counts beside them.
         self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
+        self._damp = Product(sp.diags(self.slack_delay * self.dropper_stiffness) @ self.B)
+        self._delayed = bool(self.slack_delay.any())
+        #: Their pulls at the end of a step from the attachments' motion at its beginning; `_Step.pull` finds the rest.
+        self._pull = self._pulls()
         #: What each of them pulls at.
         self._stretch = [(row.indices, row.data) for row in self.B]
         self.wires = tuple(self._wires(by_wire))
@@ -170,6 +182,13 @@ class CatenaryModel:
         self._law = CONTACT_LAWS[definition.contact.law]
         self._radii = definition.contact.wire_radius + definition.contact.strip_radius
         self._steps: dict[float, _Step] = {}
+
+    def _pulls(self) -> Product:
+        """Return k (x - w v), w the delay of the slack: v turns to a1 dx - v in a step."""
+        k = self.dropper_stiffness
+        by_velocity = sp.csr_matrix(sp.diags(-k * self.slack_delay) @ self.B)
+        by_velocity.eliminate_zeros()
+        return Product(sp.hstack([sp.diags(k) @ self.B, by_velocity]))
 
     def initial_state(self, pantographs: int = 1) -> CatenaryState:
         """Return the line at rest in its static shape."""
@@ -249,15 +268,15 @@ class CatenaryModel:
             If the slack droppers are not found.
         """
         now = self._step(step)
-        elastic = self._begin(now, state)
+        pull = self._begin(now, state)
         placed = [(s, *self.wires[s].locate(x), force) for s, x, force in forces]
         for s, element, xi, force in placed:
             interval = self.wires[s].interval(element)
             point = self._reaction(now, s, interval).point(element - interval.first, xi)
             now.stepper.apply(point, force)
             columns = point.reaction.columns
-            elastic[columns.dropper_index] += columns.dropper_force @ (force * point.load)
-        found = now.local.solve(elastic, (), np.zeros((0, 0)), state.slack)
+            pull[columns.dropper_index] += columns.dropper_force @ (force * point.load)
+        found = now.local.solve(pull, (), np.zeros((0, 0)), state.slack)
         self._apply(now, (), found)
         now.stepper.finish(state.motion)
         state.slack, state.compensation = found.slack, found.compensation
@@ -292,10 +311,23 @@ class CatenaryModel:
         return self._in_lap(result, strips)
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
-        """Return the force that every dropper carries [N], shape (n_droppers,): 0 where slack."""
+        """Return the tension of every dropper under its law [N], shape (n_droppers,): 0 where it is slack.
+
+        By the law "tension" that is all that the dropper carries, its damper's part included. By "elastic_only" it is
+        the elastic force; the damper, which knows no slack there, belongs to the proportional damping of the line and
+        comes on top, as it does in the wires.
+        """
+        force = self.spring_force(state)
+        if self._delayed:
+            self._damp.add(state.motion.attached[1], force)
+        slack = state.slack
+        force[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, force[slack] + state.compensation)
+        return force
+
+    def spring_force(self, state: CatenaryState) -> FloatArray:
+        """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""
         force = self.static.elastic_force.copy()
         self._tighten.add(state.motion.attached[0], force)
-        force[state.slack] += state.compensation
         return force
 
     def uplift(self, state: CatenaryState) -> FloatArray:
@@ -336,12 +368,21 @@ class CatenaryModel:
         droppers = stretch.T @ sp.diags(self.dropper_stiffness) @ stretch
         damping = self.definition.damping
         C = static.matrices.C + damping.of("dropper").alpha * droppers
-        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (static.matrices.K + droppers, static.matrices.M, C))
+        stiffness = static.matrices.K + droppers
+        if self.definition.dynamics.geometric_stiffness:
+            stiffness = stiffness + self._pendulums()  # not in C: alpha times it would be a damping that nothing has
+        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (stiffness, static.matrices.M, C))
         K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
         rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
         modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel(), self.mesh.owner)
         highest = self.definition.dynamics.highest_frequency
         return slower_than(modes, highest) if highest else modes
+
+    def _pendulums(self) -> sp.csc_matrix:
+        """Return what the static tension of droppers and steady arms holds them back by; none where they are slack."""
+        mesh, static = self.mesh, self.static
+        tension = np.concatenate([static.dropper_force, static.arm_force])
+        return pendulum_stiffness(np.vstack([mesh.droppers, mesh.arms]), np.maximum(tension, 0.0), static.positions)
 
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:
@@ -378,7 +419,8 @@ class CatenaryModel:
         newmark = Newmark(step)
         with self._solvable(f"make steps of {step:g} s"):
             stepper = make_stepper(self.modes, newmark)
-        compliance = Compliance(stepper.factor, self.B, self.dropper_stiffness)
+        by_change = self.dropper_stiffness * (1.0 + newmark.a1 * self.slack_delay)
+        compliance = Compliance(stepper.factor, self.B, by_change)
         local = LocalProblem(
             unilateral=self.unilateral,
             dropper_columns=compliance.dropper_columns,
@@ -386,10 +428,10 @@ class CatenaryModel:
             law=self._law,
             parameters=self.definition.contact,
         )
-        return _Step(stepper, compliance, local)
+        return _Step(stepper, Product(sp.diags(by_change) @ self.B), compliance, local)
 
     def _begin(self, now: _Step, state: CatenaryState) -> FloatArray:
-        """Find the free changes of the step; return the droppers' elastic forces at its end [N].
+        """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N].
 
         What a dropper that is slack at rest lacks is part of the static state, so it acts at both ends of the step.
         """
@@ -402,10 +444,10 @@ class CatenaryModel:
             interval = self.wires[s].interval(element)
             known.append(Known(self._reaction(now, s, interval), element - interval.first, xi, force))
         now.stepper.begin(state.motion, pressed, known)
-        np.add(state.motion.attached[0], now.stepper.attached, out=pressed)
-        elastic = self.static.elastic_force.copy()
-        self._tighten.add(pressed, elastic)
-        return elastic
+        pull = self.static.elastic_force.copy()
+        self._pull.add(state.motion.attached.ravel(), pull)
+        now.pull.add(now.stepper.attached, pull)
+        return pull
 
     def _open_contacts(
         self, now: _Step, state: CatenaryState, motion: StripMotion

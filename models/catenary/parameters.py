@@ -22,6 +22,8 @@ from models.schema import count, quantity
 
 LineType = Literal["simple", "stitched", "compound"]
 LINE_TYPES: tuple[LineType, ...] = ("simple", "stitched", "compound")
+SlackLaw = Literal["tension", "elastic_only"]
+SLACK_LAWS: tuple[SlackLaw, ...] = ("tension", "elastic_only")
 GRAVITY = 9.81
 #: Poisson ratio 0.3: G = E / 2.6 (round solid section).
 SHEAR_RATIO = 2.6
@@ -61,7 +63,12 @@ class StitchWire(Wire):
 
 @dataclass(frozen=True, kw_only=True)
 class Dropper:
-    """A dropper: carries tension only."""
+    """A dropper: carries tension only.
+
+    With k its stiffness, e its elongation and c = alpha k what its damping makes of that, ``slack_law`` says what it
+    carries: with "tension" N = max(0, k e + c e'), nothing where it is slack; with "elastic_only" N = max(0, k e), and
+    c e' beside it whether it is slack or not, as the 2012 thesis has it [2.11].
+    """
 
     stiffness: float | None = quantity(
         "N/m", "axial stiffness (instead of EA/L)", default=None, minimum=1.0, maximum=1e12
@@ -72,6 +79,7 @@ class Dropper:
     compression_ratio: float = quantity(
         "1", "stiffness in compression over that in tension", default=0.0, minimum=0.0, maximum=1.0
     )
+    slack_law: SlackLaw = "tension"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,11 +168,16 @@ class Mesh:
 
 @dataclass(frozen=True, kw_only=True)
 class Dynamics:
-    """How much of the wires' motion between their attachments is computed."""
+    """What of the line's motion about its static shape is computed."""
 
     highest_frequency: float = quantity(
         "Hz", "natural frequency above which modes of the wires between attachments are left out; 0: none are",
         default=0.0, minimum=0.0, maximum=1e9,
+    )  # fmt: skip
+    geometric_stiffness: int = count(
+        "whether the tension of droppers and steady arms holds them back as pendulums, by N/L across them: 1 yes, "
+        "0 no, as in the 2012 thesis",
+        default=1, minimum=0, maximum=1,
     )  # fmt: skip
 
 
@@ -465,7 +478,7 @@ def _check_type(
 
 
 def _read_dropper(table: Table) -> Dropper:
-    dropper = schema.read(Dropper, table)
+    dropper = schema.read(Dropper, table, slack_law=table.text("slack_law", default="tension", choices=SLACK_LAWS))
     if dropper.stiffness is None and (dropper.area is None or dropper.youngs_modulus is None):
         table.problem("stiffness", "give either stiffness, or area and youngs_modulus")
     return dropper

@@ -10,12 +10,15 @@ from models.catenary.energy import LineBalance
 from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.parameters import CatenaryDefinition
-from models.catenary.statics import contact_wire_wave_speed
+from models.catenary.statics import contact_wire_wave_speed, elasticity
 from models.contact import application_point
 from models.energy import NO_BALANCE
 from models.extrapolation import StripExtrapolation
 from models.part import FloatArray, IntArray, Snapshot
 from models.time_integration import steps_within
+
+#: Force under which a line's elasticity is told [N].
+_PUSH = 100.0
 
 
 @dataclass(frozen=True)
@@ -161,6 +164,16 @@ class CatenaryPart:
     def contact_wire_wave_speed(self) -> FloatArray:
         """Return the speed of waves in the contact wire, taken for the longest span [m/s], shape (1,)."""
         return np.array([contact_wire_wave_speed(self.definition)])
+
+    @property
+    def elasticity(self) -> FloatArray:
+        """Return the static elasticity at mid-span and at the support before it [m/N], shape (2,).
+
+        Under 100 N, in the span in the middle of the first section.
+        """
+        spans = self.definition.sections[0].spans
+        span = spans[len(spans) // 2]
+        return elasticity(self.model, np.array([(span.start + span.end) / 2.0, span.start]), _PUSH).value
 
     def initialise(self, time: float, strips: FloatArray) -> None:
         """Put the line to rest at ``time`` and find the contacts of the strips with it.

@@ -14,16 +14,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.catenary.assembly import beam_properties
 from models.catenary.band import factorised
 from models.catenary.compliance import Compliance
 from models.catenary.contact_wire import ContactWire
-from models.catenary.elements import NODE_DOFS
 from models.catenary.local_response import LocalProblem
 from models.catenary.model import CatenaryModel
 from models.catenary.parameters import CatenaryDefinition, Span, Wire
 from models.contact import CONTACT_LAWS
-from models.part import BoolArray, FloatArray, IntArray
+from models.part import BoolArray, FloatArray
 
 #: Highest speed of operation over the wave speed (EN 50119; section 2.1 of the 2012 thesis).
 OPERATION_LIMIT = 0.7
@@ -107,11 +105,14 @@ class ArmLoads:
         Lateral force of the contact wire on the arm [N], positive where the arm is in tension.
     lift : ndarray
         Vertical force of the arm's tension on the contact wire [N], positive up; its weight comes on top.
+    pendulum : ndarray
+        What the arm resists motion across its axis with, N/l [N/m].
     """
 
     x: FloatArray
     lateral: FloatArray
     lift: FloatArray
+    pendulum: FloatArray
 
 
 @dataclass(frozen=True)
@@ -209,18 +210,17 @@ def within(profile: Profile, span: Span) -> BoolArray:
 def arm_loads(model: CatenaryModel, section: int = 0) -> ArmLoads:
     """Return the loads of a section's steady arms, from their elongation."""
     mesh, static = model.mesh, model.static
-    arms = mesh.arms[mesh.section[mesh.arms[:, 1]] == section]
-    end, node = arms.T
+    chosen = mesh.section[mesh.arms[:, 1]] == section
+    end, node = mesh.arms[chosen].T
     along = static.points[node] - static.points[end]
-    length = np.linalg.norm(along, axis=1)[:, None]
-    along = along / length
-    move = static.displacement.reshape(-1, NODE_DOFS)[:, :3]
-    EA = beam_properties(model.definition, mesh).EA[_beams_of(mesh.beams, arms)]
-    tension = EA / length[:, 0] * np.einsum("ij,ij->i", along, move[node] - move[end])
+    length = np.linalg.norm(along, axis=1)
+    along /= length[:, None]
+    tension = static.arm_force[chosen]
     return ArmLoads(
         static.positions[node, 0],
         tension * np.linalg.norm(along[:, :2], axis=1),
         -tension * along[:, 2],
+        np.maximum(tension, 0.0) / length,
     )
 
 
@@ -288,9 +288,3 @@ class _StaticResponse:
             displacement[column.rows] -= compensation * column.values[:, 0]
         inside = force * modal @ (modal / model.modes.eigenvalue[interval.modes])
         return float(ends @ displacement[interval.ends] + inside)
-
-
-def _beams_of(beams: IntArray, pairs: IntArray) -> IntArray:
-    """Return the indices of the beams with these end nodes."""
-    index = {(int(i), int(j)): k for k, (i, j) in enumerate(beams)}
-    return np.array([index[int(i), int(j)] for i, j in pairs], dtype=np.int64)

@@ -86,6 +86,7 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     warn([
         limits.speed_warning(definition, arguments.speed / 3.6),
         limits.slack_warning(part.droppers, model.static.dropper_force),
+        limits.slack_law_warning(definition),
     ])
     return LineStatics(
         model=model,
@@ -110,6 +111,7 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
         (f"elasticity at {e.force:g} N, maximum [mm/N]", f"{1e3 * e.maximum:.4f}"),
         ("non-uniformity of elasticity u [%]", f"{100.0 * e.non_uniformity:.1f}"),
         *_arm_rows(result),
+        ("law by which droppers slacken", result.model.definition.dropper.slack_law),
         ("wave speed C [km/h]", f"{3.6 * w.speed:.1f}"),
         ("limit of operation 0.7 C [km/h]", f"{3.6 * w.limit:.1f}"),
         ("reflection factor r", f"{w.reflection:.4f}"),
@@ -158,6 +160,7 @@ def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
     return [
         (f"steady arm at {result.span.start:g} m, lateral load [N]", f"{result.arms.lateral[arm]:.1f}"),
         (f"steady arm at {result.span.start:g} m, lift by its tension [N]", f"{result.arms.lift[arm]:.1f}"),
+        (f"steady arm at {result.span.start:g} m, stiffness N/l [N/m]", f"{result.arms.pendulum[arm]:.1f}"),
     ]
 
 

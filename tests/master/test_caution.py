@@ -86,7 +86,10 @@ def test_a_quiet_run_keeps_them_in_its_summary(toy, tmp_path, capfd):
 
 
 def test_the_report_does_not_take_them_for_markup():
-    summary = {"status": "complete", "warnings": [{"component": "<b>", "text": "<script>"}]}
+    said = [{"component": "<b>", "text": "<script>"}]
+    summary = {"status": "complete", "warnings": said, "scenario_warnings": ["<i>"]}
     page = _head(summary, ())
     assert "&lt;b&gt; warns: &lt;script&gt;" in page
     assert "<script>" not in page
+    assert "<i>" not in page
+    assert "&lt;i&gt;" in page

@@ -131,6 +131,15 @@ def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
     assert not (tmp_path / "X.fmu").exists()
 
 
+def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypatch):
+    (tmp_path / "slavemodule.txt").write_text("x")
+    (tmp_path / "pythonfmu").mkdir()
+    (tmp_path / "pythonfmu" / "__init__.py").write_text("raise ImportError('of another FMU')")
+    before = store.fingerprint("Pantograph_CX")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert store.fingerprint("Pantograph_CX") == before
+
+
 def test_the_builders_words_are_passed_on(builder, tmp_path):
     builder.code, builder.said = 1, "warning\nerror: X: tension is negative"
     with pytest.raises(ValueError, match="cannot be built: X: tension is negative"):

@@ -48,6 +48,7 @@ def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -
             "area": [12, "mm2", source],
             "mass": [0.11, "kg/m", source],
             "youngs_modulus": [84.7, "GPa", source],
+            "slack_law": "elastic_only",  # as LN2 with its damping
         },
         "steady_arm": {
             "area": [120, "mm2", source],

@@ -8,6 +8,33 @@ from models.catenary.contact_wire import height_polynomials
 from models.catenary.elements import NODE_DOFS
 
 
+def pendulum_stiffness(model):
+    """Return N/L (I - e e') of every dropper and steady arm, bar by bar, shape (6 n, 6 n)."""
+    mesh, static = model.mesh, model.static
+    bars = [*zip(mesh.droppers.tolist(), static.dropper_force.tolist(), strict=True)]
+    bars += zip(mesh.arms.tolist(), static.arm_force.tolist(), strict=True)
+    result = sp.lil_matrix((mesh.fixed.size, mesh.fixed.size))
+    for (a, b), tension in bars:
+        along = static.positions[b] - static.positions[a]
+        length = np.linalg.norm(along)
+        across = max(tension, 0.0) / length * (np.eye(3) - np.outer(along, along) / length**2)
+        first, second = (slice(NODE_DOFS * node, NODE_DOFS * node + 3) for node in (a, b))
+        for i, j, sign in ((first, first, 1.0), (second, second, 1.0), (first, second, -1.0), (second, first, -1.0)):
+            result[i, j] += sign * across
+    return result.tocsr()
+
+
+def pulls(model, elongation, rate):
+    """Return what droppers would pull if they could push [N]: spring and damper where these go slack together."""
+    alpha = model.definition.damping.of("dropper").alpha
+    together = np.array([_dropper(model, hanger).slack_law == "tension" for hanger in model.mesh.is_hanger])
+    return model.static.elastic_force + model.dropper_stiffness * (elongation + together * alpha * rate)
+
+
+def _dropper(model, is_hanger):
+    return model.definition.hanger if is_hanger else model.definition.dropper
+
+
 class NodalLine:
     """Matrices over the free degrees of freedom of the nodes in global axes, droppers included."""
 
@@ -18,7 +45,8 @@ class NodalLine:
         index[self.free] = np.arange(len(self.free))
         self.B = dropper_rows(mesh, static.positions)[:, self.free].tocsr()
         droppers = self.B.T @ sp.diags(model.dropper_stiffness) @ self.B
-        matrices = (static.matrices.K, static.matrices.M, static.matrices.C)
+        pendulums = model.definition.dynamics.geometric_stiffness * pendulum_stiffness(model)
+        matrices = (static.matrices.K + pendulums, static.matrices.M, static.matrices.C)
         K, M, C = (matrix.tocsr()[self.free][:, self.free] for matrix in matrices)
         self.K, self.M = (K + droppers).tocsc(), M.tocsc()
         self.C = (C + model.definition.damping.of("dropper").alpha * droppers).tocsc()

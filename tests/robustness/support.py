@@ -94,10 +94,16 @@ def assert_refused(answer: Answer, *parts: str, codes: Sequence[int] = (1, 2)) -
     assert_lines(answer.err.splitlines())
 
 
-def assert_accepted(answer: Answer, *parts: str) -> None:
-    """The command did its work and had nothing to complain about."""
+def assert_accepted(answer: Answer, *parts: str, warned: Sequence[str] = ()) -> None:
+    """The command did its work and had nothing to complain about but what it had to warn of."""
     assert_quick(answer)
-    assert (answer.code, answer.err) == (0, ""), answer
+    assert answer.code == 0, answer
+    if not warned:
+        assert answer.err == "", answer
+    said = " ".join(answer.err.split())
+    for part in warned:
+        assert part in said, (part, said)
+    assert said.count("warning: ") == len(warned), said
     for part in parts:
         assert part in answer.out, (part, answer.out)
 

@@ -30,14 +30,14 @@ def rewrite(scenario, **changed):
         (scenario / name.replace("__", ".")).write_bytes(data)
 
 
-def verdict(scenario, *place):
-    """Whether the scenario is accepted; if not, that it is refused in words."""
+def verdict(scenario, *place, warned=lambda: ()):
+    """Whether the scenario is accepted, with the warnings that it must have; if not, that it is refused in words."""
     answer = ask(main, "validate", scenario, "--no-build")
     if answer.code:
         assert_refused(answer, codes=(1,))
         assert any(name in answer.err for name in place), answer.err
         return False
-    assert_accepted(answer, "valid")
+    assert_accepted(answer, "valid", warned=warned())
     return True
 
 
@@ -101,13 +101,22 @@ def test_mappings(scenario, change):
     TRIED["mapping, blindly"] += 1
     data = change(MAPPING.encode())
     rewrite(scenario, SystemStructure__ssd=MAPPED.encode(), m__ssm=data)
-    if not verdict(scenario, "m.ssm", "parameter 'pantograph."):
-        return
     wanted, values = {}, {"static_force": 140.0, "ripple": 20.0}
+
+    def warned():
+        entries = [n for n in ElementTree.fromstring(data).iter() if n.tag.endswith("}MappingEntry")]
+        sources = {n.get("source") for n in entries}
+        if not sources <= set(values):
+            return ["the parameter set holds no"]
+        return ["the mapping names no"] if sources and sources != set(values) else []
+
+    if not verdict(scenario, "m.ssm", "parameter 'pantograph.", warned=warned):
+        return
     for entry in (n for n in ElementTree.fromstring(data).iter() if n.tag.endswith("}MappingEntry")):
         linear = next((n for n in entry if n.tag.endswith("}LinearTransformation")), ElementTree.Element("x"))
         factor, offset = float(linear.get("factor", "1")), float(linear.get("offset", "0"))
-        wanted[entry.get("target")] = factor * values[entry.get("source")] + offset
+        if entry.get("source") in values:
+            wanted[entry.get("target")] = factor * values[entry.get("source")] + offset
     with open_scenario(scenario, build=False) as opened:
         assert opened.system.component("pantograph").parameters == wanted
 

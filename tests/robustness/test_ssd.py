@@ -167,7 +167,7 @@ def test_every_element_and_attribute(scenario, maker, file):
 
 def test_line_100_is_no_emoji(scenario):
     (scenario / SSD).write_text("\n" * 99 + "<nothing/>", encoding="utf-8")
-    assert "\nSystemStructure.ssd:100: is not" in ask(main, "validate", scenario, "--no-build").err
+    assert "error: SystemStructure.ssd:100: is not" in ask(main, "validate", scenario, "--no-build").err
 
 
 INPUT = '<ssd:Connector name="{}" kind="input"><ssc:Real/></ssd:Connector>'

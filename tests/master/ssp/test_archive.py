@@ -7,7 +7,7 @@ import pytest
 
 from master.errors import ScenarioError
 from master.ssp import archive
-from master.ssp.archive import extract, inside, open_package
+from master.ssp.archive import Sources, extract, open_package
 
 
 def make(path, members):
@@ -88,12 +88,12 @@ def test_missing_scenarios_are_named(tmp_path):
 
 @pytest.mark.parametrize("source", ["../x.fmu", "/x.fmu", "a/../../x", "file:/x", "http://host/x.fmu", "a\\..\\x"])
 def test_sources_outside_the_scenario_are_refused(tmp_path, source):
-    assert inside(tmp_path, source) is None
+    assert Sources(tmp_path).find(source) is None
 
 
 def test_links_out_of_the_scenario_are_refused(tmp_path):
     (tmp_path / "s").mkdir()
     (tmp_path / "secret").write_text("x")
     (tmp_path / "s" / "link").symlink_to(tmp_path / "secret")
-    assert inside(tmp_path / "s", "link") is None
-    assert inside(tmp_path / "s", "resources/X.fmu") == tmp_path / "s" / "resources" / "X.fmu"
+    assert Sources(tmp_path / "s").find("link") is None
+    assert Sources(tmp_path / "s").find("resources/X.fmu") == tmp_path / "s" / "resources" / "X.fmu"

@@ -8,7 +8,7 @@ import pytest
 
 from master.errors import ScenarioError
 from master.run import loaded, run
-from master.scenario import open_scenario
+from master.scenario import Overrides, open_scenario
 from master.ssp.units import Conversion
 
 FORCE = "catenary.pantograph[1].contact.force"
@@ -156,7 +156,15 @@ def test_an_inline_mapping_after_a_prefix(toy, toy_text):
 def test_mistakes_in_a_mapping_are_found_with_file_and_line(toy, toy_text):
     (toy / "m.ssm").write_text(MAPPING.format("mass"))
     rewrite(toy, toy_text().replace(BINDING, MAPPED))
-    assert problems(toy) == ["m.ssm:7: the parameter set holds no 'mass' [mapping]"]
+    with open_scenario(toy, build=False) as scenario:
+        told = "m.ssm:7: the parameter set holds no 'mass': nothing is set for 'speed' [mapping]"
+        assert scenario.system.warnings == (told,)
+    (toy / "m.ssm").write_text(re.sub('.*"{}".*\n', "", MAPPING))
+    with open_scenario(toy, Overrides(strict=True), build=False) as scenario:  # a note is not even strictly a mistake
+        told = "m.ssm:4: the mapping names no 'ripple' of the parameter set: not used [note]"
+        assert scenario.system.warnings == (told,)
+    (toy / "m.ssm").write_text(MAPPING.format("ripple").replace('target="speed"', 'target="static_force"'))
+    assert problems(toy) == ["m.ssm:7: 'static_force' is the target of two entries; remove one [mapping]"]
 
 
 def test_version_2_with_what_1_had(toy, toy_text, flat, tmp_path):
@@ -169,11 +177,11 @@ def test_version_2_with_what_1_had(toy, toy_text, flat, tmp_path):
 
 def test_what_version_2_adds_is_refused_with_its_line(toy, toy_text):
     text = toy_text().replace('version="1.0" name="toy"', 'version="2.0" name="toy"')
-    text = text.replace('name="A.x" kind="output"><ssc:Real/>', 'name="A.x" kind="output"><ssc:Float64/>')
+    text = text.replace('name="A.x" kind="output"><ssc:Real/>', 'name="A.x" kind="output"><ssc:Float32/>')
     rewrite(toy, text)
     found = problems(toy)
-    line = 1 + text[: text.index("ssc:Float64")].count("\n")
-    assert any(f"SystemStructure.ssd:{line}:" in p and "ssc:Float64" in p for p in found)
+    line = 1 + text[: text.index("ssc:Float32")].count("\n")
+    assert any(f"SystemStructure.ssd:{line}:" in p and "ssc:Float32" in p for p in found)
 
 
 @pytest.mark.parametrize(
@@ -198,8 +206,8 @@ def test_mistakes_in_nested_systems_are_found(toy, toy_text, old, new, text):
     assert any(text in p for p in problems(toy)), problems(toy)
 
 
-def test_inputs_from_outside_are_refused(toy, toy_text):
-    """Nothing feeds the whole system's own inputs."""
+def test_a_pantograph_is_not_fed_from_outside(toy, toy_text):
+    """Nothing feeds the whole system's own inputs, which no contact can do with."""
     text = toy_text().replace(
         '<ssd:System name="toy">',
         f'<ssd:System name="toy"><ssd:Connectors>{INPUT.format("wind", "")}</ssd:Connectors>',
@@ -211,7 +219,7 @@ def test_inputs_from_outside_are_refused(toy, toy_text):
         text.replace(wire, '<ssd:Connection startConnector="wind" endElement="pantograph" endConnector="contact.x"/>'),
     )
     found = problems(toy)
-    assert any("'wind' of system 'toy' is an input from outside, which nothing feeds here" in p for p in found)
+    assert ["input 'pantograph.contact.x' is declared but not connected" in p for p in found] == [True]
 
 
 def test_validate_lists_all_problems_at_once(toy, toy_text, capsys):
@@ -219,7 +227,7 @@ def test_validate_lists_all_problems_at_once(toy, toy_text, capsys):
 
     text = nest(toy_text()).replace('endConnector="A.y"', 'endConnector="nix"', 1)
     text = text.replace('stopTime="1.0"', 'stopTime="-1"').replace(BINDING, MAPPED)
-    (toy / "m.ssm").write_text(MAPPING.format("mass"))
+    (toy / "m.ssm").write_text(MAPPING.format("ripple").replace('target="speed"', 'target="static_force"'))
     rewrite(toy, text)
     assert main(["validate", str(toy), "--no-build"]) == 1
     said = capsys.readouterr().err

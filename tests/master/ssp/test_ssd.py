@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from master.ssp.archive import Sources
 from master.ssp.ssd import read_structure
 from master.ssp.units import Conversion
 from master.ssp.xml import Reader
@@ -16,7 +17,7 @@ def read(folder, text, ssv=None):
     if ssv is not None:
         (folder / "parameters.ssv").write_text(ssv)
     reader = Reader("SystemStructure.ssd")
-    return read_structure(folder, reader), reader.problems
+    return read_structure(Sources(folder), reader), reader.problems
 
 
 def line_of(text, part):
@@ -43,7 +44,7 @@ def test_the_toy_is_read_without_problems(base, tmp_path):
 @pytest.mark.parametrize("folder", sorted(SCENARIOS.glob("*.ssp")), ids=lambda p: p.name)
 def test_our_scenarios_are_valid_against_the_official_schemas(folder):
     reader = Reader("SystemStructure.ssd")
-    structure = read_structure(folder, reader)
+    structure = read_structure(Sources(folder), reader)
     assert reader.problems == []
     assert structure.annotations.step == pytest.approx(1e-3)
     assert (folder / "README.md").is_file()
@@ -51,7 +52,7 @@ def test_our_scenarios_are_valid_against_the_official_schemas(folder):
 
 @pytest.mark.parametrize("folder", sorted(SCENARIOS.glob("*.ssp")), ids=lambda p: p.name)
 def test_our_scenarios_keep_to_the_profile_that_other_tools_run(folder):
-    structure = read_structure(folder, Reader("x"))
+    structure = read_structure(Sources(folder), Reader("x"))
     names = [c.name for c in structure.components]
     assert not any(a != b and b.startswith(a) for a in names for b in names)
     assert structure.bindings == ()

@@ -133,15 +133,16 @@ def test_connections_that_lead_nowhere_are_refused(connection, text):
     assert any(text in p.text and p.line == 7 for p in problems)
 
 
-def test_unconnected_and_doubly_connected_inputs_are_refused():
+def test_doubly_connected_inputs_are_refused_and_unconnected_ones_told():
     a = component("a", [Connector("y", "output", "Real", "", 2)])
     b = component("b", [Connector("u", "input", "Real", "", 3), Connector("w", "input", "Real", "", 4)])
     fmus = {"a": fmu(variable("y", "output")), "b": fmu(variable("u", "input"), variable("w", "input"))}
-    _, _, problems = check(structure([a, b], [wire(), wire()]), fmus)
-    assert [(p.line, p.text) for p in problems] == [
-        (3, "input 'b.u' has 2 connections; one is allowed"),
-        (4, "input 'b.w' is declared but not connected"),
-    ]
+    problems, warnings = [], []
+    checker = Checker(structure([a, b], [wire(), wire()]), fmus, problems, warnings)
+    checker.components(checker.connections())
+    assert [(p.line, p.text) for p in problems] == [(3, "input 'b.u' has 2 connections; one is allowed")]
+    told = "input 'b.w' is declared but not connected; it keeps its start value of the FMU"
+    assert [(w.line, w.text) for w in warnings] == [(4, told)]
 
 
 @pytest.mark.parametrize(
@@ -159,15 +160,23 @@ def test_connectors_must_agree_with_the_fmu(connector, text):
     assert any(text in p.text and p.line == 5 for p in problems)
 
 
-def test_only_real_variables_can_be_connected():
-    a = component("a", [Connector("y", "output", "Integer", "", 2)])
-    b = component("b", [Connector("u", "input", "Integer", "", 3)])
-    fmus = {
-        "a": fmu(variable("y", "output", kind="Integer")),
-        "b": fmu(variable("u", "input", kind="Integer")),
-    }
+@pytest.mark.parametrize("kind", ["Integer", "Boolean", "String", "Enumeration"])
+def test_variables_of_one_type_can_be_connected(kind):
+    a = component("a", [Connector("y", "output", kind, "", 2)])
+    b = component("b", [Connector("u", "input", "", "", 3)])
+    fmus = {"a": fmu(variable("y", "output", kind=kind)), "b": fmu(variable("u", "input", kind=kind))}
+    connections, _, problems = check(structure([a, b], [wire()]), fmus)
+    assert (len(connections), problems) == (1, [])
+    fmus["b"] = fmu(variable("u", "input"))
     _, _, problems = check(structure([a, b], [wire()]), fmus)
-    assert any("only Real variables can be connected" in p.text for p in problems)
+    assert ["only variables of the same type can be connected" in p.text for p in problems] == [True]
+
+
+def test_binary_values_are_not_exchanged():
+    a = component("a", [Connector("y", "output", "Binary", "", 2)])
+    b = component("b", [Connector("u", "input", "Binary", "", 3)])
+    _, _, problems = check(structure([a, b], [wire()]), {})
+    assert ["'a.y' is Binary, which cannot be exchanged" in p.text for p in problems] == [True]
 
 
 def parameter(name, value, unit="", kind="Real"):

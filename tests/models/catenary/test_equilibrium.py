@@ -145,15 +145,26 @@ def test_dropper_lengths_of_EN_50318_2018():
     assert state.unstrained_length[inside] == pytest.approx(given, abs=4e-3)
 
 
-def test_dropper_lengths_of_LN2():
-    """Lengths printed 1.25 to 1.075 m (Table 5.2), independently found 1.27 to 1.06 m."""
-    line = load_line("LN2")
+def _lengths_of_LN2(pre_sag_between):
+    line = dataclasses.replace(load_line("LN2"), pre_sag_between=pre_sag_between)
     mesh = build_mesh(line)
-    state = find_form(line, mesh)
     x = mesh.points[mesh.droppers[:, 0], 0]
-    inside = (x > 501.7) & (x < 551.2)
-    assert state.unstrained_length[inside].max() == pytest.approx(1.27, abs=0.01)
-    assert state.unstrained_length[inside].min() == pytest.approx(1.06, abs=0.01)
+    return find_form(line, mesh).unstrained_length[(x > 501.7) & (x < 551.2)]
+
+
+def test_dropper_lengths_of_LN2():
+    """Lengths printed 1.25 to 1.075 m (Table 5.2), independently found 1.27 to 1.06 m from support to support."""
+    found = _lengths_of_LN2("supports")
+    assert found.max() == pytest.approx(1.27, abs=0.01)
+    assert found.min() == pytest.approx(1.06, abs=0.01)
+
+
+def test_the_printed_lengths_of_LN2_decide_where_its_sag_begins():
+    """They are 0.175 m apart, in spans of 49.5 m: between the outer droppers is the nearer reading, and the line's."""
+    apart = {between: float(np.ptp(_lengths_of_LN2(between))) for between in ("supports", "droppers")}
+    assert apart == {"supports": pytest.approx(0.208, abs=1e-3), "droppers": pytest.approx(0.168, abs=1e-3)}
+    nearer = min(apart, key=lambda between: abs(apart[between] - 0.175))
+    assert load_line("LN2").pre_sag_between == load_line("LN2_ring").pre_sag_between == nearer
 
 
 def test_stitch_wire_carries_its_droppers_like_a_string():

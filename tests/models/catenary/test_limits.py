@@ -1,12 +1,20 @@
 """Warnings of physical limits: when they come, and what their numbers are."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from models.catenary.limits import longest_step, slack_warning, speed_warning, step_warning, tangent_stiffness
-from models.catenary.parameters import Contact
+from models.catenary.limits import (
+    longest_step,
+    slack_law_warning,
+    slack_warning,
+    speed_warning,
+    step_warning,
+    tangent_stiffness,
+)
+from models.catenary.parameters import Contact, Rayleigh
 from models.catenary.part import CatenaryPart
 from models.catenary.statics import contact_wire_wave_speed, wave_speed
 from models.commands import main
@@ -93,6 +101,18 @@ def test_slack_droppers_are_named(line_maker):
         f"{part.droppers[11].name} at {part.droppers[11].x:.2f} m are slack at rest"
     )
     assert slack_warning(part.droppers, np.zeros(len(force))).endswith(f"and {len(force) - 8} more are slack at rest")
+
+
+def test_droppers_that_pull_before_they_are_taut_are_told_with_figure_and_cure(ln2):
+    assert slack_law_warning(ln2) == ""
+    dropper = dataclasses.replace(ln2.dropper, slack_law="tension")
+    told = slack_law_warning(dataclasses.replace(ln2, dropper=dropper))
+    assert "alpha = 0.0272 s" in told
+    assert "at 0.5 m/s pulls 14 mm before it is taut" in told
+    assert "[damping.dropper]" in told
+    assert 'slack_law = "elastic_only" in [dropper]' in told
+    own = dataclasses.replace(ln2.damping, dropper=Rayleigh(1e-3, 0.0))
+    assert slack_law_warning(dataclasses.replace(ln2, dropper=dropper, damping=own)) == ""
 
 
 @pytest.mark.parametrize(("speed", "expected"), [("200", False), ("350", True)])

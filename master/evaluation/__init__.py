@@ -1,0 +1,1 @@
+"""Pure functions of a recording; imports nothing above recordings."""

@@ -1,0 +1,1 @@
+"""All about one FMU; imports nothing above the system's description."""

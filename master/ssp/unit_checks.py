@@ -1,0 +1,98 @@
+"""Conversions between the units that a scenario uses, and what is wrong with its units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from master.errors import Problem
+from master.ssp.archive import SSD_NAME
+from master.ssp.elements import Binding, Leg
+from master.ssp.ssd import Structure
+from master.ssp.units import COMMON, Conversion, Unit, contradictions, conversion
+from master.system import Fmu
+
+
+class UnitChecks:
+    """Finds conversions; what it cannot convert becomes a problem, an unknown unit once.
+
+    Parameters
+    ----------
+    structure : Structure
+    fmus : iterable of Fmu
+        Their own units are known too.
+    problems : list of Problem
+    """
+
+    def __init__(self, structure: Structure, fmus: Iterable[Fmu], problems: list[Problem]) -> None:
+        self._declared = structure.units
+        self._of_fmus: dict[str, Unit] = {}
+        for fmu in fmus:
+            self._of_fmus = {**fmu.units, **self._of_fmus}
+        self._problems = problems
+        self._unknown: set[str] = set()
+        self._unlike: set[tuple[str, int, str, str]] = set()
+
+    def convert(
+        self,
+        source: str,
+        target: str,
+        where: str,
+        line: int,
+        file: str = SSD_NAME,
+        own: Mapping[str, Unit] | None = None,
+    ) -> Conversion:
+        """Return the conversion from one unit to another, none where either is empty.
+
+        Parameters
+        ----------
+        source, target : str
+            Names of units.
+        where : str
+            What is converted, for the message.
+        line, file : int, str
+            Where that is written.
+        own : mapping, optional
+            Units that the file itself declares.
+        """
+        if source == target or not source or not target:
+            return Conversion()
+        known = {**self._of_fmus, **COMMON, **self._declared, **(own or {})}
+        unknown = [name for name in (source, target) if name not in known]
+        if unknown:
+            if not self._unknown.issuperset(unknown):
+                declare = "ssd:Units" if file == SSD_NAME else "the ssv:Units of this file"
+                self._report(line, f"{where}: unit '{unknown[0]}' is not declared in {declare}", file)
+            self._unknown.update(unknown)
+            return Conversion()
+        found = conversion(known[source], known[target])
+        if found is None:
+            # A connection that many components are reached by is told once.
+            if (file, line, source, target) not in self._unlike:
+                self._report(line, f"{where}: '{source}' and '{target}' do not measure the same thing", file)
+            self._unlike.add((file, line, source, target))
+            return Conversion()
+        return found
+
+    def along(self, unit: str, legs: Sequence[Leg], where: str) -> tuple[Conversion, str]:
+        """Return the conversion of a value in ``unit`` along connections, and the unit that it has at their end."""
+        total = Conversion()
+        for leg in legs:
+            wanted = leg.unit or unit
+            if not leg.suppress_unit_conversion:
+                total = total.then(self.convert(unit, wanted, where, leg.line))
+            total, unit = total.then(leg.transformation), wanted
+        return total, unit
+
+    def _report(self, line: int, text: str, file: str) -> None:
+        self._problems.append(Problem(file, line, "unit", text))
+
+
+def unit_problems(structure: Structure, fmus: Iterable[Fmu]) -> Iterator[Problem]:
+    """Yield a problem for every unit that is declared twice with different meanings."""
+    bindings: list[Binding] = [*structure.bindings, *(b for c in structure.components for b in c.bindings)]
+    declared = [*structure.units.values(), *(u for b in bindings for u in b.parameters.units.values())]
+    known = {unit.name for unit in declared}
+    of_fmus = [u for fmu in fmus for u in fmu.units.values() if u.name in known]
+    for unit, text in contradictions([*of_fmus, *dict.fromkeys(declared)]):
+        if unit.line:
+            yield Problem(unit.file, unit.line, "unit", f"unit '{unit.name}' {text}")

@@ -237,5 +237,5 @@ def _fmus(*arguments: str, seconds: float) -> subprocess.CompletedProcess[str]:
 
 
 def _places() -> list[str]:
-    """Return where modules come from, without the FMUs that ran here: they leave their folders, with a pythonfmu each."""
+    """Return where modules come from, without FMUs that ran here: they leave their folders, with a pythonfmu each."""
     return [place for place in sys.path if not (Path(place) / "slavemodule.txt").is_file()]

@@ -93,6 +93,7 @@ def installed_at(folder: Path) -> Installation:
     if not folder.is_dir():
         raise InstallationError(f"{folder} is not a folder")
     base = _base_of(folder)
+    _read(base, {})  # whether it is a Python at all comes before what it lacks
     candidates = [*_package_folders(folder), *_package_folders(base)]
     packages = {name: _package_folder(name, candidates, folder) for name in PACKAGES}
     return _read(base, packages)

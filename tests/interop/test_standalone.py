@@ -19,7 +19,8 @@ from tests.effort import IS_LONG, count
 from tests.interop.support import ROOT, STEP
 from tests.interop.test_host import linux, numbers, plan, run_host, unpack
 
-pytestmark = linux
+# One group: a runtime is made once in a process.
+pytestmark = [linux, pytest.mark.xdist_group("standalone")]
 STEPS = count(60, 300)
 #: What every Linux with glibc has; libdl and libpthread are names that older programs ask for.
 LIBC = ("libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "librt.so.1", "libutil.so.1")
@@ -114,6 +115,27 @@ def test_without_a_runtime_there_is_a_sentence(bare_machine, system):
     done = run_host([*in_prison(bare_machine), "/host"], orders(system, there))
     assert done.returncode == 1
     assert "no Python 3 found" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("lack", "text"),
+    [
+        ("lib/libz.so.1", "the Python that came with the FMU is incomplete"),
+        (f"lib/python{sys.version_info.major}{sys.version_info.minor}.zip", "Python does not start"),
+        ("packages/scipy", "lacks the package scipy"),
+        ("runtime.txt", "which holds no runtime.txt"),
+    ],
+)
+def test_an_incomplete_runtime_is_one_sentence(bare_machine, system, lack, text):
+    there = put_into(bare_machine, [c.fmu.path for c in system.components])
+    place = bare_machine / "broken"
+    write_runtime(runtime_of(), place)
+    path = place / lack
+    shutil.rmtree(path) if path.is_dir() else path.unlink()
+    done = run_host([*in_prison(bare_machine), "/host"], orders(system, there), OPENPANTO_RUNTIME="/broken")
+    shutil.rmtree(place)
+    assert done.returncode == 1
+    assert text in done.stderr
 
 
 def test_what_replaces_a_standalone_fmu_is_standalone(standalone, tmp_path, capsys):

@@ -20,11 +20,12 @@ import numpy as np
 from line_step import STEP, STEPS, under_pantograph, without_load
 from timing import by_turns, on_one_thread, table
 
+from master.evaluation.contact_quality import assess
+from master.evaluation.filters import ForceFilter, low_pass
 from models.catenary.model import CatenaryModel
 from models.catenary.parameters import CatenaryDefinition
 from models.coupled import CoupledModel, CoupledRecord
 from models.library import load_line, load_lumped
-from models.statistics import contact_figures, low_pass
 
 CUTS = (1000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0, 20.0)
 #: The run: shares of the line's length where it begins, where figures begin, and where both end.
@@ -106,7 +107,7 @@ class Run:
     @property
     def filtered(self) -> np.ndarray:
         """Return the contact force up to 20 Hz [N]."""
-        return low_pass(self.record.contact_force[:, 0], STEP)[self.rows]
+        return low_pass(self.record.contact_force[:, 0], STEP, ForceFilter("fft"))[self.rows]
 
 
 def run(line: CatenaryDefinition, pantograph: str) -> Run:
@@ -169,7 +170,7 @@ def print_figures(title: str, runs: dict[str, Run]) -> None:
     rows = []
     for name, each in runs.items():
         record, own = each.record, each.record.position[each.rows, 0]
-        f = contact_figures(record.position[:, 0], record.contact_force[:, 0], STEP, own[0], own[-1])
+        f = assess(record.contact_force[:, 0], record.position[:, 0], STEP, ForceFilter("fft"), (own[0], own[-1]))
         uplift, dropper = (
             np.abs(getattr(record, what) - getattr(full.record, what)).max() for what in ("uplift", "dropper_force")
         )

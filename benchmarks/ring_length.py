@@ -15,7 +15,7 @@ import numpy as np
 from lines import SPAN, long_line, ring
 from timing import on_one_thread, table
 
-from master.quality import low_pass
+from master.evaluation.filters import ForceFilter, low_pass
 from models.catenary.model import CatenaryModel
 from models.catenary.parameters import CatenaryDefinition
 from models.coupled import CoupledModel
@@ -77,7 +77,7 @@ def passage(line: CatenaryDefinition, pantograph: LumpedDefinition, spans: int) 
     spans += spans % 2
     force = [float(system.step(STEP, n * STEP)[0].sum()) for n in range(1, spans * in_span + 1)]
     shown = slice(-(SHOWN + REACH) * in_span, -REACH * in_span)
-    return Passage(np.array(force)[shown], low_pass(np.array(force), STEP)[shown])
+    return Passage(np.array(force)[shown], low_pass(np.array(force), STEP, ForceFilter("fft"))[shown])
 
 
 if __name__ == "__main__":

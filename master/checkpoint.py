@@ -21,13 +21,15 @@ import numpy as np
 from master.algorithm import Algorithm, initialise
 from master.arrays import FloatArray
 from master.durable import write_whole
-from master.errors import MasterError, RunError, UsageError
+from master.errors import MasterError, RunError, UsageError, one_line
 from master.network import Network
 from master.simulation import TimeGrid
 from master.system import Component, System
 
 #: First bytes of every checkpoint; the digit is the format's version.
 MAGIC: Final = b"openpanto checkpoint 1\n"
+#: What they begin with in any version.
+_FAMILY: Final = b"openpanto checkpoint "
 NAME: Final = "checkpoint.state"
 _LENGTH: Final = struct.Struct("<Q")
 _CHECKSUM: Final = hashlib.sha256().digest_size
@@ -354,13 +356,21 @@ def unpack(data: bytes) -> Checkpoint:
         If the bytes are none, or were cut or changed.
     """
     if not data.startswith(MAGIC):
-        raise ValueError("is not a checkpoint of this version")
+        raise ValueError(_foreign(data))
     body, checksum = data[:-_CHECKSUM], data[-_CHECKSUM:]
     if hashlib.sha256(body).digest() != checksum:
         raise ValueError("is damaged: its checksum does not fit, it was cut or changed")
     start = len(MAGIC) + _LENGTH.size
     (length,) = _LENGTH.unpack(body[len(MAGIC) : start])
     return _unpack_body(json.loads(body[start : start + length]), body[start + length :])
+
+
+def _foreign(data: bytes) -> str:
+    """Return what is wrong with bytes that do not begin as a checkpoint of this version does."""
+    if not data.startswith(_FAMILY):
+        return "is not a checkpoint"
+    found, own = (raw.partition(b"\n")[0].removeprefix(_FAMILY).decode("ascii", "replace") for raw in (data, MAGIC))
+    return f"is a checkpoint of format {one_line(found[:20])}, this version reads {own}: begin the run anew"
 
 
 def _unpack_body(header: dict[str, Any], raw: bytes) -> Checkpoint:

@@ -21,6 +21,8 @@ from master import calibrate, checkpoint, export, limits, report, results
 from master.caution import CautionObserver
 from master.checkpoint import Continuation
 from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import EvaluationSettings
 from master.isolation import Isolation
 from master.progress import ProgressObserver
 from master.report import commands
@@ -330,19 +332,29 @@ def _show(done: Results) -> None:
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
-        console.print(report.figures_table([a.quality for a in assessments], heads))
+        console.print(report.figures_table(assessments, heads, [done.evaluation.filter]))
     for assessment in assessments:
-        console.print(report.verdict_table(assessment))
+        _show_verdict(console, assessment, done.evaluation)
     if not report.has_contacts(done):
         console.print(report.outputs_table(done))
     elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
-    if line := report.uplift_line(done):
-        console.print(line)
+    for line in filter(None, (report.calibration_line(done), report.uplift_line(done))):
+        console.print(line, markup=False, soft_wrap=True)
     for following in done.followings:
         console.print(following.sentence, markup=False, soft_wrap=True)
     for line in _closing_lines(done):
         console.print(line, markup=False, soft_wrap=True)
+
+
+def _show_verdict(console: Console, assessment: Assessment, settings: EvaluationSettings) -> None:
+    """Print the verdict of a contact, and what makes it less than certain."""
+    console.print(report.verdict_table(assessment, settings.limits))
+    if rows := report.filter_rows(assessment.quality, settings.filter):
+        console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
+        console.print(report.plain_table(report.FILTER_HEADS, rows))
+    if assessment.drift:
+        console.print(f"warning: {assessment.contact.pantograph}: {assessment.drift}", markup=False, soft_wrap=True)
 
 
 def _closing_lines(done: Results) -> list[str]:
@@ -449,17 +461,21 @@ def _calibrate(options: argparse.Namespace) -> int:
         )
         print(
             f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
-            f"({len(found.trials)} runs)"
+            f"({len(found.trials)} runs; filter {_filter_of(system)})"
         )
         if place is not None:
             note = (
-                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) with "
+                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) after {_filter_of(system)}, with "
                 f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
                 f"in {len(found.trials)} runs of 'python -m master calibrate'"
             )
             calibrate.store_value(*place, found.value, note)
             print(f"stored in {place[0]}")
     return 0
+
+
+def _filter_of(system: System) -> str:
+    return results.filter_of(system.settings.filter.model_dump()).short
 
 
 def _task(options: argparse.Namespace, system: System) -> Calibration:

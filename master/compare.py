@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from master.contacts import track_position
 from master.errors import MasterError
-from master.quality import interval_mask, low_pass
-from master.results import Assessment, Results
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import Signals, contact_signals
+from master.results import Results
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Comparison:
     first, second : Assessment
         Figures of each.
     rms : float, optional
-        Root mean square difference of the 0-20 Hz forces at equal times in the first run's interval [N].
+        Root mean square difference of the low-passed forces at equal times in the first run's interval [N].
     largest : float, optional
         Largest magnitude of that difference [N].
     """
@@ -47,14 +48,27 @@ def compare(a: Results, b: Results) -> tuple[Comparison, ...]:
     return tuple(Comparison(f, s, *_difference(a, b, f, s)) for f, s in pairs)
 
 
+def filter_note(runs: Sequence[Results]) -> str:
+    """Return a sentence if runs were evaluated with different filters, else nothing."""
+    told = [run.evaluation.filter.short for run in runs]
+    if len(set(told)) < 2:
+        return ""
+    named = "; ".join(f"{run.folder.name}: {text}" for run, text in zip(runs, told, strict=True))
+    return (
+        f"the filters differ ({named}), so the figures do even for the same force; "
+        "differences of the forces are taken with the first one's"
+    )
+
+
 def _difference(a: Results, b: Results, first: Assessment, second: Assessment) -> tuple[float | None, float | None]:
-    one, two = a.recordings[0], b.recordings[0]
-    steps = [float(np.median(np.diff(r.time))) for r in (one, two)]
-    inside = interval_mask(track_position(one, first.contact), *a.interval)
-    inside &= (one.time >= two.time[0]) & (one.time <= two.time[-1])
+    """Return the differences of the forces, both low-passed with the first run's filter."""
+    one, two = _signals(a, first), contact_signals(b.recordings[0], second.contact, a.evaluation)
+    inside = one.inside & (one.time >= two.time[0]) & (one.time <= two.time[-1])
     if not inside.any():
         return None, None
-    filtered = low_pass(two[second.contact.force], steps[1])
-    there = np.interp(one.time[inside], two.time, filtered)
-    difference = there - low_pass(one[first.contact.force], steps[0])[inside]
+    difference = np.interp(one.time[inside], two.time, two.filtered) - one.filtered[inside]
     return float(np.sqrt(np.mean(difference**2))), float(np.abs(difference).max())
+
+
+def _signals(run: Results, assessment: Assessment) -> Signals:
+    return next(s for s in run.signals if s.contact == assessment.contact)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -105,6 +105,18 @@ def track_position(recording: Recording, contact: Contact) -> FloatArray:
     if centre is None:
         return point
     return np.where(recording[contact.force] > 0.0, point, centre)
+
+
+def running_position(recording: Recording, contact: Contact) -> FloatArray:
+    """Return where along the track the strip's middle is [m], shape (n,); the contact if the strip is not recorded."""
+    centre = strip_centre(recording, contact, "x")
+    return track_position(recording, contact) if centre is None else centre
+
+
+def leading_first(recording: Recording, contacts: Sequence[Contact]) -> list[Contact]:
+    """Return contacts in the order in which they pass a place."""
+    forward = all(x[-1] >= x[0] for x in (running_position(recording, c) for c in contacts))
+    return sorted(contacts, key=lambda c: float(running_position(recording, c)[0]), reverse=forward)
 
 
 def lateral_position(recording: Recording, contact: Contact) -> FloatArray | None:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from master.errors import MasterError
 from master.recorder import Recording, header, load
-from master.results import TIMESERIES
+from master.results import FORCES, TIMESERIES
 
 
 def write_parquet(folder: Path) -> tuple[Path, ...]:
-    """Write a ``.parquet`` file beside every ``timeseries*.csv`` of a run; returns their paths.
+    """Write a ``.parquet`` file beside every time series of a run and its ``contact_force.csv``; returns their paths.
 
     Titles are those of the CSV files, units in brackets; no index column.
 
@@ -20,6 +20,7 @@ def write_parquet(folder: Path) -> tuple[Path, ...]:
         If pyarrow is not installed.
     """
     sources = [folder / TIMESERIES, *sorted(p for p in folder.glob("timeseries*.csv") if p.name != TIMESERIES)]
+    sources += [folder / FORCES] if (folder / FORCES).is_file() else []
     return tuple(_write(load(source), source.with_suffix(".parquet")) for source in sources)
 
 

@@ -11,14 +11,13 @@ from typing import Final
 import numpy as np
 
 from master.arrays import FloatArray
+from master.evaluation.filters import stands_in
 from master.network import Network
 from master.recorder import Recording
 from master.system import System
 
 #: Calculated parameter of a line that closes on itself: the length after which it repeats [m].
 PERIOD: Final = "period"
-#: What is this near to an interval counts as in it [m].
-_NEAR: Final = 1.0
 _INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
 
 #: Values of one component's calculated parameters by variable name.
@@ -60,6 +59,10 @@ class Uplift:
         """Where it stands, short and unambiguous, for tables and legends."""
         where = f"{self.x:.0f} m" if self.x is not None else f"support {self.support}"
         return where if self.section is None else f"{where} (section {self.section})"
+
+    def stands_in(self, interval: tuple[float | None, float | None]) -> bool:
+        """Return whether the support stands in an interval of the track [m], its ends included."""
+        return stands_in(self.x, interval, self.period)
 
 
 class GeometryObserver:
@@ -152,32 +155,6 @@ def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -
     """
     x = (laps(geometry, limits)[:, None] + indexed(geometry, kind, "x")).ravel()
     return x[(x >= limits[0]) & (x <= limits[1])]
-
-
-def lies_within(x: float | None, interval: tuple[float | None, float | None], period: float = 0.0) -> bool:
-    """Return whether a place is in an interval of the track or beside it; on a line that repeats, in some lap.
-
-    Parameters
-    ----------
-    x : float or None
-        The place, None if it is not known [m].
-    interval : (float or None, float or None)
-        Its ends [m]; None where it has none.
-    period : float
-        Length after which the line repeats [m]; 0 if it does not.
-
-    Examples
-    --------
-    >>> lies_within(20.0, (110.0, 150.0)), lies_within(20.0, (110.0, 150.0), 100.0)
-    (False, True)
-    """
-    if x is None:
-        return False
-    start = -math.inf if interval[0] is None else interval[0] - _NEAR
-    end = math.inf if interval[1] is None else interval[1] + _NEAR
-    if period:
-        x = start if math.isinf(start) else x + period * math.ceil((start - x) / period)
-    return start <= x <= end
 
 
 def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:

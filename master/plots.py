@@ -9,10 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
-from master.contacts import track_position
-from master.line import Uplift, by_section, indexed, lies_within, met
-from master.quality import low_pass, settled
-from master.recorder import Recording
+from master.evaluation.contact_signals import Signals
+from master.line import Uplift, by_section, indexed, met
 from master.results import Results
 
 _COLOURS: Final = ("#1f5fa8", "#c2571a", "#2e7d4f", "#7b3fa0")
@@ -33,20 +31,16 @@ def all_plots(results: Results) -> dict[str, Figure]:
 
 
 def contact_force(results: Results) -> Figure | None:
-    """Contact force, raw and 0-20 Hz, over track position; supports, droppers and interval are marked."""
-    recording = results.recordings[0]
-    contacts = [c for c in results.contacts if c.force in recording]
-    if not contacts or len(recording.time) < 2:
+    """Contact force, raw and low-passed, over track position; supports, droppers and interval are marked."""
+    if not results.signals:
         return None
-    figure, rows = _figure(len(contacts), height=3.4)
-    for i, (axes, contact) in enumerate(zip(rows, contacts, strict=True)):
-        x, force = track_position(recording, contact), recording[contact.force]
-        filtered = np.where(settled(force, _step(recording)), low_pass(force, _step(recording)), np.nan)
-        _mark_line(axes, results, contact.catenary, (float(x.min()), float(x.max())))
-        axes.plot(x, force, color=_GREY, linewidth=0.6, label="raw")
-        axes.plot(x, filtered, color=_COLOURS[i % len(_COLOURS)], linewidth=1.3, label="0-20 Hz")
-        axes.set_ylabel(f"contact force [N]\n{contact.pantograph}")
-        axes.set_ylim(*_force_range(force, filtered, x, results.interval))
+    figure, rows = _figure(len(results.signals), height=3.4)
+    for i, (axes, s) in enumerate(zip(rows, results.signals, strict=True)):
+        _mark_line(axes, results, s.contact.catenary, (float(s.position.min()), float(s.position.max())))
+        axes.plot(s.position, s.raw, color=_GREY, linewidth=0.6, label="raw")
+        axes.plot(s.position, s.shown, color=_COLOURS[i % len(_COLOURS)], linewidth=1.3, label=s.filter.band)
+        axes.set_ylabel(f"contact force [N]\n{s.contact.pantograph}")
+        axes.set_ylim(*_force_range(s))
         axes.legend(loc="lower left", ncols=5, frameon=False, bbox_to_anchor=(0.0, 1.0), fontsize=8)
     rows[-1].set_xlabel("track position of the contact [m]")
     return figure
@@ -73,7 +67,7 @@ def _support_label(u: Uplift) -> str:
 
 def uplift_history(results: Results, most: int = 8) -> Figure | None:
     """Uplift of the supports in the interval of interest over time."""
-    chosen = [u for u in results.uplifts if lies_within(u.x, results.interval, u.period)] or list(results.uplifts)
+    chosen = [u for u in results.uplifts if u.stands_in(results.interval)] or list(results.uplifts)
     if not chosen:
         return None
     figure, (axes,) = _figure(1, height=3.0)
@@ -89,17 +83,14 @@ def uplift_history(results: Results, most: int = 8) -> Figure | None:
 
 def contact_height(results: Results) -> Figure | None:
     """Height of the contact point over track position."""
-    recording = results.recordings[0]
-    contacts = [c for c in results.contacts if c.point("z") in recording and c.force in recording]
-    if not contacts or len(recording.time) < 2:
+    drawn = [s for s in results.signals if s.height is not None]
+    if not drawn:
         return None
     figure, (axes,) = _figure(1, height=3.0)
-    for i, contact in enumerate(contacts):
-        x = track_position(recording, contact)
-        z = np.where(recording[contact.force] > 0.0, recording[contact.point("z")], np.nan)
+    for i, s in enumerate(drawn):
         if i == 0:
-            _mark_line(axes, results, contact.catenary, (float(x.min()), float(x.max())))
-        axes.plot(x, z, color=_COLOURS[i % len(_COLOURS)], linewidth=1.1, label=contact.pantograph)
+            _mark_line(axes, results, s.contact.catenary, (float(s.position.min()), float(s.position.max())))
+        axes.plot(s.position, s.height, color=_COLOURS[i % len(_COLOURS)], linewidth=1.1, label=s.contact.pantograph)
     axes.set_xlabel("track position of the contact [m]")
     axes.set_ylabel("contact height [m]")
     axes.legend(loc="lower left", ncols=5, frameon=False, bbox_to_anchor=(0.0, 1.0), fontsize=8)
@@ -175,7 +166,7 @@ def _figure(rows: int, height: float) -> tuple[Figure, Sequence[Any]]:
 
 def _mark_line(axes: Any, results: Results, catenary: str, shown: tuple[float, float]) -> None:
     """Mark interval of interest, supports (dashed) and droppers (ticks at the bottom)."""
-    start, end = results.interval
+    start, end = results.evaluated_interval
     if start is not None or end is not None:
         first, last = shown[0] if start is None else start, shown[1] if end is None else end
         axes.axvspan(first, last, color=_INTERVAL, alpha=0.6, linewidth=0, label="interval of interest")
@@ -195,15 +186,8 @@ def _mark_line(axes: Any, results: Results, catenary: str, shown: tuple[float, f
     axes.set_xlim(*shown)
 
 
-def _force_range(
-    force: FloatArray, filtered: FloatArray, x: FloatArray, interval: tuple[float | None, float | None]
-) -> tuple[float, float]:
+def _force_range(s: Signals) -> tuple[float, float]:
     """Return limits that show the whole filtered force and the raw force of the interval."""
-    inside = (x >= (interval[0] or -np.inf)) & (x <= (interval[1] or np.inf))
-    shown = filtered[np.isfinite(filtered)]
-    top = max(float(shown.max(initial=1.0)), float(force[inside].max(initial=0.0)))
+    shown = s.shown[np.isfinite(s.shown)]
+    top = max(float(shown.max(initial=1.0)), float(s.raw[s.inside].max(initial=0.0)))
     return min(0.0, float(shown.min(initial=0.0))), 1.05 * top
-
-
-def _step(recording: Recording) -> float:
-    return float(recording.time[-1] - recording.time[0]) / (len(recording.time) - 1)

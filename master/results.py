@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import platform
 import re
 import resource
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -18,38 +20,31 @@ import numpy as np
 
 from master import stored
 from master.checkpoint import NAME as CHECKPOINT
-from master.contacts import Contact, lateral_position, track_position
+from master.contacts import Contact
 from master.durable import PART, write_whole
 from master.energy import Balance, drift_events, find_balances
 from master.errors import MasterError
+from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
+from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, force_table
+from master.evaluation.en50367_limits import LimitChoice, OwnLimits
+from master.evaluation.filters import BEFORE_CHOICE, ForceFilter
 from master.events import MOST_EVENTS, Event, find_events
 from master.line import Geometry, Uplift, support_uplifts
-from master.quality import FILTER_NOTE, Criterion, Quality, assess, judge
-from master.recorder import Recording, load
+from master.recorder import NUMBER_FORMAT, Recording, load
 from master.trains import Following, followings
 
 GENERATOR: Final = "openpanto master"
+#: Version of what a run leaves. 1, which says none: figures of a brick wall at 20 Hz; 2: as it stands here.
+FORMAT: Final = 2
 SUMMARY: Final = "summary.json"
 GEOMETRY: Final = "geometry.json"
 TIMESERIES: Final = "timeseries.csv"
+FORCES: Final = "contact_force.csv"
 REPORT: Final = "report.html"
-_OURS: Final = ("timeseries*.csv", "timeseries*.parquet", SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
+_TABLES: Final = ("timeseries*.csv", "timeseries*.parquet", FORCES, "contact_force.parquet")
+_OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
 #: What a run that was killed may leave half written.
-_PARTS: Final = tuple(name + PART for name in (SUMMARY, GEOMETRY, CHECKPOINT))
-
-
-@dataclass(frozen=True)
-class Assessment:
-    """Figures and verdict of one contact."""
-
-    contact: Contact
-    quality: Quality
-    criteria: tuple[Criterion, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether every limit is kept."""
-        return all(c.passed for c in self.criteria)
+_PARTS: Final = tuple(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT))
 
 
 @dataclass(frozen=True)
@@ -80,18 +75,55 @@ class Results:
 
     @property
     def interval(self) -> tuple[float | None, float | None]:
-        """The interval of interest [m]."""
-        chosen = self.summary.get("settings", {}).get("interval", {})
-        return chosen.get("start"), chosen.get("end")
+        """The interval of interest [m]; None where it is open."""
+        return self.evaluation.interval
+
+    @property
+    def evaluated_interval(self) -> tuple[float | None, float | None]:
+        """Where along the track the figures come from [m]; an open bound is that of the contact with most of it."""
+        found = [interval_of(a.quality, self.interval) for a in self.assessments()]
+        if not found or None not in self.interval:
+            return self.interval
+        return min(low for low, _ in found), max(high for _, high in found)
+
+    @cached_property
+    def evaluation(self) -> EvaluationSettings:
+        """How the run is evaluated: by the filter that it was made with, in its interval, by its limits."""
+        settings = self.summary.get("settings", {})
+        chosen, limits = settings.get("interval", {}), dict(settings.get("limits", {}))
+        supply = limits.pop("supply", "AC")
+        return EvaluationSettings(
+            filter_of(settings.get("filter")),
+            (chosen.get("start"), chosen.get("end")),
+            LimitChoice(supply, OwnLimits(**limits)),
+            settings.get("start"),
+        )
+
+    @cached_property
+    def signals(self) -> tuple[Signals, ...]:
+        """Force of every contact, raw and filtered."""
+        return all_signals(self.recordings, self.contacts, self.evaluation)
 
     @property
     def uplifts(self) -> tuple[Uplift, ...]:
-        """Largest uplift of every support."""
+        """Largest uplift of every support in the whole run."""
         return support_uplifts(self.recordings, self.geometry)
 
     def assessments(self) -> tuple[Assessment, ...]:
         """Return figures and verdict of every contact that has samples in the interval."""
-        return assess_contacts(self.recordings, self.contacts, self.interval, self.uplifts)
+        return self.assessments_in(self.interval)
+
+    def assessments_in(self, interval: tuple[float | None, float | None]) -> tuple[Assessment, ...]:
+        """Return figures and verdict of every contact that has samples in another interval [m]."""
+        if interval not in self._assessed:
+            chosen = replace(self.evaluation, interval=interval)
+            self._assessed[interval] = assess_contacts(self.recordings, self.contacts, self.geometry, chosen)
+        return self._assessed[interval]
+
+    @cached_property
+    def _assessed(self) -> dict[tuple[float | None, float | None], tuple[Assessment, ...]]:
+        """What was assessed once, by interval: pages and tables ask again and again."""
+        return {}
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -111,42 +143,6 @@ class Results:
         """Every pantograph beside the one ahead of it."""
         assessments = self.assessments()
         return followings(self.recordings[0], assessments) if assessments else ()
-
-
-def assess_contacts(
-    recordings: tuple[Recording, ...],
-    contacts: Sequence[Contact],
-    interval: tuple[float | None, float | None],
-    uplifts: Sequence[Uplift],
-) -> tuple[Assessment, ...]:
-    """Return the figures of all contacts from the recording at every step."""
-    recording = recordings[0]
-    if len(recording.time) < 2:
-        return ()
-    step = float(recording.time[-1] - recording.time[0]) / (len(recording.time) - 1)
-    found = []
-    for contact in contacts:
-        quality = _quality(recording, contact, step, interval)
-        if quality is not None:
-            largest = [u.maximum for u in uplifts if u.component == contact.catenary]
-            found.append(Assessment(contact, quality, judge(quality, largest)))
-    return tuple(found)
-
-
-def _quality(
-    recording: Recording, contact: Contact, step: float, interval: tuple[float | None, float | None]
-) -> Quality | None:
-    if contact.force not in recording or recording.units[recording.names.index(contact.force)] not in (
-        "N",
-        "",
-    ):
-        return None
-    force = recording[contact.force]
-    height = None
-    if contact.point("z") in recording:
-        height = np.where(force > 0.0, recording[contact.point("z")], np.nan)
-    position, lateral = track_position(recording, contact), lateral_position(recording, contact)
-    return assess(force, position, step, interval, height, lateral, contact.index)
 
 
 def prepare(folder: Path) -> None:
@@ -257,28 +253,69 @@ def read(folder: Path) -> Results:
 def _summary(folder: Path) -> dict[str, Any]:
     if not is_ours(folder):
         raise MasterError(f"{folder} is not a results folder: it has no {SUMMARY} written by this tool")
-    return stored.read_summary(folder / SUMMARY)
+    found = stored.read_summary(folder / SUMMARY)
+    if found.get("format", 1) > FORMAT:
+        raise MasterError(
+            f"{folder / SUMMARY} has format {found['format']}, this version reads up to {FORMAT}; "
+            "read it with the newer version that wrote it"
+        )
+    return found
 
 
-def figures(
-    assessments: Sequence[Assessment],
-    uplifts: Sequence[Uplift],
-    following: Sequence[Following] = (),
-    events: Sequence[Event] = (),
-    balances: Sequence[Balance] = (),
-) -> dict[str, Any]:
+def figures(done: Results) -> dict[str, Any]:
     """Return the figures, verdicts, events and energy balances for summary.json."""
+    events = done.events
     return {
-        "filter": FILTER_NOTE,
-        "quality": [
-            {**asdict(a.quality), "criteria": [asdict(c) for c in a.criteria], "passed": a.passed} for a in assessments
-        ],
-        "following": [asdict(f) for f in following],
-        "uplift": [asdict(u) for u in uplifts],
+        "filter": done.evaluation.filter.sentence,
+        "judged_by": done.evaluation.limits.title,
+        "quality": [_assessed(a) for a in done.assessments()],
+        "following": [asdict(f) for f in done.followings],
+        "uplift": [asdict(u) for u in done.uplifts],
         "events": [asdict(e) for e in events[:MOST_EVENTS]],
         "events_left_out": max(0, len(events) - MOST_EVENTS),
-        "energy": [{**asdict(b), "share": b.share, "text": b.text} for b in balances],
+        "energy": [{**asdict(b), "share": b.share, "text": b.text} for b in done.balances],
     }
+
+
+def _assessed(a: Assessment) -> dict[str, Any]:
+    return {
+        **asdict(a.quality),
+        "depends_on_filter": bool(a.quality.told),
+        "uplift": None if a.uplift is None else asdict(a.uplift),
+        "supports": a.supports,
+        "slack_droppers": a.slack,
+        "spans": [asdict(s) for s in a.spans],
+        "drift": a.drift,
+        "criteria": [{**asdict(c), "verdict": c.word} for c in a.criteria],
+        "passed": a.passed,
+    }
+
+
+def write_forces(done: Results) -> None:
+    """Write the filtered contact forces, as the figures are made of them, to the last bit."""
+    if not done.signals:
+        return
+    titles, columns = force_table(done.signals)
+    formats = [_EXACT if title.endswith(".filtered_force [N]") else NUMBER_FORMAT for title in titles]
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack(columns), fmt=formats, delimiter=",", header=",".join(titles), comments="")
+    write_text(done.folder / FORCES, text.getvalue())
+
+
+_EXACT: Final = "%.17g"
+
+
+def filter_data(chosen: ForceFilter) -> dict[str, Any]:
+    """Return a filter as a summary's settings have it."""
+    known = asdict(chosen)
+    return known if chosen.kind == "butterworth" else {**known, "order": None, "phase": None}
+
+
+def filter_of(told: Mapping[str, Any] | None) -> ForceFilter:
+    """Return the filter that a run was made with, from its settings."""
+    if told is None:
+        return BEFORE_CHOICE
+    return ForceFilter(**{name: value for name, value in told.items() if value is not None})
 
 
 def versions() -> dict[str, str]:

@@ -315,13 +315,14 @@ class _Session:
             **description,
             **_ending(outcome),
             **_origin(self._manner.continuation),
-            **results.figures(done.assessments(), done.uplifts, done.followings, done.events, done.balances),
+            **results.figures(done),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
             "warnings": [asdict(w) for w in self._cautions.warnings],
             "scenario_warnings": list(self._system.warnings),
         }
+        results.write_forces(done)
         results.write_json(self._folder / results.SUMMARY, summary)
         return replace(done, summary=summary)
 
@@ -389,6 +390,7 @@ def _last_match(name: str, records: Sequence[Record]) -> Record | None:
 def _description(system: System, identity: str) -> dict[str, Any]:
     return {
         "generator": results.GENERATOR,
+        "format": results.FORMAT,
         "run": identity,
         "scenario": system.name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -130,6 +130,7 @@ def load_system(
     components = checker.components(connections)
     times = _times(structure, overrides, reader.problems)
     settings = _settings(structure, overrides, components, reader.problems)
+    reader.problems.extend(_filter_problems(settings, times[2]))
     problems = reader.problems or ([w for w in reader.warnings if w.rule != NOTE] if overrides.strict else [])
     if problems:
         raise ScenarioError(_sorted(problems))
@@ -216,6 +217,15 @@ def _step_problem(start: float, stop: float, step: float) -> str:
     if step < _RESOLUTION * max(abs(start), abs(stop)):
         return f"is lost beside times up to {max(abs(start), abs(stop)):g} s; begin nearer to 0"
     return ""
+
+
+def _filter_problems(settings: RunSettings, step: float) -> Iterator[Problem]:
+    """Yield a problem if a filter is asked for that nothing of what is sampled is above."""
+    cutoff = settings.filter.cutoff
+    if "filter" in settings.model_fields_set and 2.0 * cutoff * step >= 1.0:
+        half = f"half the sampling frequency, {0.5 / step:g} Hz at a macro step of {step:g} s"
+        text = f"Filter cutoff {cutoff:g} Hz is not below {half}: it would filter nothing; lower it or the step"
+        yield Problem(SSD_NAME, 0, "annotation", text)
 
 
 def _settings(

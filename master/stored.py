@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
@@ -33,8 +33,34 @@ class _Interval(_Loose):
     end: float | None = None
 
 
+class _Filter(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    kind: Literal["butterworth", "fft"]
+    order: int | None = None
+    cutoff: float
+    phase: Literal["zero", "causal"] | None = None
+
+
+class _Limits(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    supply: Literal["AC", "DC3", "DC1.5"] = "AC"
+    mean_upper: float | None = None
+    mean_lower: float | None = None
+    maximum: float | None = None
+    sigma_share: float | None = None
+    statistical_minimum: float | None = None
+    nq: float | None = None
+    uplift: float | None = None
+    height_range: float | None = None
+
+
 class _Settings(_Loose):
+    start: float | None = None
     interval: _Interval = _Interval()
+    filter: _Filter | None = None
+    limits: _Limits = _Limits()
 
 
 class _Component(_Loose):
@@ -48,6 +74,7 @@ class _Caution(_Loose):
 
 
 class _Summary(_Loose):
+    format: int = 1
     contacts: list[_Contact] = []
     settings: _Settings = _Settings()
     components: list[_Component] = []

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
-from master.arrays import FloatArray
-from master.contacts import Contact, strip_centre, track_position
+from master.contacts import leading_first, running_position
+from master.evaluation.contact_assessment import Assessment
 from master.recorder import Recording
-
-if TYPE_CHECKING:
-    from master.results import Assessment
 
 
 @dataclass(frozen=True)
@@ -46,12 +42,6 @@ class Following:
         )
 
 
-def leading_first(recording: Recording, contacts: Sequence[Contact]) -> list[Contact]:
-    """Return contacts in the order in which they pass a place."""
-    forward = all(x[-1] >= x[0] for x in (_position(recording, c) for c in contacts))
-    return sorted(contacts, key=lambda c: float(_position(recording, c)[0]), reverse=forward)
-
-
 def followings(recording: Recording, assessments: Sequence[Assessment]) -> tuple[Following, ...]:
     """Compare every pantograph that has figures with the one ahead of it on the same line."""
     found: list[Following] = []
@@ -63,7 +53,7 @@ def followings(recording: Recording, assessments: Sequence[Assessment]) -> tuple
 
 
 def _following(recording: Recording, ahead: Assessment, behind: Assessment) -> Following:
-    places = [float(_position(recording, a.contact)[0]) for a in (ahead, behind)]
+    places = [float(running_position(recording, a.contact)[0]) for a in (ahead, behind)]
     one, two = ahead.quality, behind.quality
     return Following(
         ahead.contact.pantograph,
@@ -74,8 +64,3 @@ def _following(recording: Recording, ahead: Assessment, behind: Assessment) -> F
         two.minimum - one.minimum,
         two.maximum - one.maximum,
     )
-
-
-def _position(recording: Recording, contact: Contact) -> FloatArray:
-    centre = strip_centre(recording, contact, "x")
-    return track_position(recording, contact) if centre is None else centre

@@ -8,18 +8,31 @@ from master import plots, results
 from master.report.measured import Comparison, comparison_rows
 from master.report.output_charts import has_contacts, output_plots, outputs_table
 from master.report.page import page
-from master.report.tables import CLAUSES, figure_rows, figures_table, headlines, uplift_line, verdict_table
+from master.report.tables import (
+    FILTER_HEADS,
+    calibration_line,
+    figure_rows,
+    figures_table,
+    filter_rows,
+    headlines,
+    plain_table,
+    uplift_line,
+    verdict_table,
+)
 from master.results import Results
 
 __all__ = [
-    "CLAUSES",
+    "FILTER_HEADS",
+    "calibration_line",
     "comparison_rows",
     "figure_rows",
     "figures_table",
+    "filter_rows",
     "has_contacts",
     "headlines",
     "outputs_table",
     "page",
+    "plain_table",
     "uplift_line",
     "verdict_table",
     "write",

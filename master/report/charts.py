@@ -13,11 +13,12 @@ from typing import Any, Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.line import Uplift, by_section, indexed, lies_within, met, period_of
-from master.quality import CUTOFF, MAX_UPLIFT
+from master.evaluation.contact_signals import Signals, power_spectrum
+from master.evaluation.en50367_limits import limits_at
+from master.evaluation.filters import FILTER_REACH, stands_in
+from master.line import Uplift, by_section, indexed, met, period_of
 from master.recorder import Recording
 from master.report.encode import kept_samples, packed
-from master.report.signals import Signals, power_spectrum
 from master.results import Results
 
 Figure = dict[str, Any]
@@ -122,7 +123,7 @@ def _forces_together(results: Results, signals: Sequence[Signals]) -> Chart:
         for i, s in enumerate(signals)
     ]
     limits = (min(float(s.position.min()) for s in signals), max(float(s.position.max()) for s in signals))
-    axes = Axes("track position of the contact [m]", "contact force, 0-20 Hz [N]", interval_shape(results, limits))
+    axes = Axes("track position of the contact [m]", force_title(signals), interval_shape(results, limits))
     axes.extra = {"meta": {"sync": "track"}}
     return Chart("forces_together", "Contact forces together", _figure(traces, axes), "", 360)
 
@@ -131,7 +132,7 @@ def _force_chart(results: Results, s: Signals) -> Chart:
     shown = s.shown
     traces = [
         _line(s.position, s.raw, {"color": GREY, "width": 0.8}, "raw"),
-        _line(s.position, shown, {"color": COLOURS[0], "width": 2.2}, "0-20 Hz"),
+        _line(s.position, shown, {"color": COLOURS[0], "width": 2.2}, s.filter.band),
     ]
     limits = (float(s.position.min()), float(s.position.max()))
     traces += line_marks(results, s.contact.catenary, limits)
@@ -140,12 +141,18 @@ def _force_chart(results: Results, s: Signals) -> Chart:
     marks = {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}
     x_axis = {"title": {"text": axes.x}, "range": list(limits)}
     axes.extra = {"xaxis": x_axis, "yaxis2": marks, "meta": {"sync": "track"}}
-    note = "Thin grey: as computed; thick: low-passed to 0-20 Hz. Shaded: interval of interest. "
+    note = f"Thin grey: as computed; thick: {s.filter.short}. Shaded: interval of interest. "
     note += "Dashed: supports; ticks at the bottom: droppers."
     if not np.isfinite(shown[0]):
-        note += " The filtered force is drawn from the first contact plus 0.1 s on; before, the filter only rings."
+        note += f" The filtered force is drawn from {FILTER_REACH:g} s after the first contact on; before, it rings."
     name = f"force_{s.contact.catenary}_{s.contact.index}"
     return Chart(name, f"Contact force, {s.contact.pantograph}", {"data": traces, "layout": axes.layout()}, note, 440)
+
+
+def force_title(signals: Sequence[Signals]) -> str:
+    """Return the title of an axis for low-passed forces."""
+    bands = ", ".join(dict.fromkeys(s.filter.band for s in signals))
+    return f"contact force, {bands} [N]"
 
 
 def force_range(s: Signals) -> tuple[float, float]:
@@ -176,8 +183,8 @@ def _ticks(x: FloatArray, name: str, dash: str, width: float, span: tuple[float,
 
 
 def interval_shape(results: Results, limits: tuple[float, float]) -> list[Figure]:
-    """Return the interval of interest as a shaded band, if there is one."""
-    start, end = results.interval
+    """Return the interval that the figures come from as a shaded band, if there is one."""
+    start, end = results.evaluated_interval
     if start is None and end is None:
         return []
     x0, x1 = limits[0] if start is None else start, limits[1] if end is None else end
@@ -203,7 +210,7 @@ def histogram(signals: Sequence[Signals]) -> Chart | None:
         _bars(0.5 * (edges[1:] + edges[:-1]), shares(c, edges), s.contact.pantograph, i)
         for i, (s, c) in enumerate(zip(chosen, cuts, strict=True))
     ]
-    axes = Axes("contact force, 0-20 Hz [N]", "share of time [%]", extra={"bargap": 0.04, "barmode": "group"})
+    axes = Axes(force_title(chosen), "share of time [%]", extra={"bargap": 0.04, "barmode": "group"})
     return Chart("histogram", "Histogram of the contact force", _figure(traces, axes), "Interval of interest.", 320)
 
 
@@ -226,8 +233,9 @@ def spectrum(results: Results, signals: Sequence[Signals]) -> Chart | None:
     if not chosen:
         return None
     traces = [spectrum_trace(s, Curve(i, s.contact.pantograph, 1.3)) for i, s in enumerate(chosen)]
+    cutoff = chosen[0].filter.cutoff
     speed, span = _speed(chosen[0]), _median_span(results, chosen[0].contact.catenary)
-    axes = Axes("frequency [Hz]", "power spectral density [N\u00b2/Hz]", [_upright(CUTOFF, "cut-off 20 Hz")])
+    axes = Axes("frequency [Hz]", "power spectral density [N\u00b2/Hz]", [_upright(cutoff, f"cut-off {cutoff:g} Hz")])
     if span:
         axes.shapes.append(_upright(speed / span, f"span passing {speed / span:.2f} Hz"))
     figure = _figure(traces, axes)
@@ -270,11 +278,12 @@ def uplift_bars(results: Results) -> Chart | None:
         return None
     catenaries = sorted({u.component for u in uplifts})
     traces = [uplift_trace([u for u in uplifts if u.component == c], c, i) for i, c in enumerate(catenaries)]
-    shapes = [_level(1e3 * MAX_UPLIFT, f"limit {1e3 * MAX_UPLIFT:g} mm")]
+    most = 1e3 * limits_at(0.0, results.evaluation.limits).uplift.value
+    shapes = [_level(most, f"limit {most:g} mm")]
     if not uplifts[0].period:
         shapes += interval_shape(results, _limits(uplifts))
     axes = Axes(_support_axis(uplifts), "largest uplift [mm]", shapes)
-    axes.y_range = (0.0, 1e3 * max(1.1 * MAX_UPLIFT, *(1.1 * u.maximum for u in uplifts)))
+    axes.y_range = (0.0, 1.1 * max(most, *(1e3 * u.maximum for u in uplifts)))
     return Chart("uplift", "Uplift of the contact wire at the supports", _figure(traces, axes), "Whole run.", 320)
 
 
@@ -312,7 +321,7 @@ def _level(y: float, text: str) -> Figure:
 
 def uplift_history(results: Results) -> Chart | None:
     """Return the uplift of the supports in the interval over time."""
-    chosen = [u for u in results.uplifts if lies_within(u.x, results.interval, u.period)] or list(results.uplifts)
+    chosen = [u for u in results.uplifts if u.stands_in(results.interval)] or list(results.uplifts)
     if not chosen:
         return None
     traces = [_uplift_curve(results, u, i) for i, u in enumerate(chosen)]
@@ -350,7 +359,7 @@ def _dropper_charts(results: Results, recording: Recording, component: str, name
     axes = Axes(title, "dropper force [N]", interval_shape(results, limits) if place is x and not period else [])
     note = "Bar: from least to greatest in the run; dot: at the start; cross: slack at some time (hover for its share)."
     found = [Chart(f"droppers_{component}", "Dropper forces", _figure(_dropper_range(place, forces), axes), note, 360)]
-    inside = [i for i, p in enumerate(place) if lies_within(float(p), results.interval, period)]
+    inside = [i for i, p in enumerate(place) if stands_in(float(p), results.interval, period)]
     chosen = _middle(inside or list(range(len(names))))
     curves = [_dropper_curve(recording.time, forces[:, i], f"{place[i]:.1f}", k) for k, i in enumerate(chosen)]
     found.append(_dropper_history(component, curves))

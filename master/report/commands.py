@@ -18,7 +18,6 @@ from master.report.comparison import columns, comparison_page
 from master.report.film import FilmOptions, write_film
 from master.report.measured import Comparison, compare_measured, read_measured
 from master.report.movie import MOST_LAPS, make_movie
-from master.report.signals import all_signals
 from master.results import Results
 
 REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
@@ -39,11 +38,13 @@ def add_report_arguments(parser: argparse.ArgumentParser) -> None:
 def run_report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is wanted."""
     done = results.read(options.run)
-    figures = results.figures(done.assessments(), done.uplifts, done.followings, done.events, done.balances)
-    summary = {**done.summary, **figures}
+    summary = {**done.summary, **results.figures(done), "format": results.FORMAT}
+    summary["settings"] = {**summary.get("settings", {}), "filter": results.filter_data(done.evaluation.filter)}
+    done = replace(done, summary=summary)
     measured = _measured(done, options.measured, options.contact) if options.measured else None
+    results.write_forces(done)
     results.write_json(done.folder / results.SUMMARY, summary)
-    print(report.write(replace(done, summary=summary), measured))
+    print(report.write(done, measured))
     if options.parquet:
         print(*export.write_parquet(done.folder), sep="\n")
     if options.film:
@@ -56,13 +57,15 @@ def run_report(options: argparse.Namespace) -> int:
 def report_what_there_is(folder: Path) -> None:
     """Write the report of a run that stopped, if it has left anything to report on."""
     try:
-        report.write(results.read(folder))
+        done = results.read(folder)
+        results.write_forces(done)
+        report.write(done)
     except MasterError:
         return  # it stopped before anything was recorded; the error itself is told by the caller
 
 
 def _measured(done: Results, path: Path, contact: int) -> Comparison:
-    signals = [s for s in all_signals(done) if s.contact.index == contact]
+    signals = [s for s in done.signals if s.contact.index == contact]
     if not signals:
         raise MasterError(
             f"{done.folder} has no contact {contact} with a recorded force; choose another with --contact"
@@ -71,12 +74,12 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
 
 
 def _say_measured(measured: Comparison) -> None:
-    rows = tables.plain_table(("0-20 Hz", "simulated", "measured", "difference"), report.comparison_rows(measured))
+    rows = tables.plain_table(("low-passed", "simulated", "measured", "difference"), report.comparison_rows(measured))
     Console(width=_WIDTH, highlight=False).print(rows)
 
 
 def _film(done: Results, options: argparse.Namespace) -> Path:
-    movie = make_movie(done, all_signals(done))
+    movie = make_movie(done, done.signals)
     if movie is None:
         needed = "a film needs recorded uplift, contact point and geometry"
         raise MasterError(f"{done.folder} cannot be drawn: {needed}, and at most {MOST_LAPS} laps of a line")
@@ -99,7 +102,8 @@ def run_compare(options: argparse.Namespace) -> int:
         options.report.write_text(comparison_page(runs), encoding="utf-8")
     pairs = [compare.compare(runs[0], other) for other in runs[1:]]
     if options.json:
-        print(json.dumps([_as_json(c) for found in pairs for c in found], indent=1))
+        others = [(other, c) for other, found in zip(runs[1:], pairs, strict=True) for c in found]
+        print(json.dumps([_as_json(c, runs[0], other) for other, c in others], indent=1))
         return 0
     _show(runs, pairs, options)
     return 0
@@ -109,18 +113,23 @@ def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]]
     console = Console(width=_WIDTH, highlight=False)
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
-    console.print(report.figures_table([c.assessment.quality for c in found], heads))
+    console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
+    if note := compare.filter_note(runs):
+        console.print(f"warning: {note}", markup=False, soft_wrap=True)
     for folder, differences in zip(options.others, pairs, strict=True):
         for c in differences:
             if c.rms is not None and c.largest is not None:
-                who = f"{folder}, {c.first.contact.pantograph}: 0-20 Hz forces differ by"
+                who = f"{folder}, {c.first.contact.pantograph}: low-passed forces differ by"
                 console.print(f"{who} {c.rms:.3g} N (rms), {c.largest:.3g} N (largest)", markup=False, soft_wrap=True)
     if options.report:
         console.print(f"report in {options.report}", markup=False, soft_wrap=True)
 
 
-def _as_json(c: compare.Comparison) -> Mapping[str, Any]:
+def _as_json(c: compare.Comparison, first: Results, other: Results) -> Mapping[str, Any]:
     names = ("mean", "sigma", "minimum", "maximum")
     one, two = c.first.quality, c.second.quality
     difference = {n: getattr(two, n) - getattr(one, n) for n in names}
-    return {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
+    filters = [run.evaluation.filter.short for run in (first, other)]
+    same = len(set(filters)) == 1
+    known = {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
+    return {**known, "filters": filters, "same_filter": same}

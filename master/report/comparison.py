@@ -10,8 +10,10 @@ from typing import Any, Final
 import numpy as np
 
 from master.arrays import FloatArray
+from master.compare import filter_note
 from master.errors import MasterError
-from master.quality import FILTER_NOTE
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import Signals
 from master.report import markup
 from master.report.charts import (
     Axes,
@@ -19,6 +21,7 @@ from master.report.charts import (
     Curve,
     common_edges,
     curve_trace,
+    force_title,
     grouped_bars,
     line_marks,
     shares,
@@ -27,9 +30,8 @@ from master.report.charts import (
 )
 from master.report.inputs import differing_inputs, quality_rows
 from master.report.page import status_note
-from master.report.signals import Signals, all_signals
 from master.report.tables import figure_rows
-from master.results import Assessment, Results
+from master.results import Results
 
 _BANDS: Final = ("0-2", "0-5", "5-20")
 
@@ -72,7 +74,7 @@ def columns(runs: Sequence[Results]) -> tuple[Column, ...]:
 
 
 def _columns(name: str, run: Results) -> list[Column]:
-    by_contact = {s.contact: s for s in all_signals(run)}
+    by_contact = {s.contact: s for s in run.signals}
     assessments = [a for a in run.assessments() if a.contact in by_contact]
     several = len(assessments) > 1
     return [
@@ -113,11 +115,10 @@ def comparison_page(runs: Sequence[Results]) -> str:
     body = [
         f"<h1>{markup.text(' | '.join(dict.fromkeys(names)))}</h1>",
         *(f"<p class='note'>{markup.text(r.folder.name)}</p>{note}" for r in runs if (note := status_note(r.summary))),
-        *(markup.verdict(c.assessment, c.name, c.run.summary.get("status") == "complete") for c in found),
+        *map(_verdict, found),
         "<h2>Figures</h2>",
-        markup.table(["figure, 0-20 Hz", *names], _rows_with_differences(found)),
-        f"<p class='note'>In brackets: difference from {markup.text(names[0])}. "
-        f"Filter: {markup.text(FILTER_NOTE)}.</p>",
+        markup.table(["figure, low-passed", *names], _rows_with_differences(found)),
+        f"<p class='note'>In brackets: difference from {markup.text(names[0])}. {_filters(runs)}</p>",
         "<h2>Curves</h2>",
         *map(markup.chart, charts),
         *_input_section(runs),
@@ -126,8 +127,19 @@ def comparison_page(runs: Sequence[Results]) -> str:
     return markup.document(f"comparison: {', '.join(names)}", body, charts)
 
 
+def _verdict(c: Column) -> str:
+    return markup.verdict(c.assessment, c.name, c.run.evaluation.limits, c.run.summary.get("status") == "complete")
+
+
+def _filters(runs: Sequence[Results]) -> str:
+    """Return which filter all runs were evaluated with, or a warning that it is not one."""
+    if note := filter_note(runs):
+        return f"<b>Warning:</b> {markup.text(note)}."
+    return f"Filter: {markup.text(runs[0].evaluation.filter.sentence)}."
+
+
 def _rows_with_differences(found: Sequence[Column]) -> list[tuple[str, ...]]:
-    return [_with_differences(row) for row in figure_rows([c.assessment.quality for c in found])]
+    return [_with_differences(row) for row in figure_rows([c.assessment for c in found])]
 
 
 def _with_differences(row: Sequence[str]) -> tuple[str, ...]:
@@ -158,7 +170,7 @@ def _force_chart(found: Sequence[Column]) -> Chart:
     first = found[0]
     limits = (float(first.signals.position.min()), float(first.signals.position.max()))
     traces += line_marks(first.run, first.assessment.contact.catenary, limits)
-    axes = Axes("track position of the contact [m]", "contact force, 0-20 Hz [N]")
+    axes = Axes("track position of the contact [m]", force_title([c.signals for c in found]))
     axes.extra = {"yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}}
     note = f"Supports and droppers of {first.name}."
     return Chart("force", "Contact force", {"data": traces, "layout": axes.layout()}, note, 440)
@@ -171,7 +183,7 @@ def _histogram(found: Sequence[Column]) -> Chart:
         curve_trace(*_staircase(edges, shares(cut, edges)), Curve(i, c.name))
         for i, (c, cut) in enumerate(zip(found, cuts, strict=True))
     ]
-    axes = Axes("contact force, 0-20 Hz [N]", "share of time [%]")
+    axes = Axes(force_title([c.signals for c in found]), "share of time [%]")
     note = "Interval of interest of each run."
     return Chart("histogram", "Histogram", {"data": traces, "layout": axes.layout()}, note, 340)
 
@@ -192,7 +204,7 @@ def _spectrum(found: Sequence[Column]) -> Chart:
 
 
 def _bands(found: Sequence[Column]) -> Chart:
-    names = ["0-20 Hz", *(f"{b} Hz" for b in _BANDS)]
+    names = ["whole", *(f"{b} Hz" for b in _BANDS)]
     traces = []
     for i, c in enumerate(found):
         q = c.assessment.quality

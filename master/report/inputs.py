@@ -90,6 +90,8 @@ def differing_inputs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]
 def _table(summary: Mapping[str, Any]) -> dict[str, str]:
     settings = summary.get("settings", {})
     found = {"scheme": str(settings.get("coupling", {}).get("scheme", "-")), "step [s]": number(settings.get("step"))}
+    for section in ("interval", "filter", "limits"):
+        found |= {f"{section}, {k}": str(v) for k, v in (settings.get(section) or {}).items() if v is not None}
     for component in summary.get("components", []):
         found[f"FMU of {component['name']}"] = f"{component['fmu']} ({component['sha256'][:8]})"
         for i in inputs_of(component):

@@ -8,10 +8,11 @@ from collections.abc import Iterable, Sequence
 from importlib import resources
 from typing import Any, Final
 
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.en50367_limits import ORIGINS, Criterion, LimitChoice
 from master.report.charts import Chart
 from master.report.movie import Movie, as_json
-from master.report.tables import CLAUSES, headlines
-from master.results import Assessment
+from master.report.tables import headlines
 
 _ICON: Final = "<link rel='icon' href='data:,'>"
 #: The browser itself keeps the page from asking for anything.
@@ -89,32 +90,33 @@ def chart(found: Chart) -> str:
     return f"<figure><figcaption><h3>{text(found.title)}</h3>{note}</figcaption>{place}</figure>"
 
 
-def mark(passed: bool) -> str:
-    """Return a verdict in a word and a sign, not in colour alone."""
-    kind, sign, word = ("pass", "\u2713", "passed") if passed else ("fail", "\u2717", "failed")
-    return f"<span class='{kind}'>{sign}<span class='word'> {word}</span></span>"
+def mark(criterion: Criterion) -> str:
+    """Return a verdict in words and a sign, not in colour alone."""
+    kind, sign = ("pass", "\u2713") if criterion.passed else ("fail", "\u2717")
+    return f"<span class='{kind}'>{sign}<span class='word'> {criterion.word}</span></span>"
 
 
-def badge(passed: bool, complete: bool = True) -> str:
+def badge(passed: bool, title: str, complete: bool = True) -> str:
     """Return the verdict as a whole."""
     word = ("\u2713 passed" if passed else "\u2717 failed") + ("" if complete else " so far")
-    return f"<span class='badge {'pass' if passed else 'fail'}'>EN 50367 {word}</span>"
+    return f"<span class='badge {'pass' if passed else 'fail'}'>{text(title)} {word}</span>"
 
 
-def verdict(assessment: Assessment, name: str, complete: bool = True) -> str:
+def verdict(assessment: Assessment, name: str, limits: LimitChoice, complete: bool = True) -> str:
     """Return the first screen of one contact: verdict and headline figures."""
     q = assessment.quality
     where = f"{q.start:.1f} m to {q.end:.1f} m at {3.6 * q.speed:.1f} km/h"
-    word = badge(assessment.passed, complete)
+    word = badge(assessment.passed, limits.title, complete)
     aside = f"<span class='note'>{where}</span>{_broken(assessment)}"
     head = f"<div class='verdict'><b>{text(name)}</b> {word} {aside}</div>"
     tiles = "".join(
         f"<div class='tile'><div class='name'><span>{text(h.name)}</span>{_sign(h.passed)}</div>"
         f"<div class='value'>{text(h.value)} <small>{text(h.unit)}</small></div>"
         f"<div class='limit'>{signs(h.limit)}</div></div>"
-        for h in headlines(assessment)
+        for h in headlines(assessment, limits)
     )
-    return f"{head}<div class='tiles'>{tiles}</div>"
+    drift = f"<p class='warning'>{text(assessment.drift)}</p>" if assessment.drift else ""
+    return f"{head}<div class='tiles'>{tiles}</div>{drift}"
 
 
 def _broken(assessment: Assessment) -> str:
@@ -131,12 +133,16 @@ def _sign(passed: bool | None) -> str:
 def criteria(assessment: Assessment) -> str:
     """Return the verdict row by row."""
     rows = "".join(
-        f"<tr><td>{text(c.name)}<div class='note'>{text(CLAUSES.get(c.name, ''))}</div></td>"
-        f"<td class='n'>{text(c.value)}</td><td class='n'>{signs(c.limit)}</td><td>{mark(c.passed)}</td></tr>"
+        f"<tr><td>{text(c.name)}<div class='note'>{text(c.source)}; {text(c.origin)}</div>{_remark(c)}</td>"
+        f"<td class='n'>{text(c.value)}</td><td class='n'>{signs(c.limit)}</td><td>{mark(c)}</td></tr>"
         for c in assessment.criteria
     )
-    heads = "<tr><th>figure and clause</th><th class='n'>value</th><th class='n'>limit</th><th>verdict</th></tr>"
-    return f"<div class='scroll'><table>{heads}{rows}</table></div>"
+    heads = "<tr><th>figure and limit</th><th class='n'>value</th><th class='n'>limit</th><th>verdict</th></tr>"
+    return f"<div class='scroll'><table>{heads}{rows}</table></div><p class='note'>{text(ORIGINS)}.</p>"
+
+
+def _remark(criterion: Criterion) -> str:
+    return f"<div>{text(criterion.remark)}</div>" if criterion.remark else ""
 
 
 def movie_player(movie: Movie, begin: float) -> str:
@@ -147,7 +153,7 @@ def movie_player(movie: Movie, begin: float) -> str:
     note = (
         f"Side view that follows the pantographs; the contact wire's deformation is drawn {how}, straight between, "
         "and magnified; the messenger wire is drawn at rest, slack droppers dashed. "
-        "Below: contact force, thin as computed, thick 0-20 Hz."
+        "Below: contact force, thin as computed, thick low-passed."
     )
     speeds = "".join(f"<option value='{v}'>{n}</option>" for v, n in ((1, "real time"), (0.25, "1/4"), (0.1, "1/10")))
     return (

@@ -14,9 +14,9 @@ import numpy as np
 
 from master.arrays import BoolArray, FloatArray
 from master.errors import MasterError, one_line
-from master.quality import low_pass
+from master.evaluation.contact_signals import Signals
+from master.evaluation.filters import low_pass
 from master.report.charts import Axes, Chart, Curve, curve_trace
-from master.report.signals import Signals
 
 _TITLE: Final = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")
 _POSITIONS: Final = ("x", "position", "track position", "distance", "chainage", "km")
@@ -53,7 +53,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Measured and simulated 0-20 Hz force at the same instants.
+    """Measured and simulated low-passed force at the same instants.
 
     Attributes
     ----------
@@ -204,7 +204,7 @@ def _checked(
 
 
 def compare_measured(s: Signals, measurement: Measurement) -> Comparison:
-    """Put a measurement beside a simulated contact; both are low-passed to 0-20 Hz.
+    """Put a measurement beside a simulated contact; both are low-passed with the run's filter.
 
     The measured force is brought to the simulation's instants, then filtered as the simulated one is.
 
@@ -228,7 +228,7 @@ def compare_measured(s: Signals, measurement: Measurement) -> Comparison:
 
 def _filtered(s: Signals, measurement: Measurement, there: FloatArray, known: BoolArray) -> FloatArray:
     filtered = np.full(len(there), np.nan)
-    filtered[known] = low_pass(np.interp(there[known], measurement.abscissa, measurement.force), s.step)
+    filtered[known] = low_pass(np.interp(there[known], measurement.abscissa, measurement.force), s.step, s.filter)
     return filtered
 
 
@@ -255,5 +255,5 @@ def comparison_chart(c: Comparison) -> Chart:
         curve_trace(c.position, c.simulated, Curve(0, f"simulated, {c.pantograph}", 2.2)),
         curve_trace(c.position, c.measured, Curve(1, "measured", 1.6)),
     ]
-    layout = Axes("track position of the contact [m]", "contact force, 0-20 Hz [N]").layout()
+    layout = Axes("track position of the contact [m]", "contact force, low-passed [N]").layout()
     return Chart("measured_force", "Contact force, measured and simulated", {"data": traces, "layout": layout})

@@ -16,10 +16,10 @@ import numpy as np
 
 from master.arrays import BoolArray, FloatArray, IntArray
 from master.contacts import strip_centre
+from master.evaluation.contact_signals import Signals
 from master.line import by_section, indexed, laps
 from master.recorder import Recording
 from master.report.encode import packed, packed_integers
-from master.report.signals import Signals
 from master.results import Results
 
 #: Most frames, and the shortest time between two [s].

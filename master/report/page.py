@@ -6,17 +6,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from master.quality import FILTER_NOTE
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import Signals
+from master.evaluation.filters import SETTLING, ForceFilter
 from master.report import markup
 from master.report.charts import Chart, run_charts
 from master.report.inputs import Input, inputs_of, provenance_rows, quality_rows
 from master.report.measured import Comparison, comparison_chart, comparison_rows
 from master.report.movie import Movie, make_movie
 from master.report.output_charts import HEADS, has_contacts, output_charts, output_rows
-from master.report.signals import Signals, all_signals
-from master.report.tables import figure_rows
-from master.results import Assessment, Results
-from master.trains import Following
+from master.report.tables import FILTER_HEADS, calibration_line, figure_rows, filter_rows, uplift_line
+from master.results import Results
 
 _CONTENTS: Final = (
     ("verdict", "Verdict"),
@@ -42,15 +42,16 @@ def page(done: Results, measured: Comparison | None = None) -> str:
     measured : Comparison, optional
         A measured contact force beside it.
     """
-    summary, signals, assessments = done.summary, all_signals(done), done.assessments()
+    summary, signals, assessments = done.summary, done.signals, done.assessments()
     is_coupling = has_contacts(done)
     charts = run_charts(done, signals) if is_coupling else output_charts(done)
     extra = [comparison_chart(measured)] if measured is not None else []
     movie = make_movie(done, signals)
     body = [
-        _head(summary, assessments, is_coupling),
+        _head(done, assessments, is_coupling),
         *([] if is_coupling else _outputs(done, charts)),
-        _figures(assessments, done.followings if assessments else ()),
+        _figures(done, assessments),
+        _spans(assessments),
         *(_measured(measured, extra[0]) if measured is not None else ()),
         *_section("force", "Contact force", [c for c in charts if is_coupling and not c.key.startswith(_LINE_CHARTS)]),
         *(_movie(movie, signals) if movie is not None else ()),
@@ -73,13 +74,14 @@ def _outputs(done: Results, charts: list[Chart]) -> list[str]:
     return ["<section id='outputs'><h2>Outputs</h2>", table, *map(markup.chart, charts), "</section>"]
 
 
-def _head(summary: dict[str, Any], assessments: tuple[Assessment, ...], is_coupling: bool = True) -> str:
+def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool = True) -> str:
+    summary, limits = done.summary, done.evaluation.limits
     complete = summary.get("status") == "complete"
     name = markup.text(summary.get("scenario", ""))
     key = "verdict" if is_coupling else "run"
     parts = [f"<section id='{key}'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
     parts.append(_cautions(summary))
-    parts += [markup.verdict(a, a.contact.pantograph, complete) for a in assessments]
+    parts += [markup.verdict(a, a.contact.pantograph, limits, complete) for a in assessments]
     if not assessments and is_coupling:
         parts.append("<p class='warning'>No contact-quality figures: no contact force in the interval of interest.</p>")
     return "".join([*parts, "</section>"])
@@ -108,20 +110,57 @@ def status_note(summary: dict[str, Any]) -> str:
     return f"<p class='warning'>{note}</p>"
 
 
-def _figures(assessments: tuple[Assessment, ...], following: tuple[Following, ...] = ()) -> str:
+def _figures(done: Results, assessments: tuple[Assessment, ...]) -> str:
     if not assessments:
         return ""
-    heads = ["figure, 0-20 Hz", *(a.contact.pantograph for a in assessments)]
+    chosen, title = done.evaluation.filter, markup.text(done.evaluation.limits.title)
+    heads = [f"figure, {chosen.band}", *(a.contact.pantograph for a in assessments)]
     verdicts = "".join(
-        f"<h3>EN 50367, {markup.text(a.contact.pantograph)}</h3>{markup.criteria(a)}" for a in assessments
+        f"<h3>{title}, {markup.text(a.contact.pantograph)}</h3>{markup.criteria(a)}" for a in assessments
     )
-    note = f"<p class='note'>Filter: {markup.text(FILTER_NOTE)}.</p>"
-    rows = markup.table(heads, figure_rows([a.quality for a in assessments]))
-    note += "".join(f"<p>{markup.text(f.sentence)}.</p>" for f in following)
-    statistics = f"<div><h3>Statistics in the interval of interest</h3>{rows}{note}</div>"
+    rows = markup.table(heads, figure_rows(assessments))
+    said = [f"{f.sentence}." for f in done.followings] + [t for t in (calibration_line(done), uplift_line(done)) if t]
+    notes = f"<p class='note'>{INTERVAL_NOTE} Filter: {markup.text(chosen.sentence)}.</p>"
+    notes += "".join(f"<p>{markup.text(line)}</p>" for line in said)
+    notes += "".join(_filters(a, chosen) for a in assessments)
+    statistics = f"<div><h3>Statistics in the interval of interest</h3>{rows}{notes}</div>"
     return (
         f"<section id='figures'><h2>Figures</h2><div class='columns'><div>{verdicts}</div>{statistics}</div></section>"
     )
+
+
+#: What is taken from where, for whoever reads the figures.
+INTERVAL_NOTE: Final = (
+    "Forces, losses and heights: while the strip is in the interval, which, where it has no beginning, begins "
+    f"{SETTLING:g} s after the first contact. Uplift: supports in it, its ends included, over the whole run. Slack "
+    "droppers: share of those in it that carry nothing for a moment as the pantograph passes, until the next one comes."
+)
+
+
+def _filters(a: Assessment, chosen: ForceFilter) -> str:
+    """Return the figures under every filter where they depend on it."""
+    rows = filter_rows(a.quality, chosen)
+    name = markup.text(a.contact.pantograph)
+    head = f"<h3>The extremes of {name} depend on the filter</h3>"
+    return f"{head}{markup.table(FILTER_HEADS, rows)}" if rows else ""
+
+
+def _spans(assessments: tuple[Assessment, ...]) -> str:
+    """Return the figures span by span, which tell whether the run has settled."""
+    heads = ("span", "mean [N]", "sigma [N]", "maximum [N]", "minimum [N]")
+    parts = []
+    for a in assessments:
+        rows = [
+            (f"{s.start:.1f} m to {s.end:.1f} m{'' if s.is_inside else ' (outside the interval)'}",
+             *(f"{v:.1f}" for v in (s.mean, s.sigma, s.maximum, s.minimum)))
+            for s in a.spans
+        ]  # fmt: skip
+        if rows:
+            parts.append(f"<h3>{markup.text(a.contact.pantograph)}</h3>{markup.table(heads, rows)}")
+    if not parts:
+        return ""
+    note = "<p class='note'>Low-passed force in every whole span after the contact has settled.</p>"
+    return f"<section id='spans'><details><summary>Span by span</summary>{note}{''.join(parts)}</details></section>"
 
 
 def _section(key: str, title: str, charts: list[Chart]) -> list[str]:
@@ -137,7 +176,7 @@ def _movie(movie: Movie, signals: tuple[Signals, ...]) -> list[str]:
 
 
 def _measured(found: Comparison, chart: Chart) -> list[str]:
-    heads = ("0-20 Hz", "simulated", "measured", "difference")
+    heads = ("low-passed", "simulated", "measured", "difference")
     rows = markup.table(heads, comparison_rows(found))
     where = f"compared from {found.start:.1f} m to {found.end:.1f} m"
     note = f"<p class='note'>Measured: {markup.text(found.source)}; {where}.</p>"

@@ -6,6 +6,8 @@ The annotation stands in the ``ssd:Annotations`` of the system structure descrip
       <panto:Run xmlns:panto="urn:openpanto:ssp">
         <panto:Coupling scheme="jacobi"/>
         <panto:Interval start="551" end="798"/>
+        <panto:Filter kind="butterworth" order="6" cutoff="20" phase="zero"/>
+        <panto:Limits supply="AC" maximum="300"/>
         <panto:Calibration parameter="pantograph.static_force" meanForce="157.5" tolerance="0.1"/>
         <panto:Record variables="catenary.dropper[*].force" every="0.005"/>
       </panto:Run>
@@ -60,7 +62,7 @@ class Coupling(_Settings):
 
 
 class Interval(_Settings):
-    """Interval of interest along the track [m]; a missing end means the run's own."""
+    """Interval of interest along the track [m]; from where the contact has settled and to the end, if not told."""
 
     start: float | None = None
     end: float | None = None
@@ -69,6 +71,59 @@ class Interval(_Settings):
     def _ordered(self) -> Interval:
         if self.start is not None and self.end is not None and self.start >= self.end:
             raise ValueError(f"start {self.start:g} m must lie before end {self.end:g} m")
+        return self
+
+
+class Filter(_Settings):
+    """Low-pass of the contact force; what each attribute means stands in `master.evaluation.filters.ForceFilter`."""
+
+    kind: Literal["butterworth", "fft"] = "butterworth"
+    order: int | None = Field(6, ge=1, le=20)
+    cutoff: float = Field(20.0, gt=0)
+    phase: Literal["zero", "causal"] | None = "zero"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _wall_is_plain(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("kind") == "fft":
+            idle = [name for name in ("order", "phase") if data.get(name) is not None]
+            if idle:
+                raise ValueError(f"the filter fft has no {' and no '.join(idle)}; leave it out, or choose butterworth")
+            return {**data, "order": None, "phase": None}
+        return data
+
+
+class Limits(_Settings):
+    """By which limits the figures are judged: those of EN 50367 for a supply system, and the scenario's own, SI.
+
+    Attributes
+    ----------
+    supply : str
+        AC, DC3 (3 kV) or DC1.5 (1.5 kV).
+    mean_upper, mean_lower, maximum, statistical_minimum : float, optional
+        Of the contact force [N]; these and the next ones take the place of the standard's.
+    sigma_share : float, optional
+        Standard deviation over mean.
+    nq : float, optional
+        Percentage of arcing, as estimated [%].
+    uplift, height_range : float, optional
+        Of the supports, and of the contact point [m].
+    """
+
+    supply: Literal["AC", "DC3", "DC1.5"] = "AC"
+    mean_upper: float | None = Field(None, alias="meanUpper", gt=0)
+    mean_lower: float | None = Field(None, alias="meanLower", ge=0)
+    maximum: float | None = Field(None, gt=0)
+    sigma_share: float | None = Field(None, alias="sigmaShare", gt=0)
+    statistical_minimum: float | None = Field(None, alias="statisticalMinimum")
+    nq: float | None = Field(None, ge=0, le=100)
+    uplift: float | None = Field(None, gt=0, lt=1)
+    height_range: float | None = Field(None, alias="heightRange", gt=0, lt=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Limits:
+        if None not in (self.mean_lower, self.mean_upper) and (self.mean_lower or 0.0) >= (self.mean_upper or 0.0):
+            raise ValueError(f"meanLower {self.mean_lower:g} N must lie below meanUpper {self.mean_upper:g} N")
         return self
 
 
@@ -100,6 +155,8 @@ class RunSettings(_Settings):
 
     coupling: Coupling = Field(default_factory=lambda: Coupling.model_validate({}))
     interval: Interval = Field(default_factory=Interval)
+    filter: Filter = Field(default_factory=lambda: Filter.model_validate({}))
+    limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
     calibration: Calibration | None = None
     records: tuple[Record, ...] = DEFAULT_RECORDS
 
@@ -107,11 +164,13 @@ class RunSettings(_Settings):
 _SECTIONS: Final[dict[str, type[_Settings]]] = {
     "Coupling": Coupling,
     "Interval": Interval,
+    "Filter": Filter,
+    "Limits": Limits,
     "Calibration": Calibration,
     "Record": Record,
 }
 _LISTS: Final = ("order", "variables")
-_TEXTS: Final = (*_LISTS, "scheme", "parameter")
+_TEXTS: Final = (*_LISTS, "scheme", "parameter", "kind", "phase", "supply")
 #: What an ``osp:Algorithm`` may hold.
 _ALGORITHMS: Final = ("FixedStepAlgorithm", "VariableStepAlgorithm")
 
@@ -166,10 +225,11 @@ def parse_run(annotation: Any, reader: Reader) -> RunSettings:
             parsed = parse_section(section, reader)
             if parsed is not None:
                 found[tag(section)].append(parsed)
-    for name in ("Coupling", "Interval", "Calibration"):
+    once = [name for name in _SECTIONS if name != "Record"]
+    for name in once:
         if len(found[name]) > 1:
             reader.problem(annotation, "annotation", f"{name} is given {len(found[name])} times; once is enough")
-    single = {name.lower(): found[name][0] for name in ("Coupling", "Interval", "Calibration") if found[name]}
+    single = {name.lower(): found[name][0] for name in once if found[name]}
     return RunSettings.model_validate({**single, "records": (*DEFAULT_RECORDS, *found["Record"])})
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from master.arrays import BoolArray, FloatArray
 from master.contacts import track_position
+from master.evaluation.contact_signals import contact_signals
+from master.evaluation.filters import settled
 from master.line import Geometry
-from master.quality import interval_mask, low_pass, settled
-from master.recorder import Recording
 from master.report.charts import Axes, Chart, Curve, common_edges, curve_trace, grouped_bars, line_marks, shares
 from master.results import Results
 from master.study.family import Interval
@@ -19,6 +19,7 @@ from master.study.outcome import Done, Outcome
 
 #: How far to both sides of a change of wires the forces are drawn [m].
 _MARGIN: Final = 15.0
+_FORCE: Final = "contact force, low-passed [N]"
 _STATISTICS: Final = ("maximum", "minimum", "amplitude", "mean", "sigma", "statistical_minimum")
 _MARKS: Final = {"yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}}
 
@@ -48,17 +49,15 @@ def _statistics(number: int, role: str, found: Sequence[Entry]) -> Chart:
         {**grouped_bars(i, e.variant), "x": names, "y": [getattr(e.assessment.quality, s) for s in _STATISTICS]}
         for i, e in enumerate(found)
     ]
-    layout = {**Axes("", "contact force, 0-20 Hz [N]").layout(), "barmode": "group"}
+    layout = {**Axes("", _FORCE).layout(), "barmode": "group"}
     return Chart(f"statistics_{number}_{role}", f"Statistics, {role}", {"data": traces, "layout": layout}, "", 380)
 
 
 def _filtered(done: Results, e: Entry) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return track position, 0-20 Hz force and what of it lies in the entry's interval."""
-    recording, contact = done.recordings[0], e.assessment.contact
-    force, position = recording[contact.force], track_position(recording, contact)
-    step = _step(recording)
-    inside = interval_mask(position, e.interval.start, e.interval.end) & settled(force, step)
-    return position, low_pass(force, step), inside
+    """Return track position, low-passed force and what of it lies in the entry's interval."""
+    settings = replace(done.evaluation, interval=(e.interval.start, e.interval.end))
+    s = contact_signals(done.recordings[0], e.assessment.contact, settings)
+    return s.position, s.filtered, s.inside & settled(s.raw, s.step)
 
 
 def _forces(key: str, done: Results, own: Sequence[Entry]) -> Chart:
@@ -68,7 +67,7 @@ def _forces(key: str, done: Results, own: Sequence[Entry]) -> Chart:
         traces.append(curve_trace(position[inside], force[inside], Curve(i, e.pantograph)))
     limits = (own[0].interval.start, own[0].interval.end)
     traces += line_marks(done, own[0].assessment.contact.catenary, limits)
-    axes = Axes("track position of the contact [m]", "contact force, 0-20 Hz [N]", extra=dict(_MARKS))
+    axes = Axes("track position of the contact [m]", _FORCE, extra=dict(_MARKS))
     title = f"Contact force, {own[0].variant}"
     return Chart(f"force_{key}", title, {"data": traces, "layout": axes.layout()}, "", 340)
 
@@ -84,7 +83,7 @@ def _histogram(key: str, done: Results, own: Sequence[Entry]) -> Chart:
         {**grouped_bars(i, e.pantograph), "x": middles.tolist(), "y": shares(cut, edges).tolist()}
         for i, (e, cut) in enumerate(zip(own, cuts, strict=True))
     ]
-    layout = {**Axes("contact force, 0-20 Hz [N]", "share of time [%]").layout(), "barmode": "group"}
+    layout = {**Axes(_FORCE, "share of time [%]").layout(), "barmode": "group"}
     return Chart(f"histogram_{key}", f"Histogram, {own[0].variant}", {"data": traces, "layout": layout}, "", 300)
 
 
@@ -171,7 +170,3 @@ def _nearest(geometry: Geometry, kind: str, position: float) -> tuple[str, float
         if name.startswith(f"{kind}[") and name.endswith("].x")
     ]
     return min(found, key=lambda each: abs(each[1] - position), default=None)
-
-
-def _step(recording: Recording) -> float:
-    return float(recording.time[-1] - recording.time[0]) / (len(recording.time) - 1)

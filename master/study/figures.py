@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
-from master.contacts import Contact, strip_centre, track_position
-from master.line import lies_within
+from master.contacts import Contact, leading_first, track_position
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_quality import Quality
+from master.evaluation.filters import interval_mask
 from master.recorder import Recording
-from master.results import Assessment, Results, assess_contacts
+from master.results import Results
 from master.study.family import Interval
-from master.trains import leading_first
-
-#: A pantograph's effect on a dropper begins this long before it passes, and is followed this long after [s].
-_BEFORE: Final = 0.2
-_AFTER: Final = 1.0
 
 
 @dataclass(frozen=True)
@@ -55,11 +51,7 @@ class Entry:
     variant : str
     interval : Interval
     assessment : Assessment
-        Figures and verdict; the uplift in it is that of the interval's supports.
-    uplift : float or None
-        Largest uplift of the interval's supports [m].
-    slack : float or None
-        Share of the interval's droppers that go slack as this pantograph passes.
+        Figures and verdict in it.
     sharing : Sharing or None
         If it touches two wires within the interval.
     """
@@ -67,8 +59,6 @@ class Entry:
     variant: str
     interval: Interval
     assessment: Assessment
-    uplift: float | None
-    slack: float | None
     sharing: Sharing | None
 
     @property
@@ -76,57 +66,27 @@ class Entry:
         """The pantograph's name."""
         return self.assessment.contact.pantograph
 
+    @property
+    def quality(self) -> Quality:
+        """The figures of the contact force."""
+        return self.assessment.quality
+
+    @property
+    def uplift(self) -> float | None:
+        """Largest uplift of the interval's supports [m]."""
+        return None if self.assessment.uplift is None else self.assessment.uplift.maximum
+
+    @property
+    def slack(self) -> float | None:
+        """Share of the interval's droppers that go slack as this pantograph passes."""
+        return self.assessment.slack
+
 
 def entries(variant: str, done: Results, interval: Interval) -> tuple[Entry, ...]:
     """Return the entries of a run's pantographs in an interval, the leading one first."""
-    limits = (interval.start, interval.end)
-    uplifts = [u for u in done.uplifts if u.x is None or lies_within(u.x, limits, u.period)]
-    found = assess_contacts(done.recordings, done.contacts, limits, uplifts)
-    ordered = leading_first(done.recordings[0], [a.contact for a in found])
-    by_index = {(a.contact.catenary, a.contact.index): a for a in found}
-    return tuple(
-        Entry(
-            variant,
-            interval,
-            by_index[contact.catenary, contact.index],
-            max((u.maximum for u in uplifts), default=None),
-            slack_share(done, contact, follower, interval),
-            sharing(done.recordings[0], contact, interval),
-        )
-        for contact, follower in zip(ordered, [*ordered[1:], None], strict=False)
-    )
-
-
-def passing_time(recording: Recording, contact: Contact, x: float) -> float:
-    """Return when a pantograph passes a place [s], infinite if it does not."""
-    centre = strip_centre(recording, contact, "x")
-    position = track_position(recording, contact) if centre is None else centre
-    if not min(position[0], position[-1]) <= x <= max(position[0], position[-1]):
-        return float("inf")
-    order = np.argsort(position, kind="stable")
-    return float(np.interp(x, position[order], recording.time[order]))
-
-
-def slack_share(done: Results, contact: Contact, follower: Contact | None, interval: Interval) -> float | None:
-    """Return the share of the interval's droppers that carry nothing for a moment as a pantograph passes.
-
-    From just before it passes until the next pantograph comes, or for a second.
-    """
-    geometry = done.geometry.get(contact.catenary, {})
-    total = slack = 0
-    for recording in done.recordings:
-        for name in recording.matching(f"{contact.catenary}.dropper[*].force"):
-            x = geometry.get(f"{name.removeprefix(contact.catenary + '.').removesuffix('.force')}.x")
-            if x is None or not interval.start <= x <= interval.end:
-                continue
-            begin = passing_time(done.recordings[0], contact, x) - _BEFORE
-            end = begin + _BEFORE + _AFTER
-            if follower is not None:
-                end = min(end, passing_time(done.recordings[0], follower, x) - _BEFORE)
-            during = (recording.time >= begin) & (recording.time < end)
-            total += 1
-            slack += bool((recording[name][during] <= 0.0).any())
-    return slack / total if total else None
+    found = {a.contact: a for a in done.assessments_in((interval.start, interval.end))}
+    ordered = leading_first(done.recordings[0], list(found))
+    return tuple(Entry(variant, interval, found[c], sharing(done.recordings[0], c, interval)) for c in ordered)
 
 
 def section_forces(recording: Recording, contact: Contact) -> FloatArray | None:
@@ -143,7 +103,7 @@ def sharing(recording: Recording, contact: Contact, interval: Interval) -> Shari
     if forces is None:
         return None
     touched = forces > 0.0
-    both = np.flatnonzero((touched.sum(axis=1) > 1) & (position >= interval.start) & (position <= interval.end))
+    both = np.flatnonzero((touched.sum(axis=1) > 1) & interval_mask(position, interval.start, interval.end))
     if not both.size:
         return None
     first, last = int(both[0]), int(both[-1])

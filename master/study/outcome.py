@@ -14,6 +14,8 @@ from master.study.family import Family, Interval
 from master.study.figures import Entry, entries
 
 GENERATOR: Final = "openpanto study"
+#: Version of ``study.json`` and ``study.csv``; 1 says none.
+FORMAT: Final = 2
 #: Columns of the figures: title, unit, how to get it, decimals.
 FIGURES: Final[tuple[tuple[str, str, Callable[[Entry], float | None], int], ...]] = (
     ("mean", "N", lambda e: e.assessment.quality.mean, 1),
@@ -78,12 +80,35 @@ def shown(value: float | None, decimals: int) -> str:
 
 
 def verdict(entry: Entry) -> str:
-    """Return EN 50367's verdict in a few words.
+    """Return the verdict on the limits in a few words."""
+    criteria = entry.assessment.criteria
+    failed = [c.name for c in criteria if not c.passed]
+    if failed:
+        return f"fails: {', '.join(failed)}"
+    at_limit = [c.name for c in criteria if c.is_at_limit]
+    return f"passes, at the limit: {', '.join(at_limit)}" if at_limit else "passes"
 
-    A mean force off its target is named even where the study wants another mean.
-    """
-    failed = [c.name for c in entry.assessment.criteria if not c.passed]
-    return f"fails: {', '.join(failed)}" if failed else "passes"
+
+def filters(outcome: Outcome) -> tuple[str, ...]:
+    """Return with what the forces of the variants were low-passed: one filter, several if runs had other settings."""
+    return tuple(dict.fromkeys(d.results.evaluation.filter.sentence for d in outcome.done))
+
+
+def judged_by(found: Sequence[Done]) -> str:
+    """Return by which limits the variants are judged."""
+    return "; ".join(dict.fromkeys(d.results.evaluation.limits.title for d in found)) or "EN 50367"
+
+
+def filter_remarks(found: Sequence[Entry]) -> list[str]:
+    """Return whose extremes depend on the filter, with what they would be, and which verdicts do."""
+    remarks = []
+    for e in found:
+        who = f"{e.variant}, {e.pantograph}"
+        told = "; ".join(f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.told)
+        remarks += [f"{who}: {told}"] if told else []
+        remarks += [f"{who}: {c.name}: {c.remark}" for c in e.assessment.criteria if c.remark and not c.is_at_limit]
+        remarks += [f"{who}: {e.assessment.drift}"] if e.assessment.drift else []
+    return remarks
 
 
 def differences(found: Sequence[Entry]) -> list[tuple[str, str, str, tuple[float, float, float]]]:
@@ -122,11 +147,13 @@ def as_csv(outcome: Outcome) -> str:
     writer = csv.writer(text, lineterminator="\n")
     heads = [f"{title} [{unit}]" for title, unit, _, _ in FIGURES]
     sharing = ["both wires from [m]", "both wires to [m]", "both wires [s]", "least total force [N]", "losses per wire"]
-    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", *sharing])
+    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", "filter", *sharing])
+    told = {d.name: d.results.evaluation.filter.short for d in outcome.done}
     for interval in outcome.family.settings.interval:
         for e in outcome.entries(interval):
             values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
-            writer.writerow([e.variant, interval.name, e.pantograph, *values, verdict(e), *_sharing_cells(e)])
+            cells = [*values, verdict(e), told[e.variant], *_sharing_cells(e)]
+            writer.writerow([e.variant, interval.name, e.pantograph, *cells])
     return text.getvalue()
 
 
@@ -142,6 +169,9 @@ def as_data(outcome: Outcome) -> dict[str, Any]:
     """Return the contents of ``study.json``."""
     return {
         "generator": GENERATOR,
+        "format": FORMAT,
+        "filter": list(filters(outcome)),
+        "judged_by": judged_by(outcome.done),
         "study": outcome.family.name,
         "title": outcome.family.settings.title,
         "status": outcome.status,
@@ -160,6 +190,8 @@ def _entry_data(e: Entry) -> dict[str, Any]:
         "interval": e.interval.name,
         "pantograph": e.pantograph,
         **figures,
+        "other_filters": [asdict(f) for f in e.quality.others],
+        "drift": e.assessment.drift,
         "criteria": [asdict(c) for c in e.assessment.criteria],
         "sharing": asdict(e.sharing) if e.sharing is not None else None,
     }

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from master.quality import FILTER_NOTE
 from master.report import markup
 from master.report.charts import Chart
+from master.report.page import INTERVAL_NOTE
 from master.study import charts
 from master.study.figures import Entry
-from master.study.outcome import FIGURES, Outcome, differences, shown, verdict
+from master.study.outcome import FIGURES, Outcome, differences, filter_remarks, filters, judged_by, shown, verdict
 
 _STATUS = {
     "running": "Not finished: still running, or killed. What follows is what was computed.",
@@ -34,13 +34,13 @@ def page(outcome: Outcome) -> str:
         title = f"{interval.name}, {interval.start:g} m to {interval.end:g} m"
         body.append(f"<h2>{markup.text(title)}</h2>")
         if found:
-            body += _tables(found)
+            body += _tables(found, judged_by(outcome.done))
             body += _place(charts.interval_charts(outcome, interval, found), drawn)
     body += _sharing(outcome)
     body += _place(charts.sharing_charts(outcome), drawn)
     if histories := charts.history_charts(outcome):
         body += ["<h2>Histories</h2>", *_place(histories, drawn)]
-    body.append(f"<p class='note'>Contact forces: {markup.text(FILTER_NOTE)}.</p>")
+    body += [f"<p class='note'>Contact forces: {markup.text(f)}.</p>" for f in filters(outcome)]
     return markup.document(outcome.family.name, body, drawn)
 
 
@@ -49,16 +49,14 @@ def _place(made: Sequence[Chart], drawn: list[Chart]) -> list[str]:
     return [markup.chart(c) for c in made]
 
 
-def _tables(found: Sequence[Entry]) -> list[str]:
-    heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), "EN 50367"]
+def _tables(found: Sequence[Entry], title: str) -> list[str]:
+    heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), title]
     rows = [
         [f"{e.variant}, {e.pantograph}", *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found
     ]
-    note = (
-        "Uplift: the interval's supports, all pantographs. Slack droppers: share of the interval's droppers that "
-        "carry nothing for a moment as this pantograph passes, until the next one comes."
-    )
+    note = INTERVAL_NOTE
     parts = [markup.table(heads, rows), f"<p class='note'>{note}</p>"]
+    parts += [f"<p class='note'>{markup.text(r)}</p>" for r in filter_remarks(found)]
     if beside := differences(found):
         lines = [[f"{v}, {p}", other, *(f"{d:+.1f}" for d in change)] for v, p, other, change in beside]
         heads = ["variant, pantograph", "less", "sigma [N]", "maximum [N]", "minimum [N]"]

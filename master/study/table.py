@@ -12,7 +12,7 @@ from rich.table import Table
 
 from master.study.family import Family, Interval
 from master.study.figures import Entry
-from master.study.outcome import Outcome, differences, shown
+from master.study.outcome import Outcome, differences, filter_remarks, filters, judged_by, shown
 
 _WIDTH: Final = 80
 _SIGMA: Final = "\u03c3"
@@ -24,19 +24,23 @@ def show(console: Console, outcome: Outcome) -> None:
     for interval in outcome.family.settings.interval:
         found = outcome.entries(interval)
         if found:
-            console.print(figures_table(interval, found))
+            console.print(figures_table(interval, found, outcome))
         if beside := differences(found):
             console.print(differences_table(beside))
     if sharing := [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing]:
         console.print(sharing_table(sharing))
+    for remark in filter_remarks([e for i in outcome.family.settings.interval for e in outcome.entries(i)]):
+        console.print(remark, markup=False, soft_wrap=True)
+    for sentence in filters(outcome):
+        console.print(f"filter: {sentence}", markup=False, soft_wrap=True)
     for name, text in outcome.failures.items():
         console.print(f"variant '{name}' failed: {text}", style="red", markup=False, soft_wrap=True)
 
 
-def figures_table(interval: Interval, found: Sequence[Entry]) -> Table:
-    """Return the statistics of all pantographs; yellow where EN 50367 is not met."""
+def figures_table(interval: Interval, found: Sequence[Entry], outcome: Outcome) -> Table:
+    """Return the statistics of all pantographs; yellow where a limit is not kept."""
     where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
-    table = _table(f"{where}: force 0-20 Hz [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
+    table = _table(f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
     for e in found:
         q = e.assessment.quality
         numbers = (q.mean, q.sigma, q.sigma / q.mean, q.maximum, q.minimum, q.statistical_minimum)
@@ -45,7 +49,7 @@ def figures_table(interval: Interval, found: Sequence[Entry]) -> Table:
         slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
         style = "" if e.assessment.passed else "yellow"
         table.add_row(_name(e), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
-    table.caption, table.caption_justify = escape(_failing(found)), "left"
+    table.caption, table.caption_justify = escape(_failing(found, judged_by(outcome.done))), "left"
     return table
 
 
@@ -53,17 +57,17 @@ def _name(e: Entry) -> str:
     return escape(f"{e.variant}, {e.pantograph}")
 
 
-def _failing(found: Sequence[Entry]) -> str:
-    """Return which limits of EN 50367 are not kept, and by whom."""
+def _failing(found: Sequence[Entry], title: str) -> str:
+    """Return which limits are not kept, and by whom."""
     failing: dict[str, list[str]] = {}
     for e in found:
         for criterion in e.assessment.criteria:
             if not criterion.passed:
                 failing.setdefault(criterion.name, []).append(f"{e.variant}, {e.pantograph}")
     if not failing:
-        return "EN 50367: all pass"
+        return f"{title}: all pass"
     words = (f"{what}: {'all' if len(who) == len(found) else '; '.join(who)}" for what, who in failing.items())
-    return "EN 50367 is not met by\n" + "\n".join(words)
+    return f"{title} is not met by\n" + "\n".join(words)
 
 
 def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, float]]]) -> Table:

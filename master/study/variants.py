@@ -14,7 +14,7 @@ from master import results
 from master.calibrate import Found, find_values
 from master.caution import CautionObserver
 from master.errors import MasterError, UsageError
-from master.results import Results, assess_contacts
+from master.results import Results
 from master.run import run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.simulation import Observer
@@ -137,6 +137,7 @@ def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[
             runner.tell(", ".join(f"{n} = {v:.5g}: {m:.2f} N" for n, v, m in zip(names, values, found, strict=True)))
             return found
 
+        runner.tell(f"filter: {results.filter_of(system.settings.filter.model_dump()).sentence}")
         return dict(zip(names, find_values(means, wanted.mean_force, starts, wanted.tolerance), strict=True))
 
 
@@ -162,7 +163,7 @@ def _with_values(system: System, values: dict[str, float]) -> System:
 def _means(system: System, interval: Interval, pantographs: Sequence[str], runner: Runner) -> tuple[float, ...]:
     with tempfile.TemporaryDirectory(prefix="calibrate-") as folder:
         done = runner.run(system, Path(folder))
-        found = assess_contacts(done.recordings, done.contacts, (interval.start, interval.end), ())
+        found = done.assessments_in((interval.start, interval.end))
     means = {a.contact.pantograph: a.quality.mean for a in found}
     missing = [p for p in pantographs if p not in means]
     if missing:

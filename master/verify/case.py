@@ -80,6 +80,10 @@ class Row(_Data):
         How far off a value may be, or beyond the nearer limit, in the quantity's unit or in percent of it.
     source : str
         Where the reference comes from.
+    band : (float, float)
+        What readings of the source's data span that nobody has tuned: how little agreement alone proves.
+    recalled : bool
+        Whether the reference is recalled from texts, not read where it was published.
     kind : Kind
     """
 
@@ -99,6 +103,8 @@ class Row(_Data):
     tolerance: float | None = Field(None, ge=0)
     tolerance_percent: float | None = Field(None, ge=0)
     source: str = Field(min_length=1)
+    band: tuple[float, float] | None = None
+    recalled: bool = False
     kind: Kind = "must hold"
 
     @property
@@ -162,8 +168,11 @@ class Row(_Data):
     def _value_problems(self) -> Iterator[str]:
         if self.value is not None and len(self.value) not in (1, len(self.at)):
             yield f"{len(self.value)} values for {len(self.at)} places 'at'"
-        if self.range is not None and self.range[0] > self.range[1]:
-            yield f"the range begins at {self.range[0]:g}, above its end {self.range[1]:g}"
+        for what, limits in (("range", self.range), ("band", self.band)):
+            if limits is not None and limits[0] > limits[1]:
+                yield f"the {what} begins at {limits[0]:g}, above its end {limits[1]:g}"
+        if self.band is not None and (self.truth is not None or self.others):
+            yield "a band goes with value, range, minimum or maximum only"
 
     def _tolerance_problems(self) -> Iterator[str]:
         given = [t for t in (self.tolerance, self.tolerance_percent) if t is not None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -141,6 +141,7 @@ def decide(row: Row, quantity: Quantity, measured: Measured, others: Mapping[str
     pairs = list(zip(measured.values, bounds, strict=True))
     place = max((b.place(v) for v, b in pairs), key=_ORDER.index)
     worst = _worst([b.deviation(v) for v, b in pairs])
+    notes = list(_notes(row, quantity, measured))
     return Judged(
         row=row,
         title=row.title or quantity.title,
@@ -151,7 +152,7 @@ def decide(row: Row, quantity: Quantity, measured: Measured, others: Mapping[str
         bounds=bounds,
         verdict=verdict_of(row, place),
         deviation=worst[0],
-        remark=measured.remark or _where(measured, worst[1]),
+        remark="; ".join([t for t in (measured.remark or _where(measured, worst[1]),) if t] + notes),
     )
 
 
@@ -224,6 +225,16 @@ def _worst(deviations: Sequence[float | None]) -> tuple[float | None, int]:
 
 def _where(measured: Measured, index: int) -> str:
     return f"{len(measured.labels)} supports, worst at {measured.labels[index]}" if measured.labels else ""
+
+
+def _notes(row: Row, quantity: Quantity, measured: Measured) -> Iterator[str]:
+    """Yield what there is to know beside the verdict: that a reference is recalled, the band, what the filter moves."""
+    if row.recalled:
+        yield "reference recalled, not read"
+    if row.band is not None:
+        yield f"untuned readings span {row.band[0]:g} to {row.band[1]:g} {quantity.unit}".rstrip()
+    if measured.others and (row.recalled or measured.is_told):
+        yield "with other filters " + ", ".join(f"{quantity.show(v)} ({name})" for name, v in measured.others)
 
 
 def _span(quantity: Quantity, values: Sequence[float], exact: bool = False) -> str:

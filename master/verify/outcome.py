@@ -14,6 +14,8 @@ from master.verify.judgement import Judged, Verdict, judge_row
 from master.verify.runs import Runs
 
 GENERATOR: Final = "openpanto verify"
+#: Version of ``verify.json``; 1 says none.
+FORMAT: Final = 2
 #: Verdicts in the order in which they are counted up, with the words for several rows.
 WORDS: Final[Mapping[Verdict, str]] = {
     "holds": "hold",
@@ -136,6 +138,7 @@ def as_data(verification: Verification) -> dict[str, Any]:
     """Return a verification as plain data for JSON."""
     return {
         "generator": GENERATOR,
+        "format": FORMAT,
         "date": verification.date,
         "versions": dict(verification.versions),
         "status": verification.status,
@@ -163,6 +166,7 @@ def _run_data(results: Results) -> dict[str, Any]:
     return {
         "scenario": summary["scenario"],
         "folder": str(results.folder),
+        "filter": results.evaluation.filter.sentence,
         "settings": summary["settings"],
         "components": summary["components"],
         "performance": summary["performance"],
@@ -182,6 +186,9 @@ def _row_data(judged: Judged) -> dict[str, Any]:
         "reference": judged.reference,
         "bounds": [asdict(b) for b in judged.bounds],
         "source": judged.row.source,
+        "recalled": judged.row.recalled,
+        "band": judged.row.band,
+        "other_filters": dict(measured.others) if measured else {},
         "kind": judged.row.kind,
         "verdict": judged.verdict,
         "deviation_percent": judged.deviation,

@@ -9,11 +9,10 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from master import plots
-from master.quality import FILTER_NOTE
 from master.results import Results
 from master.verify.judgement import Judged
 from master.verify.outcome import CaseOutcome, Verification, count_verdicts
-from master.verify.table import percent, verdict_text
+from master.verify.table import filter_lines, percent, verdict_text
 
 _STYLE: Final = """
 body{font:15px/1.45 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#202124}
@@ -57,7 +56,6 @@ def page(verification: Verification, sections: Iterable[str]) -> str:
             _banner(verification),
             _overview(verification.cases),
             f"<p class='note'>{_LEGEND}</p>",
-            f"<p class='note'>Contact forces: {html.escape(FILTER_NOTE)}.</p>",
             *sections,
             "</body></html>\n",
         ]
@@ -71,6 +69,7 @@ def section(outcome: CaseOutcome) -> str:
     parts += [f"<p>{html.escape(case.description)}</p>"] if case.description else []
     parts += [f"<p class='note'>{html.escape(case.citation)}</p>"] if case.citation else []
     parts += [_failure(name, text) for name, text in outcome.failures.items()]
+    parts += [f"<p class='note'>{html.escape(line)}</p>" for line in filter_lines(outcome)]
     parts.append(_rows(outcome))
     if len(outcome.runs) == 1:
         parts += [_picture(results) for results in outcome.runs.values()]

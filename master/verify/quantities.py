@@ -12,10 +12,12 @@ import numpy as np
 from master.arrays import BoolArray, FloatArray
 from master.contacts import track_position
 from master.errors import MasterError
-from master.line import Uplift, indexed, lies_within
-from master.quality import Quality, interval_mask
+from master.evaluation.contact_assessment import Assessment, interval_of
+from master.evaluation.contact_quality import Filtered, Quality
+from master.evaluation.filters import interval_mask
+from master.line import Uplift, indexed
 from master.recorder import Recording
-from master.results import Assessment, Results
+from master.results import Results
 
 #: A support belongs to a place along the track within this distance [m].
 SUPPORT_TOLERANCE: Final = 1.0
@@ -47,11 +49,16 @@ class Choice:
 
 @dataclass(frozen=True)
 class Measured:
-    """A quantity's value in a run, or several with a label each, and a remark."""
+    """A quantity's value in a run, or several with a label each, and a remark.
+
+    ``others`` are what other filters would give, by their names, where the quantity depends on the filter.
+    """
 
     values: tuple[float, ...]
     labels: tuple[str, ...] = ()
     remark: str = ""
+    others: tuple[tuple[str, float], ...] = ()
+    is_told: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,9 +111,22 @@ def _figure(get: Callable[[Quality], float | None], scale: float = 1.0) -> Calla
     return measure
 
 
+def _filtered(get: Callable[[Filtered | Quality], float]) -> Callable[[Results, Choice], Measured]:
+    """Return how to measure a figure that depends on the filter: with what the others would give."""
+
+    def measure(results: Results, choice: Choice) -> Measured:
+        quality = assessment(results, choice).quality
+        others = tuple((o.filter, get(o)) for o in quality.others)
+        return Measured((get(quality),), others=others, is_told=bool(quality.told))
+
+    return measure
+
+
 def _en50367(results: Results, choice: Choice) -> Measured:
     found = assessment(results, choice)
     broken = [f"{c.name} {c.value}, limit {c.limit}" for c in found.criteria if not c.passed]
+    broken += [f"{c.name}: {c.remark}" for c in found.criteria if c.remark]
+    broken.insert(0, results.evaluation.limits.title)
     return Measured((float(found.passed),), remark="; ".join(broken))
 
 
@@ -121,11 +141,19 @@ def _uplifts(results: Results, choice: Choice) -> tuple[Uplift, ...]:
 
 def _largest_uplift(results: Results, choice: Choice) -> Measured:
     """Largest uplift at the supports of the interval of interest."""
-    inside = [u for u in _uplifts(results, choice) if lies_within(u.x, results.interval, u.period)]
-    if not inside:
-        raise MissingQuantityError("there is no support in the interval of interest")
-    most = max(inside, key=lambda u: u.maximum)
-    return Measured((1e3 * most.maximum,), remark=f"{len(inside)} supports, largest at {most.x:.1f} m")
+    found = assessment(results, choice)
+    if found.uplift is None:
+        raise MissingQuantityError("there is no support in the interval of interest whose uplift is recorded")
+    remark = f"{found.supports} supports, largest at {found.uplift.place}"
+    return Measured((1e3 * found.uplift.maximum,), remark=remark)
+
+
+def _slack(results: Results, choice: Choice) -> Measured:
+    """Share of the interval's droppers that go slack as the pantograph passes, as the run's table has it."""
+    share = assessment(results, choice).slack
+    if share is None:
+        raise MissingQuantityError("the run records no dropper forces in the interval of interest")
+    return Measured((100.0 * share,))
 
 
 def _uplift_at(results: Results, choice: Choice) -> Measured:
@@ -150,13 +178,14 @@ def _nearest(uplifts: Sequence[Uplift], x: float) -> Uplift:
 
 def _slack_share(results: Results, choice: Choice) -> Measured:
     """Share of the interval's droppers that go slack while the pantograph is near them."""
-    contact = assessment(results, choice).contact
+    found = assessment(results, choice)
+    contact = found.contact
     geometry = results.geometry.get(contact.catenary, {})
     recording, names = _dropper_recording(results, f"{contact.catenary}.dropper[*].force")
     whole = results.recordings[0]
     position = np.interp(recording.time, whole.time, track_position(whole, contact))
     x = np.array([geometry.get(f"{n.removeprefix(contact.catenary + '.').removesuffix('.force')}.x") for n in names])
-    inside = interval_mask(x.astype(np.float64), *results.interval)
+    inside = interval_mask(x.astype(np.float64), *interval_of(found.quality, results.interval))
     slack = [
         _goes_slack(recording[n], np.abs(position - place) <= choice.within)
         for n, place, chosen in zip(names, x, inside, strict=True)
@@ -211,15 +240,15 @@ def _dropper_length_range(results: Results, choice: Choice) -> Measured:
 
 #: Every quantity by its key in a case file.
 QUANTITIES: Final[dict[str, Quantity]] = {
-    "mean": Quantity("mean force", "N", 1, _figure(lambda q: q.mean)),
-    "sigma": Quantity("standard deviation", "N", 1, _figure(lambda q: q.sigma)),
+    "mean": Quantity("mean force", "N", 1, _filtered(lambda q: q.mean)),
+    "sigma": Quantity("standard deviation", "N", 1, _filtered(lambda q: q.sigma)),
     "sigma_0_2": Quantity("standard deviation, 0-2 Hz", "N", 1, _figure(lambda q: q.sigma_bands["0-2"])),
     "sigma_0_5": Quantity("standard deviation, 0-5 Hz", "N", 1, _figure(lambda q: q.sigma_bands["0-5"])),
     "sigma_5_20": Quantity("standard deviation, 5-20 Hz", "N", 1, _figure(lambda q: q.sigma_bands["5-20"])),
-    "maximum": Quantity("actual maximum", "N", 1, _figure(lambda q: q.maximum)),
-    "minimum": Quantity("actual minimum", "N", 1, _figure(lambda q: q.minimum)),
-    "statistical_maximum": Quantity("statistical maximum", "N", 1, _figure(lambda q: q.statistical_maximum)),
-    "statistical_minimum": Quantity("statistical minimum", "N", 1, _figure(lambda q: q.statistical_minimum)),
+    "maximum": Quantity("actual maximum", "N", 1, _filtered(lambda q: q.maximum)),
+    "minimum": Quantity("actual minimum", "N", 1, _filtered(lambda q: q.minimum)),
+    "statistical_maximum": Quantity("statistical maximum", "N", 1, _filtered(lambda q: q.mean + 3.0 * q.sigma)),
+    "statistical_minimum": Quantity("statistical minimum", "N", 1, _filtered(lambda q: q.mean - 3.0 * q.sigma)),
     "loss": Quantity("loss of contact", "%", 2, _figure(lambda q: q.losses.percentage)),
     "contact_height_range": Quantity(
         "range of the contact point", "mm", 1, _figure(lambda q: q.contact_height_range, 1e3)
@@ -231,6 +260,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "elasticity_support": Quantity("elasticity, support", "mm/N", 3, _elasticity("elasticity.support")),
     "dropper_length_range": Quantity("dropper lengths, longest less shortest", "mm", 0, _dropper_length_range),
     "slack_share": Quantity("droppers slack at passage", "%", 0, _slack_share, ("within",)),
+    "slack": Quantity("droppers slack as it passes", "%", 0, _slack),
     "en50367": Quantity("passes EN 50367", "", 0, _en50367, is_verdict=True),
     "wave_speed": Quantity("wave speed", "km/h", 1, _wave_speed),
 }

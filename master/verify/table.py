@@ -28,6 +28,8 @@ _NUMBERS: Final = ("computed", "verdict")
 def show_case(console: Console, outcome: CaseOutcome) -> None:
     """Print a case: its rows, and why runs failed."""
     console.print(case_table(outcome, console.width))
+    for line in filter_lines(outcome):
+        console.print(line, style="dim", markup=False)
     for name, text in outcome.failures.items():
         console.print(f"run '{name}' failed: {text}", style="red", markup=False, soft_wrap=True)
     console.print()
@@ -51,6 +53,15 @@ def case_table(outcome: CaseOutcome, width: int) -> Table:
     for judged in outcome.rows:
         table.add_row(*_cells(judged, several))
     return table
+
+
+def filter_lines(outcome: CaseOutcome) -> list[str]:
+    """Return with what the forces of a case's runs were low-passed, if its rows ask for any."""
+    told = {name: run.evaluation.filter.sentence for name, run in outcome.runs.items() if run.signals}
+    sentences = dict.fromkeys(told.values())
+    if len(sentences) == 1:
+        return [f"filter: {next(iter(sentences))}"]
+    return [f"filter of {name}: {sentence}" for name, sentence in told.items()]
 
 
 def _cells(judged: Judged, several: bool) -> tuple[str, ...]:

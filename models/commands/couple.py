@@ -5,25 +5,37 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from master.evaluation.contact_quality import Quality, Sampled, figures_of
+from master.evaluation.filters import SETTLING, ForceFilter, evaluated, low_pass, stands_in
 from models.catenary import limits
 from models.catenary.model import CatenaryModel
 from models.catenary.parameters import SHORTEST_STEP
 from models.catenary.part import CatenaryPart
-from models.commands.options import add_settings, finite, new_folder, positive, print_table, settings, warn
+from models.commands.options import (
+    add_filter,
+    add_settings,
+    chosen_filter,
+    finite,
+    new_folder,
+    positive,
+    print_table,
+    settings,
+    warn,
+)
 from models.coupled import CoupledModel, CoupledRecord
 from models.library import load_line, load_lumped
 from models.pantograph.parameters import LumpedDefinition
-from models.part import ParameterError
-from models.statistics import ContactFigures, contact_figures
+from models.part import FloatArray, ParameterError
 
 #: Longest step of the monolithic run [s]: a contact lasts longer than it.
 LONGEST_STEP = 0.1
-#: Steps of a run: enough for the 0-20 Hz filter, and not more than fit into memory.
+#: Steps of a run: enough for the filter, and not more than fit into memory.
 FEWEST_STEPS, MOST_STEPS = 100, 10**7
 
 
@@ -37,12 +49,12 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     parser.add_argument("--speed", type=positive, default=300.0, help="km/h (default 300)")
     parser.add_argument("--start", type=finite, default=None, help="where the pantograph is raised [m]")
     parser.add_argument("--end", type=finite, default=None, help="where the run ends [m]")
-    parser.add_argument(
-        "--interval", type=finite, nargs=2, metavar=("FROM", "TO"), help="interval of interest [m]"
-    )
+    text = f"interval of interest [m] (default: from {SETTLING:g} s after the first contact to the end)"
+    parser.add_argument("--interval", type=finite, nargs=2, metavar=("FROM", "TO"), help=text)
     parser.add_argument("--step", type=positive, default=1e-3, help="time step [s] (default 0.001)")
     parser.add_argument("--out", type=Path, default=None, help="folder for timeseries.csv")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    add_filter(parser)
     add_settings(parser)
     parser.set_defaults(run=run)
 
@@ -50,6 +62,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def run(arguments: argparse.Namespace) -> int:
     """Run and print the contact-force figures."""
     _check_step(arguments)
+    chosen = chosen_filter(arguments)
     definition = load_line(arguments.line).with_values(settings(arguments.set, "line"))
     line = CatenaryModel(definition)
     span = _span_of(arguments, line)
@@ -67,9 +80,10 @@ def run(arguments: argparse.Namespace) -> int:
         task = bar.add_task(f"{arguments.line} + {arguments.pantograph}, monolithic", total=stop)
         record = coupled.run(stop, arguments.step, lambda t: bar.update(task, completed=t))
     wall = time.perf_counter() - begin
-    _print(arguments, record, span, stop / wall)
+    run_of = Evaluated.of(record, line, pantograph.strip_offset, tuple(arguments.interval or (None, None)), chosen)
     if arguments.out is not None:
-        write_timeseries(new_folder(arguments.out) / "timeseries.csv", record)
+        write_timeseries(new_folder(arguments.out) / "timeseries.csv", run_of)
+    _print(run_of, stop / wall)
     return 0
 
 
@@ -83,16 +97,78 @@ def _limits(line: CatenaryModel, pantograph: LumpedDefinition, step: float) -> t
     )
 
 
-def write_timeseries(path: Path, record: CoupledRecord) -> None:
-    """Write a record as CSV: first column time, then quantity with unit, one row per time."""
-    names = ["time [s]"]
-    columns = [record.time]
-    for p in range(record.contact_force.shape[1]):
-        names += [f"catenary.pantograph[{p + 1}].contact.{n}" for n in ("force [N]", "x [m]", "y [m]", "z [m]")]
-        columns += [record.contact_force[:, p], record.position[:, p], *record.contact_point[:, p, 1:].T]
+@dataclass(frozen=True)
+class Evaluated:
+    """A record of one pantograph with what its figures are made of, by the functions that the master uses.
+
+    Attributes
+    ----------
+    record : CoupledRecord
+    sampled : Sampled
+        Force and contact point, and which samples count.
+    filter : ForceFilter
+    supports : ndarray, shape (n_supports,)
+        Where they stand [m].
+    period : float
+        Length after which the line repeats [m]; 0 if it does not.
+    interval : (float or None, float or None)
+        Interval of interest as asked for [m].
+    """
+
+    record: CoupledRecord
+    sampled: Sampled
+    filter: ForceFilter
+    supports: FloatArray
+    period: float
+    interval: tuple[float | None, float | None]
+
+    @classmethod
+    def of(
+        cls,
+        record: CoupledRecord,
+        line: CatenaryModel,
+        strip_offset: float,
+        interval: tuple[float | None, float | None],
+        chosen: ForceFilter,
+    ) -> Evaluated:
+        """Return a record of a line with its first pantograph as it is evaluated."""
+        force, point = record.contact_force[:, 0], record.contact_point[:, 0]
+        touches, step = force > 0.0, float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
+        position = np.where(touches, point[:, 0], record.position[:, 0])
+        inside = evaluated(force, position, step, interval)
+        height, lateral = (np.where(touches, values, np.nan) for values in (point[:, 2], point[:, 1] - strip_offset))
+        sampled = Sampled(force, position, step, inside, height, lateral)
+        supports = line.static.positions[line.mesh.support_nodes, 0]
+        return cls(record, sampled, chosen, supports, line.wires[0].period, interval)
+
+    @property
+    def figures(self) -> Quality | None:
+        """The figures in the interval; None if the run does not reach it, or does not settle."""
+        return figures_of(self.sampled, self.filter)
+
+    def uplift(self, quality: Quality) -> float | None:
+        """Return the largest uplift of the interval's supports over the whole run [m]; None if there is none in it."""
+        low, high = min(quality.start, quality.end), max(quality.start, quality.end)
+        start, end = self.interval
+        limits = (low if start is None else start, high if end is None else end)
+        inside = [stands_in(float(x), limits, self.period) for x in self.supports]
+        return float(self.record.uplift[:, inside].max()) if any(inside) else None
+
+
+def write_timeseries(path: Path, run_of: Evaluated) -> None:
+    """Write a record as CSV: first column time, then quantity with unit, one row per time.
+
+    Statistics of ``filtered_force`` where ``in_interval`` is 1 are the figures that are printed.
+    """
+    record, sampled = run_of.record, run_of.sampled
+    prefix = "catenary.pantograph[1].contact"
+    names = ["time [s]", *(f"{prefix}.{n}" for n in ("force [N]", "x [m]", "y [m]", "z [m]"))]
+    columns = [record.time, sampled.force, sampled.position, *record.contact_point[:, 0, 1:].T]
+    names += [f"{prefix}.filtered_force [N]", f"{prefix}.in_interval"]
+    columns += [low_pass(sampled.force, sampled.step, run_of.filter), sampled.inside.astype(np.float64)]
     names += [f"catenary.support[{i + 1}].uplift [m]" for i in range(record.uplift.shape[1])]
     columns += list(record.uplift.T)
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.17g")
 
 
 def _span_of(arguments: argparse.Namespace, line: CatenaryModel) -> tuple[float, float]:
@@ -126,20 +202,29 @@ def _check_step(arguments: argparse.Namespace) -> None:
         raise ParameterError(f"--step {arguments.step:g}: must lie between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s")
 
 
-def _print(arguments: argparse.Namespace, record: CoupledRecord, span: tuple[float, float], factor: float) -> None:
-    start, end = arguments.interval or (span[0] + 0.45 * (span[1] - span[0]), span[0] + 0.85 * (span[1] - span[0]))
-    figures = contact_figures(record.position[:, 0], record.contact_force[:, 0], arguments.step, start, end)
-    rows = [(label, f"{value:.2f}") for label, value in _rows(figures)]
-    rows.append(("largest uplift at a support [mm]", f"{1e3 * record.uplift.max():.1f}"))
-    print_table(f"Contact force, 0-20 Hz, {start:g} ... {end:g} m", ("quantity", "value"), rows)
-    print(f"{factor:.2f} times real time; peak of the record: {record.contact_force.max():.1f} N unfiltered")
+def _print(run_of: Evaluated, factor: float) -> None:
+    q = run_of.figures
+    if q is None:
+        print(f"no figures: the run ends less than {SETTLING:g} s after the first contact, or makes none")
+        return
+    rows = [(label, f"{value:.2f}") for label, value in _rows(q)]
+    uplift, whole = run_of.uplift(q), run_of.record.uplift.max()
+    rows.append(("largest uplift of the interval's supports [mm]", "-" if uplift is None else f"{1e3 * uplift:.1f}"))
+    print_table(f"Contact force, {run_of.filter.band}, {q.start:.0f} ... {q.end:.0f} m", ("quantity", "value"), rows)
+    print(f"filter: {run_of.filter.sentence}")
+    for other in q.told:
+        extremes = f"maximum {other.maximum:.1f} N, minimum {other.minimum:.1f} N"
+        print(f"the extremes depend on the filter: {extremes} with {other.filter}")
+    peak = run_of.sampled.force.max()
+    print(f"whole run: largest uplift of a support {1e3 * whole:.1f} mm, peak {peak:.1f} N unfiltered")
+    print(f"{factor:.2f} times real time")
 
 
-def _rows(figures: ContactFigures) -> list[tuple[str, float]]:
+def _rows(q: Quality) -> list[tuple[str, float]]:
     return [
-        ("mean [N]", figures.mean),
-        ("standard deviation [N]", figures.sigma),
-        ("maximum [N]", figures.maximum),
-        ("minimum [N]", figures.minimum),
-        ("loss of contact [%]", figures.loss),
+        ("mean [N]", q.mean),
+        ("standard deviation [N]", q.sigma),
+        ("maximum [N]", q.maximum),
+        ("minimum [N]", q.minimum),
+        ("loss of contact [%]", q.losses.percentage),
     ]

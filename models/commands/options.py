@@ -11,6 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from master.evaluation.filters import DEFAULT, ForceFilter
 from models.definition import LARGEST, SMALLEST
 from models.part import ParameterError
 
@@ -24,6 +25,36 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         metavar="PART.PARAMETER=VALUE",
         help="change a parameter: line.damping.alpha=0.00275, pantograph.static_force=170 (SI units)",
     )
+
+
+def add_filter(parser: argparse.ArgumentParser) -> None:
+    """Add the choice of the contact force's low-pass."""
+    parser.add_argument("--filter", choices=("butterworth", "fft"), default=DEFAULT.kind, help="low-pass of the force")
+    parser.add_argument("--filter-order", type=int, metavar="N", help=f"of butterworth (default {DEFAULT.order})")
+    parser.add_argument("--filter-phase", choices=("zero", "causal"), help=f"of butterworth (default {DEFAULT.phase})")
+    parser.add_argument("--cutoff", type=positive, default=DEFAULT.cutoff, help=f"Hz (default {DEFAULT.cutoff:g})")
+
+
+def chosen_filter(arguments: argparse.Namespace) -> ForceFilter:
+    """Return the low-pass that was asked for.
+
+    Raises
+    ------
+    ParameterError
+        If an option does not belong to the filter, or is out of its range.
+    """
+    order, phase = arguments.filter_order, arguments.filter_phase
+    if arguments.filter == "fft" and (order is not None or phase is not None):
+        raise ParameterError("--filter fft: has neither order nor phase; leave --filter-order and --filter-phase out")
+    if order is not None and not 1 <= order <= _HIGHEST_ORDER:
+        raise ParameterError(f"--filter-order {order}: must lie between 1 and {_HIGHEST_ORDER}")
+    if 2.0 * arguments.cutoff * arguments.step >= 1.0:
+        half = f"half the sampling frequency, {0.5 / arguments.step:g} Hz at --step {arguments.step:g}"
+        raise ParameterError(f"--cutoff {arguments.cutoff:g}: must lie below {half}, or nothing is filtered")
+    return ForceFilter(arguments.filter, order or DEFAULT.order, arguments.cutoff, phase or DEFAULT.phase)
+
+
+_HIGHEST_ORDER = 20
 
 
 def settings(given: Iterable[str], part: str) -> dict[str, float]:

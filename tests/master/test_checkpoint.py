@@ -158,3 +158,13 @@ def test_fmus_that_cannot_serialise_are_named(toy):
         mute = replace(system.components[0], fmu=replace(system.components[0].fmu, can_serialise=False))
         with pytest.raises(UsageError, match="FMU of catenary cannot serialise"):
             index_at(replace(system, components=(mute, system.components[1])), 0.1)
+
+
+def test_a_checkpoint_of_another_version_is_refused_in_one_sentence(tmp_path):
+    path = tmp_path / "checkpoint.state"
+    path.write_bytes(b"openpanto checkpoint 0\nwhatever came then")
+    with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 1: begin the run anew"):
+        checkpoint.read(path)
+    path.write_bytes(b"something else")
+    with pytest.raises(MasterError, match="is not a checkpoint"):
+        checkpoint.read(path)

@@ -51,7 +51,7 @@ def test_run_says_figures_and_verdict_in_80_columns(toy, in_folder, capsys):
     assert main([str(toy), "--no-build"]) == 0
     out = capsys.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "EN 50367, pantograph, 20-45 m, 180 km/h" in out
+    assert "EN 50367, AC, pantograph, 20-45 m, 180 km/h" in out
     assert "mean force [N]" in out
     assert "failed" in out  # 140 N are too many at 180 km/h
     assert "real-time factor" in out

@@ -5,11 +5,32 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from master.quality import assess, band_pass, find_losses, interval_mask, judge, low_pass, settled, target_mean_force
+from master.evaluation import contact_quality, filters
+from master.evaluation.contact_quality import find_losses
+from master.evaluation.en50367_limits import LimitChoice, judge, limits_at
+from master.evaluation.filters import ForceFilter, interval_mask, settled
 
+#: The wall is what most of these statements are sharp for; tests/master/evaluation has those of the other filters.
+WALL = ForceFilter("fft")
 STEP = 1e-3
 TIME = np.arange(8001) * STEP
 MIDDLE = slice(2000, 6000)  # 4 s: whole periods of every sine below, less one sample
+
+
+def low_pass(signal, step):
+    return filters.low_pass(signal, step, WALL)
+
+
+def band_pass(signal, step, low, high):
+    return filters.band_pass(signal, step, low, high, WALL)
+
+
+def assess(force, position, step, *others):
+    return contact_quality.assess(force, position, step, WALL, *others)
+
+
+def judged(figures, uplifts=()):
+    return judge(figures, LimitChoice(), uplifts)
 
 
 def sine(frequency, amplitude=1.0, phase=0.0):
@@ -162,13 +183,13 @@ def test_speed_comes_from_the_record():
 
 def test_target_mean_force_at_300_kmh():
     """157.3 N at 300 km/h [EN 50367: 0.00097 v^2 + 70]; the branches nearly meet at 200 km/h."""
-    assert target_mean_force(300 / 3.6) == pytest.approx(157.3)
-    assert target_mean_force(200 / 3.6) == pytest.approx(108.8)
+    assert limits_at(300 / 3.6, LimitChoice()).mean_upper.value == pytest.approx(157.3)
+    assert limits_at(200 / 3.6, LimitChoice()).mean_upper.value == pytest.approx(108.8)
 
 
-def quality(force, speed=300 / 3.6, **options):
+def quality(force, speed=300 / 3.6, height=None):
     n = len(force)
-    return assess(force, speed * np.arange(n) * STEP, STEP, (speed, speed * (n * STEP - 1)), **options)
+    return assess(force, speed * np.arange(n) * STEP, STEP, (speed, speed * (n * STEP - 1)), height)
 
 
 def verdicts(criteria):
@@ -176,9 +197,9 @@ def verdicts(criteria):
 
 
 def test_verdict_passes_a_good_run():
-    criteria = judge(quality(157.5 + sine(2.0, 50.0), height=np.full(len(TIME), 5.08)), [0.045, 0.046])
+    criteria = judged(quality(157.5 + sine(2.0, 50.0), height=np.full(len(TIME), 5.08)), [0.045, 0.046])
     assert all(c.passed for c in criteria)
-    assert len(criteria) == 6
+    assert len(criteria) == 7
 
 
 @pytest.mark.parametrize(
@@ -192,35 +213,39 @@ def test_verdict_passes_a_good_run():
     ],
 )
 def test_each_limit_can_fail_alone(force, uplifts, height, failed):
-    found = verdicts(judge(quality(force, height=height + 0.0 * TIME), uplifts))
+    found = verdicts(judged(quality(force, height=height + 0.0 * TIME), uplifts))
     assert [name for name, passed in found.items() if not passed] == [failed]
 
 
 @pytest.mark.parametrize("speed", [120 / 3.6, 190 / 3.6, 230 / 3.6, 300 / 3.6])
-@pytest.mark.parametrize(("off", "passes"), [(-2.6, False), (-2.4, True), (2.4, True), (2.6, False), (-40.0, False)])
-def test_a_mean_may_be_off_its_target_by_so_much_on_either_side(speed, off, passes):
-    """EN 50367's target of the mean by hand, v in km/h: 0.00047 v^2 + 90 N up to 200 km/h, 0.00097 v^2 + 70 N above."""
+@pytest.mark.parametrize(("off", "passes"), [(-2.6, True), (0.4, True), (0.6, False), (2.6, False)])
+def test_a_mean_lies_between_its_limits(speed, off, passes):
+    """EN 50367's limits of the mean by hand, v in km/h: from 0.00047 v^2 + 60 N to 0.00047 v^2 + 90 N up to 200 km/h,
+    to 0.00097 v^2 + 70 N above. Below the upper one is no failure; 0.5 N above it is at it.
+    """
     v = 3.6 * speed
-    target = 0.00047 * v * v + 90.0 if v <= 200.0 else 0.00097 * v * v + 70.0
-    assert verdicts(judge(quality(target + off + sine(2.0, 20.0), speed)))["mean force"] == passes
+    upper = 0.00047 * v * v + 90.0 if v <= 200.0 else 0.00097 * v * v + 70.0
+    lower = 0.00047 * v * v + 60.0
+    for mean, kept in ((upper + off, passes), (lower - 0.1, False), (lower + 0.1, True)):
+        assert verdicts(judged(quality(mean + sine(2.0, 20.0), speed)))["mean force"] == kept
 
 
 @pytest.mark.parametrize(("share", "passes"), [(0.295, True), (0.305, False)])
 def test_sigma_may_be_three_tenths_of_the_mean(share, passes):
     """A sine's standard deviation is its amplitude over the root of 2."""
     force = 157.3 * (1.0 + np.sqrt(2.0) * share * np.sin(2.0 * np.pi * 2.0 * TIME))
-    assert verdicts(judge(quality(force)))["sigma / mean"] == passes
+    assert verdicts(judged(quality(force)))["sigma / mean"] == passes
 
 
 @pytest.mark.parametrize(("amplitude", "passes"), [(190.0, True), (196.0, False)])
 def test_the_largest_force_is_below_350_newtons(amplitude, passes):
     force = 157.0 + amplitude * np.exp(-(((TIME - 4.0) / 0.1) ** 2))
-    assert verdicts(judge(quality(force)))["maximum force"] == passes
+    assert verdicts(judged(quality(force)))["maximum force"] == passes
 
 
 @pytest.mark.parametrize(("uplifts", "passes"), [([0.02, 0.119], True), ([0.121, 0.02], False)])
 def test_the_largest_uplift_is_judged_wherever_it_is(uplifts, passes):
-    assert verdicts(judge(quality(157.5 + sine(2.0, 30.0)), uplifts))["uplift at supports"] == passes
+    assert verdicts(judged(quality(157.5 + sine(2.0, 30.0)), uplifts))["uplift at supports"] == passes
 
 
 @pytest.mark.parametrize(("lost", "passes"), [(11, True), (13, False)])
@@ -228,7 +253,7 @@ def test_arcs_may_take_two_per_mille_of_the_time(lost, passes):
     """Of the 8 s of record the first and the last are outside the interval: 12 ms are 0.2 % of it."""
     force = 157.5 + sine(2.0, 30.0)
     force[4000 : 4000 + lost] = 0.0
-    assert verdicts(judge(quality(force)))["NQ (estimate)"] == passes
+    assert verdicts(judged(quality(force)))["NQ (estimate)"] == passes
 
 
 def test_what_lies_before_the_first_contact_and_two_periods_of_the_filter_is_left_out():
@@ -262,4 +287,4 @@ def test_figures_of_an_interval_are_those_of_the_whole_filtered_record_there():
 def test_arcing_fails():
     force = 157.5 + sine(2.0, 30.0)
     force[4000:4020] = 0.0
-    assert not verdicts(judge(quality(force)))["NQ (estimate)"]
+    assert not verdicts(judged(quality(force)))["NQ (estimate)"]

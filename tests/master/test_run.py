@@ -38,6 +38,7 @@ def test_files_and_header(done):
         "timeseries_5ms.csv",
         "summary.json",
         "geometry.json",
+        "contact_force.csv",
     }
     titles = (done.folder / "timeseries.csv").read_text().splitlines()[0].split(",")
     assert titles[:2] == ["time [s]", FORCE]

@@ -5,13 +5,14 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
+from master.evaluation.contact_quality import assess
+from master.evaluation.filters import ForceFilter
 from models.catenary.model import CatenaryModel, StripMotion
 from models.catenary.part import CatenaryPart
 from models.contact import application_point, engagement
 from models.coupled import CoupledModel
 from models.library import load_pantograph
 from models.pantograph.lumped import LumpedModel, LumpedPantographPart
-from models.statistics import contact_figures
 from models.time_integration import Newmark
 from tests.models.nodal_line import NodalLine
 
@@ -225,8 +226,9 @@ def test_a_kilometre_apart_each_runs_as_if_it_were_alone(line_maker, cx):
     together = CoupledModel(line, spaced).run(stop, 1e-3)
     for i, pantograph in enumerate(spaced):
         alone = CoupledModel(line, [pantograph]).run(stop, 1e-3)
+        interval = (starts[i] + 350.0, starts[i] + 600.0)
         figures = [
-            contact_figures(r.position[:, p], r.contact_force[:, p], 1e-3, starts[i] + 350.0, starts[i] + 600.0)
+            assess(r.contact_force[:, p], r.position[:, p], 1e-3, ForceFilter("fft"), interval)
             for r, p in ((together, i), (alone, 0))
         ]
         for name in ("mean", "sigma", "maximum", "minimum"):

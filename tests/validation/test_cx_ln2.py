@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from master.quality import assess
+from master.evaluation.contact_quality import assess
+from master.evaluation.filters import ForceFilter
 from models.catenary.model import CatenaryModel
 from models.coupled import CoupledModel
 from models.library import load_line, load_lumped
@@ -41,7 +42,7 @@ def monolithic():
             line = load_line("LN2").with_values(line_values)
             pantograph = load_lumped("CX").with_values(_parameters())
             record = CoupledModel(CatenaryModel(line), [pantograph]).run(stop, step)
-            quality = assess(record.contact_force[:, 0], record.position[:, 0], step, INTERVAL)
+            quality = assess(record.contact_force[:, 0], record.position[:, 0], step, ForceFilter("fft"), INTERVAL)
             done[key] = quality, record
         return done[key]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from master.line import laps, lies_within, met, support_uplifts
+from master.evaluation.filters import stands_in
+from master.line import laps, met, support_uplifts
 from master.recorder import Recording
 
 RING = {"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}
@@ -45,12 +46,12 @@ def test_supports_of_a_ring_are_met_once_a_lap(limits):
 def test_a_place_of_a_ring_is_in_an_interval_if_one_of_its_images_is(x, interval):
     images = x + 100.0 * np.arange(-5, 12)
     inside = bool(((images >= interval[0] - 1.0) & (images <= interval[1] + 1.0)).any())
-    assert lies_within(x, interval, 100.0) == inside
+    assert stands_in(x, interval, 100.0) == inside
 
 
 def test_a_place_of_a_line_that_ends_is_where_it_is():
-    assert lies_within(151.0, (110.0, 150.0))
-    assert not lies_within(152.0, (110.0, 150.0))
-    assert lies_within(109.5, (110.0, None))
-    assert lies_within(-1e6, (None, 150.0))
-    assert not lies_within(None, (None, None))
+    assert stands_in(151.0, (110.0, 150.0))
+    assert not stands_in(152.0, (110.0, 150.0))
+    assert stands_in(109.5, (110.0, None))
+    assert stands_in(-1e6, (None, 150.0))
+    assert not stands_in(None, (None, None))

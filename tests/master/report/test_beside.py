@@ -9,7 +9,6 @@ from master.errors import MasterError
 from master.report.comparison import columns, comparison_page
 from master.report.inputs import differing_inputs
 from master.report.measured import compare_measured, comparison_rows, read_measured
-from master.report.signals import all_signals
 
 
 def write(path, text):
@@ -23,7 +22,7 @@ def as_csv(title, xs, fs):
 
 @pytest.fixture
 def signals(made_up):
-    return all_signals(made_up())[0]
+    return made_up().signals[0]
 
 
 def test_a_measurement_of_the_simulation_itself_correlates_fully(signals, tmp_path):

@@ -11,13 +11,12 @@ from PIL import Image
 from master.errors import MasterError
 from master.report.film import FilmOptions, write_film
 from master.report.movie import DISPLACEMENT_UNIT, as_json, make_movie
-from master.report.signals import all_signals
 
 
 @pytest.fixture
 def movie(made_up):
     run = made_up()
-    return make_movie(run, all_signals(run))
+    return make_movie(run, run.signals)
 
 
 def test_frames_show_what_was_recorded(movie, made_up):
@@ -60,7 +59,7 @@ def test_in_an_overlap_the_pantograph_runs_on_the_lower_wire(made_up):
             values[f"{kind}[{i}].section"] = 1.0 if i <= 2 else 2.0
     values |= {"support[3].z": 5.28, "dropper[3].lower.z": 5.25, "dropper[4].lower.z": 5.25}
     run = dataclasses.replace(run, geometry={"catenary": values})
-    found = make_movie(run, all_signals(run))
+    found = make_movie(run, run.signals)
     assert len(found.sections) == 2
     (rider,) = found.riders
     assert set(rider.section[rider.x < 99.0]) == {0}
@@ -73,7 +72,7 @@ def test_without_uplift_or_geometry_there_is_no_picture(made_up):
         made_up(with_geometry=False),
         dataclasses.replace(made_up(), recordings=made_up().recordings[:1]),
     ):
-        assert make_movie(run, all_signals(run)) is None
+        assert make_movie(run, run.signals) is None
 
 
 def test_a_film_plays_the_interval(movie, tmp_path):
@@ -94,7 +93,7 @@ def test_a_line_that_closes_on_itself_is_drawn_for_every_lap(made_up):
     gone = ("support[3]", "dropper[3]", "dropper[4]")
     values = {k: v for k, v in run.geometry["catenary"].items() if k[:10] not in gone}
     run = dataclasses.replace(run, geometry={"catenary": values | {"period": 100.0}})
-    movie = make_movie(run, all_signals(run))
+    movie = make_movie(run, run.signals)
     (section,) = movie.sections
     assert section.points.tolist() == [-50.0, 0.0, 50.0, 100.0]  # ... of which lap 0 begins 50 m before the run's end
     assert section.line.droppers[0].tolist() == [-45.0, -20.0, 55.0, 80.0]
@@ -106,4 +105,4 @@ def test_a_line_that_closes_on_itself_is_drawn_for_every_lap(made_up):
 def test_so_many_laps_are_not_drawn(made_up):
     run = made_up()
     run = dataclasses.replace(run, geometry={"catenary": run.geometry["catenary"] | {"period": 2.0}})
-    assert make_movie(run, all_signals(run)) is None
+    assert make_movie(run, run.signals) is None

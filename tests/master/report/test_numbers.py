@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from master.quality import low_pass, settled
+from master.evaluation.contact_signals import power_spectrum
+from master.evaluation.filters import ForceFilter, low_pass, settled
 from master.report.encode import kept_samples, packed, packed_integers
-from master.report.signals import power_spectrum
 
 
 @settings(max_examples=50, deadline=None)
@@ -52,7 +52,7 @@ def test_spectrum_holds_the_variance_at_its_frequency():
 def test_ringing_before_and_after_the_first_contact_is_left_out():
     """A force that jumps from 0 to 150 N rings below zero before the jump, not where it is shown."""
     force = np.where(np.arange(4000) < 1000, 0.0, 150.0)
-    filtered = low_pass(force, 1e-3)
+    filtered = low_pass(force, 1e-3, ForceFilter("fft"))
     assert filtered[:1000].min() < -5.0
     shown = filtered[settled(force, 1e-3)]
     assert abs(shown - 150.0).max() < 0.03 * 150.0

@@ -8,7 +8,6 @@ import pytest
 
 from master import plots
 from master.report.charts import line_marks, run_charts
-from master.report.signals import all_signals
 
 
 def lines(axes):
@@ -88,8 +87,8 @@ def test_charts_over_places_of_one_lap_say_so(made_up):
     ends = made_up()
     ring = dataclasses.replace(ends, geometry={"catenary": ends.geometry["catenary"] | {"period": 200.0}})
     for run, named in ((ring, True), (ends, False)):
-        (bars,) = [c for c in run_charts(run, all_signals(run)) if c.key == "uplift"]
-        (droppers,) = [c for c in run_charts(run, all_signals(run)) if c.key == "droppers_catenary"]
+        (bars,) = [c for c in run_charts(run, run.signals) if c.key == "uplift"]
+        (droppers,) = [c for c in run_charts(run, run.signals) if c.key == "droppers_catenary"]
         for chart in (bars, droppers):
             layout = chart.figure["layout"]
             assert ("in its lap" in layout["xaxis"]["title"]["text"]) == named

@@ -130,3 +130,15 @@ def test_a_run_that_failed_fails_its_rows_and_says_why():
 
 def test_rounding_does_not_decide():
     assert Bounds(-math.inf, 0.3).place(0.1 + 0.2) == "inside"
+
+
+def test_a_row_tells_its_band_that_it_is_recalled_and_what_other_filters_give():
+    row = _row(value=38.9, tolerance=1, band=(33, 46), recalled=True)
+    measured = Measured((38.0,), others=(("fft 20 Hz", 37.5),))
+    remark = decide(row, QUANTITIES["sigma"], measured, {}).remark
+    said = "reference recalled, not read; untuned readings span 33 to 46 N; with other filters 37.5 (fft 20 Hz)"
+    assert remark == said
+    plain = _row(value=38.9, tolerance=1)
+    assert decide(plain, QUANTITIES["sigma"], measured, {}).remark == ""
+    told = Measured((38.0,), others=(("fft 20 Hz", 30.0),), is_told=True)
+    assert decide(plain, QUANTITIES["sigma"], told, {}).remark == "with other filters 30.0 (fft 20 Hz)"

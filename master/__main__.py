@@ -2,7 +2,15 @@
 
 import sys
 
-from master.cli import main
+from master.supervision import supervised
+
+
+def _main() -> int:
+    # Here, and so in the child alone: the parent waits and needs nothing.
+    from master.cli import main
+
+    return main()
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(supervised(_main))

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from master import folder_lock
+from master.durable import write_whole
 from master.errors import MasterError
 
 MAX_RUNS: Final = 12
+#: Files of a scenario in which values stand.
+_TEXTS: Final = (".ssd", ".ssv", ".ssm", ".csv", ".toml")
 #: First change tried, as a share of the start value, and how much a step may exceed the bracket's secant.
 _FIRST_CHANGE: Final = 0.03
 
@@ -155,6 +160,41 @@ def _bracket(trials: list[Trial], target: float) -> tuple[float, float] | None:
     return min(lower.value, upper.value), max(lower.value, upper.value)
 
 
+@contextmanager
+def unchanged(folder: Path) -> Iterator[Callable[[], None]]:
+    """Work on a scenario in which a value is to be stored at the end; gives what checks that nobody else did so.
+
+    To be entered before the scenario is read.
+
+    Parameters
+    ----------
+    folder : Path
+        The scenario's folder, in which one calibration at a time may work.
+
+    Raises
+    ------
+    FolderInUseError
+        If another calibration is at work there.
+    MasterError
+        By the check, naming a file that was changed meanwhile.
+    """
+    with folder_lock.claimed(folder, "wait for it to end, or try with --dry-run"):
+        before = _texts(folder)
+
+        def check() -> None:
+            now = _texts(folder)
+            for path in sorted({*before, *now}):
+                if before.get(path) != now.get(path):
+                    raise MasterError(f"{path} was changed during the calibration: nothing is stored, run it again")
+
+        yield check
+
+
+def _texts(folder: Path) -> dict[Path, bytes]:
+    """Return the files that say what is computed; FMUs may be built meanwhile."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.suffix in _TEXTS and path.is_file()}
+
+
 def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     """Write a Real parameter's value into an ``.ssv`` file, leaving the rest of its text as it is.
 
@@ -179,4 +219,4 @@ def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     m = found[0]
     comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
     new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"
-    path.write_text(text[: m.start()] + new + text[m.end() :], encoding="utf-8")
+    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode())

@@ -18,12 +18,17 @@ class Caution:
     component : str
     text : str
         In the FMU's own words.
+    is_own : bool
+        Whether they are: how an FMU ended it does not say itself.
     """
 
     component: str
     text: str
+    is_own: bool = True
 
     def __str__(self) -> str:
+        if not self.is_own:
+            return f"warning: {self.text}; what was computed is not touched by that"
         return f"warning: component '{self.component}' says: {self.text}"
 
 
@@ -59,10 +64,13 @@ class CautionObserver:
     def finish(self) -> None:
         """Nothing to finish."""
 
+    def add(self, found: Caution) -> None:
+        """Take a warning that comes from elsewhere."""
+        if found not in self.warnings:
+            self.warnings.append(found)
+            self._tell(found)
+
     def _look(self, network: Network) -> None:
         for slave in network.slaves:
             for text in slave.warnings() if isinstance(slave, Cautious) else ():
-                found = Caution(slave.name, text)
-                if found not in self.warnings:
-                    self.warnings.append(found)
-                    self._tell(found)
+                self.add(Caution(slave.name, text))

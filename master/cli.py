@@ -1,6 +1,6 @@
 """The command line: ``python -m master [VERB] ...``.
 
-Exit codes: 0 done, 1 the run failed or the scenario is invalid, 2 the command line is wrong.
+Exit codes: docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +23,7 @@ from master.checkpoint import Continuation
 from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import EvaluationSettings
-from master.isolation import Isolation
+from master.isolation import INIT_TIMEOUT, Isolation
 from master.progress import ProgressObserver
 from master.report import commands
 from master.results import Results
@@ -136,6 +136,12 @@ def _add_run(verbs: Any) -> None:
         "--step-timeout", type=_positive, metavar="S", help="with --isolate: a step of more than S seconds has failed"
     )
     parser.add_argument(
+        "--init-timeout",
+        type=_positive,
+        metavar="S",
+        help=f"with --isolate: loading or initialising for more than S seconds has failed, default {INIT_TIMEOUT:g}",
+    )
+    parser.add_argument(
         "--real-time",
         type=_positive,
         nargs="?",
@@ -239,13 +245,14 @@ def _run(options: argparse.Namespace) -> int:
         folder = _folder(options, scenario.system)
         _protect(folder, scenario.package)
         _tell_warnings(scenario.system, tell)
-        try:
-            done = _run_shown(scenario.system, folder, options.quiet, manner)
-        except RunError:
-            if not options.no_report:
-                _report_what_there_is(folder)
-            raise
-    _tell_results(done, options)
+        with results.claimed(folder):  # until the report is written too
+            try:
+                done = _run_shown(scenario.system, folder, options.quiet, manner)
+            except RunError:
+                if not options.no_report:
+                    _report_what_there_is(folder)
+                raise
+            _tell_results(done, options)
     return 0
 
 
@@ -292,7 +299,12 @@ def _manner(options: argparse.Namespace) -> Manner:
         raise UsageError(
             "--step-timeout needs --isolate: only a process of its own can be ended when it does not return"
         )
-    isolation = Isolation(options.step_timeout, options.real_time is not None) if options.isolate else None
+    if options.init_timeout is not None and not options.isolate:
+        raise UsageError(
+            "--init-timeout needs --isolate: only a process of its own can be ended when it does not return"
+        )
+    limits = (options.step_timeout, options.real_time is not None, options.init_timeout or INIT_TIMEOUT)
+    isolation = Isolation(*limits) if options.isolate else None
     every = options.checkpoint_every
     return Manner(options.checkpoint, every, _continuation(options), isolation, options.real_time)
 
@@ -448,17 +460,19 @@ def _runtime(folder: Path) -> Path:
 
 
 def _calibrate(options: argparse.Namespace) -> int:
+    is_stored = not (options.dry_run or options.set)
+    is_folder = options.scenario.is_dir()
+    with calibrate.unchanged(options.scenario) if is_stored and is_folder else nullcontext(lambda: None) as check:
+        return _calibrated(options, is_stored, check)
+
+
+def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[], None]) -> int:
     with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
         system = scenario.system
         _tell_warnings(system, _tell)
         task = _task(options, system)
-        place = None if options.dry_run or options.set else _place(scenario.package, task.parameter)
-        found = calibrate.find_value(
-            lambda value: _trial(system, task, value),
-            task.mean_force,
-            _start_value(system, task.parameter),
-            task.tolerance,
-        )
+        place = _place(scenario.package, task.parameter) if is_stored else None
+        found = _found(system, task)
         print(
             f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
             f"({len(found.trials)} runs; filter {_filter_of(system)})"
@@ -469,6 +483,7 @@ def _calibrate(options: argparse.Namespace) -> int:
                 f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
                 f"in {len(found.trials)} runs of 'python -m master calibrate'"
             )
+            check()
             calibrate.store_value(*place, found.value, note)
             print(f"stored in {place[0]}")
     return 0
@@ -476,6 +491,11 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 def _filter_of(system: System) -> str:
     return results.filter_of(system.settings.filter.model_dump()).short
+
+
+def _found(system: System, task: Calibration) -> calibrate.Found:
+    start = _start_value(system, task.parameter)
+    return calibrate.find_value(lambda value: _trial(system, task, value), task.mean_force, start, task.tolerance)
 
 
 def _task(options: argparse.Namespace, system: System) -> Calibration:

@@ -22,7 +22,8 @@ def write_whole(path: Path, data: bytes) -> None:
     MasterError
         If it cannot be written; the old one is still there then.
     """
-    temporary = path.with_name(path.name + PART)
+    # Hidden, so that no archive takes it along, and each process has its own: two writers do not mix.
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     try:
         with temporary.open("wb") as file:
             file.write(data)

@@ -81,5 +81,9 @@ class InterruptedRunError(RunError):
     """A run that the user stopped."""
 
 
+class ForeignResultsError(MasterError):
+    """A results folder that no longer holds what the run has written into it."""
+
+
 class UsageError(MasterError):
     """A wrong command line."""

@@ -16,8 +16,11 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-#: Messages kept per instance.
+from master.errors import one_line
+
+#: Messages kept per instance, and bytes of one that are looked at.
 _KEPT: Final = 20
+_LONGEST: Final = 1 << 16
 
 #: FMI status of a warning.
 _WARNING: Final = 1
@@ -28,7 +31,7 @@ _messages: defaultdict[str, deque[tuple[int, str]]] = defaultdict(lambda: deque(
 
 def _log(_environment: Any, instance: bytes, status: int, _category: bytes, message: bytes) -> None:
     if status > 0:
-        text = " ".join(message.decode("utf-8", "replace").split())
+        text = one_line(" ".join(message[:_LONGEST].decode("utf-8", "replace").split()))
         _messages[(instance or b"").decode("utf-8", "replace")].append((status, text))
 
 

@@ -24,8 +24,11 @@ from master.system import Component, Variable
 from master.unpacked import Unpacked
 
 _STATUS: Final = ("ok", "warning", "discard", "error", "fatal", "pending")
-_WARNING: Final = 1
+#: Statuses after which a run may go on; whatever else comes, also what FMI does not know, has failed.
+_GOOD: Final = (0, 1)
 _FATAL: Final = 4
+#: Longest serialised state that is taken from an FMU [bytes].
+LONGEST_STATE: Final = 1 << 30
 
 
 class Readable(Protocol):
@@ -89,14 +92,14 @@ class Group:
         """Fill `values` from the FMU."""
         if self._typed is not None:
             self._typed.read()
-        elif self.names and (status := self._get(*self._arguments)) > _WARNING:
+        elif self.names and (status := self._get(*self._arguments)) not in _GOOD:
             raise self._instance.error("reading its variables", status)
 
     def write(self) -> None:
         """Set the FMU's variables to `values`."""
         if self._typed is not None:
             self._typed.write()
-        elif self.names and (status := self._set(*self._arguments)) > _WARNING:
+        elif self.names and (status := self._set(*self._arguments)) not in _GOOD:
             raise self._instance.error("setting its inputs", status)
 
 
@@ -192,7 +195,7 @@ class Instance:
         began = perf_counter()
         status = self._do_step(self.handle, time, step, 1)
         self.stepping_time += perf_counter() - began
-        if status > _WARNING:
+        if status not in _GOOD:
             raise self.error("a step", status)
 
     def save(self) -> c_void_p:
@@ -214,6 +217,9 @@ class Instance:
         state, size = self.save(), c_size_t()
         try:
             self._call("serialising its state", "fmi2SerializedFMUstateSize", state, byref(size))
+            if size.value > LONGEST_STATE:
+                text = f"claims a state of {size.value} bytes, of which at most {LONGEST_STATE} are taken"
+                raise SlaveError(f"component '{self.name}' ({self.component.fmu.path.name}) {text}")
             data = (c_char * size.value)()
             self._call("serialising its state", "fmi2SerializeFMUstate", state, data, size.value)
             return data.raw
@@ -238,19 +244,29 @@ class Instance:
         """Return the FMU's warnings so far, each once and on one line."""
         return tuple(one_line(text) for text in fmi_log.warnings(self.name))
 
-    def close(self) -> None:
-        """Terminate and free the instance and its files; an FMU that died is only forgotten."""
+    def close(self) -> str:
+        """Terminate and free the instance and its files; an FMU that died is only forgotten.
+
+        Returns
+        -------
+        str
+            What went wrong, empty if nothing did: what was computed is not touched by how an FMU ends.
+        """
+        said = ""
+        if not self._dead:
+            status = self.function("fmi2Terminate")(self.handle)
+            said = "" if status in _GOOD else str(self.error("its termination", status))
         if not self._dead:
             self._dead = True
-            self.function("fmi2Terminate")(self.handle)
             self._fmu.freeInstance()
             self._unpacked.release()
         self._unpacked.remove()
+        return said
 
     def error(self, doing: str, status: int) -> SlaveError:
         """Return the error for a failed call, in the FMU's own words if it said any."""
         self._dead = self._dead or status >= _FATAL
-        label = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
+        label = _STATUS[status] if 0 <= status < len(_STATUS) else f"{status}, which FMI does not know"
         said = fmi_log.last_words(self.name) or "the FMU gave no reason"
         at = f" at t = {self.time:.6g} s" if self.time == self.time else ""
         who = f"component '{self.name}' ({self.component.fmu.path.name})"
@@ -258,7 +274,7 @@ class Instance:
 
     def _call(self, doing: str, function: str, *arguments: Any) -> None:
         status = self.function(function)(self.handle, *arguments)
-        if status > _WARNING:
+        if status not in _GOOD:
             raise self.error(doing, status)
 
     def _set(self, variable: Variable, value: Value) -> None:

@@ -126,6 +126,7 @@ class Recorder:
         self._count = 0  # rows not written yet, as numbers or as lines
         self._oldest = self._latest = -math.inf
         self._goes_on = keep > 0
+        self._rows = keep
         titles = _title_line(self.names, self.units)
         self._file = LineFile(path, _end_of_rows(path, titles, keep) if keep else 0)
         if not keep:
@@ -149,6 +150,16 @@ class Recorder:
             finally:
                 self._file.close()
 
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._file.path
+
+    @property
+    def rows(self) -> int:
+        """How many rows the file must have: those kept and those recorded."""
+        return self._rows
+
     def sync(self) -> None:
         """Write what is waiting and wait until it is on the disk."""
         self._write()
@@ -167,6 +178,7 @@ class Recorder:
         if self._count == 0:
             self._oldest = time
         self._count += 1
+        self._rows += 1
         self._waiting.append(values)
         if self._is_steady:
             self._format_rows()

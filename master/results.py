@@ -7,9 +7,9 @@ import json
 import math
 import platform
 import re
-import resource
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib import metadata
@@ -18,12 +18,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from master import stored
+from master import folder_lock, stored
 from master.checkpoint import NAME as CHECKPOINT
 from master.contacts import Contact
 from master.durable import PART, write_whole
 from master.energy import Balance, drift_events, find_balances
-from master.errors import MasterError
+from master.errors import MasterError, UsageError
 from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, force_table
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits
@@ -43,8 +43,10 @@ FORCES: Final = "contact_force.csv"
 REPORT: Final = "report.html"
 _TABLES: Final = ("timeseries*.csv", "timeseries*.parquet", FORCES, "contact_force.parquet")
 _OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
-#: What a run that was killed may leave half written.
-_PARTS: Final = tuple(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT))
+#: What a run, a study or a verification that was killed may leave half written, and what is no result.
+_PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT)), f".*{PART}")
+_LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)
+_NOT_OURS: Final = "exists and is {kind} of this tool; it is left alone, choose another with --out"
 
 
 @dataclass(frozen=True)
@@ -145,59 +147,100 @@ class Results:
         return followings(self.recordings[0], assessments) if assessments else ()
 
 
-def prepare(folder: Path) -> None:
-    """Make the folder, or empty one that is recognisably a result of ours.
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Work alone in a results folder of ours, or a new one; nothing in it is changed yet.
+
+    Raises
+    ------
+    FolderInUseError
+        If another process works in it.
+    MasterError
+        If it exists and is something else, or cannot be written.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise MasterError(f"{folder} is a file, not a results folder; choose another with --out")
+    if not (is_ours(folder) or _holds_nothing(folder)):
+        raise MasterError(f"{folder} {_NOT_OURS.format(kind='not a results folder')}")
+    with _alone_in(folder, "results folder"):
+        yield
+
+
+@contextmanager
+def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator[None]:
+    """Work alone in a folder, or one whose JSON file ``marker`` names its ``generator``; nothing is removed.
+
+    Raises
+    ------
+    FolderInUseError
+        If another process works in it.
+    MasterError
+        If it is there and is no ``kind`` of ours, or cannot be made.
+    """
+    if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
+        raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
+    with _alone_in(folder, "folder"):
+        _remove(folder, _PARTS)
+        yield
+
+
+@contextmanager
+def _alone_in(folder: Path, kind: str) -> Iterator[None]:
+    """Make a folder and lock it; it goes away again if the command line turns out to be wrong."""
+    is_new = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        claim = ExitStack()
+        claim.enter_context(folder_lock.claimed(folder))
+    except OSError as error:
+        text = f"the {kind} {folder} cannot be written ({error.strerror}); choose another with --out"
+        raise MasterError(text) from error
+    try:
+        with claim:
+            yield
+    except UsageError:
+        if is_new:
+            with suppress(OSError):  # there is something in it
+                folder.rmdir()
+        raise
+
+
+def prepare(folder: Path, keep: Path | None = None) -> None:
+    """Empty a claimed folder of the results of an earlier run.
+
+    Parameters
+    ----------
+    folder : Path
+    keep : Path, optional
+        The checkpoint that a new run begins from, if it lies there.
 
     Raises
     ------
     MasterError
-        If it exists and is something else, or cannot be written.
+        If it cannot be written.
     """
     try:
-        if folder.exists():
-            _empty(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        _remove(folder, (*_OURS, *_PARTS))
+        checkpoint = folder / CHECKPOINT
+        if checkpoint.exists() and not (keep is not None and keep.exists() and checkpoint.samefile(keep)):
+            checkpoint.unlink()
     except OSError as error:
         raise MasterError(
             f"the results folder {folder} cannot be written ({error.strerror}); choose another with --out"
         ) from error
 
 
-def _empty(folder: Path) -> None:
-    if not folder.is_dir():
-        raise MasterError(f"{folder} is a file, not a results folder; choose another with --out")
-    left = list(folder.iterdir())
-    if all(path.name in _PARTS for path in left):  # nothing, or a run that was killed at once
-        for path in left:
-            path.unlink()
-        return
-    if not is_ours(folder):
-        raise MasterError(
-            f"{folder} exists and is not a results folder of this tool; it is left alone, choose another with --out"
-        )
-    for pattern in (*_OURS, *_PARTS):
+def _remove(folder: Path, patterns: Sequence[str]) -> None:
+    for pattern in patterns:
         for path in folder.glob(pattern):
             path.unlink()
 
 
-def take_over(folder: Path, marker: str, generator: str, kind: str) -> None:
-    """Make a folder, or take over one whose JSON file ``marker`` names its ``generator``; nothing is removed.
-
-    Raises
-    ------
-    MasterError
-        If it is there and is no ``kind`` of ours, or cannot be made.
-    """
-    if folder.is_dir() and any(folder.iterdir()) and not made_by(folder / marker, generator):
-        raise MasterError(
-            f"{folder} exists and is no {kind} of this tool; it is left alone, choose another with --out"
-        )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MasterError(
-            f"the folder {folder} cannot be made ({error.strerror}); choose another with --out"
-        ) from error
+def _holds_nothing(folder: Path) -> bool:
+    """Whether a folder is not there, or holds nothing but what a run that was killed at once has left."""
+    if not folder.is_dir():
+        return not folder.exists()
+    return all(any(path.match(p) for p in (*_PARTS, *_LOCKS)) for path in folder.iterdir())
 
 
 def is_ours(folder: Path) -> bool:
@@ -241,8 +284,18 @@ def read(folder: Path) -> Results:
     Raises
     ------
     MasterError
-        If it is not a results folder of ours, or a file in it is damaged.
+        If it is not a results folder of ours, a file in it is damaged, or a run writes there.
     """
+    folder_lock.check_free(folder)
+    done = _read(folder)
+    folder_lock.check_free(folder)
+    now = _summary(folder)
+    if (now.get("run"), now.get("status")) != (done.summary.get("run"), done.summary.get("status")):
+        raise MasterError(f"{folder} was written anew while it was read; try again")
+    return done
+
+
+def _read(folder: Path) -> Results:
     summary = _summary(folder)
     geometry = stored.read_geometry(folder / GEOMETRY) if (folder / GEOMETRY).is_file() else {}
     coarse = sorted(p for p in folder.glob("timeseries*.csv") if p.name != TIMESERIES)
@@ -336,6 +389,10 @@ def peak_memory() -> float:
         found = re.search(r"^VmHWM:\s*(\d+) kB$", status.read_text(encoding="ascii", errors="replace"), re.MULTILINE)
         if found is not None:
             return int(found[1]) / 1024.0
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0.0
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1024.0**2 if sys.platform == "darwin" else 1024.0)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from master import results
 from master.algorithm import make_algorithm
-from master.caution import CautionObserver
+from master.caution import Caution, CautionObserver
 from master.checkpoint import NAME as CHECKPOINT
 from master.checkpoint import (
     Checkpoint,
@@ -26,18 +26,20 @@ from master.checkpoint import (
     take,
 )
 from master.contacts import find_contacts
-from master.errors import InterruptedRunError, MasterError, RunError, UsageError
+from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RunError, UsageError
 from master.instance import Instance, Recordable
 from master.interface import PowerObserver
+from master.interruption import heeded_at_once, interruptible
 from master.isolation import IsolatedInstance, Isolation
 from master.line import GeometryObserver
 from master.network import Network
 from master.pattern import matcher
 from master.realtime import Pacer
-from master.recorder import Recorder, Source
+from master.recorder import Recorder, Recording, Source
 from master.results import Results
-from master.simulation import Observer, Outcome, TimeGrid, interruptible, simulate
+from master.simulation import Observer, Outcome, TimeGrid, simulate
 from master.ssp.annotation import Record
+from master.supervision import phase, unfinished
 from master.system import Component, System, Variable
 from master.watch import ContactWatch
 
@@ -113,28 +115,48 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
     ------
     RunError
         If the run stops before its end; what was computed is in the folder then.
+    FolderInUseError
+        If another process works in the folder.
+    MasterError
+        If the folder is not ours, or was removed or taken over meanwhile.
     UsageError
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
-    identity = _take_folder(system, folder, manner.continuation)
-    results.write_json(folder / results.SUMMARY, {**_description(system, identity), "status": "running"})
+    with results.claimed(folder):
+        identity = _take_folder(system, folder, manner.continuation)
+        with unfinished(folder / results.SUMMARY, identity):
+            results.write_json(folder / results.SUMMARY, {**_description(system, identity), "status": "running"})
+            return _run(system, folder, observers, manner, occasions, identity)
+
+
+def _run(
+    system: System, folder: Path, observers: Sequence[Observer], manner: Manner, occasions: Occasions, identity: str
+) -> Results:
+    farewells: list[Caution] = []
     with (
-        _failure_noted(system, folder, identity),
-        loaded(system, manner.isolation) as network,
         interruptible() as stop_wanted,
+        _failure_noted(system, folder, identity, stop_wanted),
+        loaded(system, manner.isolation, farewells) as network,
     ):
         session = _Session(system, network, folder, manner, identity)
         watchers = [*session.observers, *observers, *session.last_observers(occasions)]
         continuation = manner.continuation
         way_in = {} if continuation is None else {"prepare": continuation.prepare}
         outcome = simulate(network, session.algorithm, session.grid, watchers, stop_wanted, **way_in)
+    for observer in watchers:
+        if isinstance(observer, CautionObserver):
+            for farewell in farewells:
+                observer.add(farewell)
     return _concluded(session, outcome, folder)
 
 
 def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
     try:
         done = session.conclude(outcome)
+    except ForeignResultsError as error:
+        session.disown(error)
+        raise ForeignResultsError(f"{outcome.error}. {error}" if outcome.error else str(error)) from error
     except MasterError as error:  # no room for the summary, say
         cause = outcome.error or error
         raise RunError(f"{cause}. What was written before is in {folder}, marked running") from error
@@ -161,34 +183,75 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
             if not known or known != continuation.checkpoint.run:
                 raise UsageError(f"{continuation.file} comes from another run than the results beside it")
             return known
-    results.prepare(folder)
+    results.prepare(folder, None if continuation is None else Path(continuation.file))
     return uuid.uuid4().hex
 
 
 @contextmanager
-def _failure_noted(system: System, folder: Path, identity: str) -> Iterator[None]:
-    """Mark the folder's summary as failed if the run does not even begin."""
+def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Callable[[], bool]) -> Iterator[None]:
+    """Mark the folder's summary as failed, or interrupted, if the run does not even begin."""
     try:
         yield
-    except MasterError as error:
-        ending = _ending(Outcome("failed", 0, system.start, error))
-        results.write_json(folder / results.SUMMARY, {**_description(system, identity), **ending})
+    except (MasterError, KeyboardInterrupt) as error:
+        # An FMU in Python takes the interruption for a failure of its own.
+        is_interrupted = isinstance(error, KeyboardInterrupt) or stop_wanted()
+        cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
+        outcome = Outcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
+        if _is_still(folder, identity):
+            results.write_json(folder / results.SUMMARY, {**_description(system, identity), **_ending(outcome)})
+        if is_interrupted:
+            raise InterruptedRunError(_what_happened(outcome, folder)) from error
         raise
 
 
 @contextmanager
-def loaded(system: System, isolation: Isolation | None = None) -> Iterator[Network]:
-    """Load the FMUs of a system, each into a process of its own if wanted, and connect them; they are freed at last."""
+def loaded(
+    system: System, isolation: Isolation | None = None, farewells: list[Caution] | None = None
+) -> Iterator[Network]:
+    """Load the FMUs of a system and connect them; they are freed at last.
+
+    Parameters
+    ----------
+    system : System
+    isolation : Isolation, optional
+        Given if each is to have a process of its own.
+    farewells : list of Caution, optional
+        Takes what goes wrong when they are freed.
+    """
     instances: list[Instance | IsolatedInstance] = []
     try:
-        for component in system.components:
-            # One by one: those loaded so far must be freed on failure.
-            instance = Instance(component) if isolation is None else IsolatedInstance(component, isolation)
-            instances.append(instance)
+        with phase("loading"), heeded_at_once():
+            for component in system.components:
+                # One by one: those loaded so far must be freed on failure.
+                instance = Instance(component) if isolation is None else IsolatedInstance(component, isolation)
+                instances.append(instance)
         yield Network(instances, system.connections, system.discrete)
     finally:
-        for instance in reversed(instances):
-            instance.close()
+        with phase("closing"):
+            _free(instances, [] if farewells is None else farewells)
+
+
+def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caution]) -> None:
+    """Free all, also after one at which the user lost patience."""
+    interruption = None
+    for instance in reversed(instances):
+        try:
+            with heeded_at_once():
+                said = instance.close()
+        except KeyboardInterrupt as error:
+            interruption = error
+            continue
+        if said:
+            farewells.append(Caution(instance.name, said, is_own=False))
+    if interruption is not None:
+        raise interruption
+
+
+def _is_still(folder: Path, identity: str) -> bool:
+    """Whether it is the run of this identity whose results lie in the folder."""
+    with suppress(MasterError):
+        return results.identity(folder) == identity
+    return False
 
 
 def recording_plans(system: System) -> tuple[Plan, ...]:
@@ -307,8 +370,14 @@ class _Session:
         return take(self._system, network, self.algorithm, index, self._remembering, self._identity)
 
     def conclude(self, outcome: Outcome) -> Results:
-        """Write the summary and return the results, of what is in the files."""
-        recordings = tuple(r.recording for r in self._recorders)
+        """Write the summary and return the results, of what is in the files.
+
+        Raises
+        ------
+        ForeignResultsError
+            If the files are no longer those that this run wrote.
+        """
+        recordings = self._recordings(outcome)
         description = _description(self._system, self._identity)
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
@@ -319,12 +388,33 @@ class _Session:
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
-            "warnings": [asdict(w) for w in self._cautions.warnings],
+            "warnings": [{"component": w.component, "text": w.text} for w in self._cautions.warnings],
             "scenario_warnings": list(self._system.warnings),
         }
         results.write_forces(done)
         results.write_json(self._folder / results.SUMMARY, summary)
         return replace(done, summary=summary)
+
+    def disown(self, error: ForeignResultsError) -> None:
+        """Mark results that are not what was written, if they are this run's at all."""
+        if _is_still(self._folder, self._identity):
+            data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
+            results.write_json(self._folder / results.SUMMARY, data)
+
+    def _recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
+        """Read what was recorded; refuses files that are not those that this run has written."""
+        advice = "while the run went on; run it again, in a folder of its own (--out)"
+        if not _is_still(self._folder, self._identity):
+            raise ForeignResultsError(f"the results in {self._folder} were removed or taken by another run {advice}")
+        for recorder in self._recorders:
+            if not recorder.path.is_file():
+                raise ForeignResultsError(f"{recorder.path} was removed {advice}")
+        recordings = tuple(r.recording for r in self._recorders)
+        for recorder, recording in zip(self._recorders, recordings, strict=True):
+            if outcome.status == "complete" and len(recording.time) != recorder.rows:
+                found = f"has {len(recording.time)} rows, {recorder.rows} were written"
+                raise ForeignResultsError(f"{recorder.path} {found}: it was changed {advice}")
+        return recordings
 
     def _performance(self, outcome: Outcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None

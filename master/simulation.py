@@ -1,14 +1,10 @@
-"""The loop over macro steps: time, observers, checks of exchanged values, interruption."""
+"""The loop over macro steps: time, observers, checks of exchanged values."""
 
 from __future__ import annotations
 
 import math
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import FrameType
 from typing import Literal, Protocol
 
 import numpy as np
@@ -16,7 +12,9 @@ import numpy as np
 from master.algorithm import Algorithm, initialise
 from master.arrays import FloatArray
 from master.errors import MasterError, RunError
+from master.interruption import heeded_at_once
 from master.network import Network
+from master.supervision import phase
 
 Status = Literal["complete", "interrupted", "failed"]
 
@@ -115,17 +113,24 @@ def _run(
 ) -> Outcome:
     index = grid.first
     try:
-        prepare(network, algorithm, grid)
+        with phase("loading"), heeded_at_once():
+            prepare(network, algorithm, grid)
         check_finite(network, grid.begin, None)
         check_inputs(network, grid.begin, None)
         for observer in observers:
             observer.begin(grid.begin, network)
         previous = network.outputs.copy()
-        for index in range(grid.first, grid.count):
-            if stop_wanted():
-                return Outcome("interrupted", index, grid.time(index))
-            _advance(network, algorithm, grid, index, observers, previous)
+        with phase("stepping"):
+            for index in range(grid.first, grid.count):
+                if stop_wanted():
+                    return Outcome("interrupted", index, grid.time(index))
+                _advance(network, algorithm, grid, index, observers, previous)
+    except KeyboardInterrupt:
+        return Outcome("interrupted", index, grid.time(index))
     except MasterError as error:
+        # An FMU in Python takes the interruption for a failure of its own.
+        if stop_wanted():
+            return Outcome("interrupted", index, grid.time(index))
         return Outcome("failed", index, grid.time(index), error)
     return Outcome("complete", grid.count, grid.stop)
 
@@ -207,25 +212,3 @@ def _remarks(network: Network) -> str:
     """Return what the slaves themselves have said."""
     said = ((slave.name, slave.remark()) for slave in network.slaves)
     return "; ".join(f"component '{name}' says: {text}" for name, text in said if text)
-
-
-@contextmanager
-def interruptible() -> Iterator[Callable[[], bool]]:
-    """Turn Ctrl-C and SIGTERM into a wish to stop after the current step; a second one stops at once."""
-    wished = threading.Event()
-
-    def handle(number: int, _frame: FrameType | None) -> None:
-        if wished.is_set():
-            signal.default_int_handler(number, _frame)
-        wished.set()
-
-    if threading.current_thread() is not threading.main_thread():
-        yield wished.is_set
-        return
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, handle) for number in numbers]
-    try:
-        yield wished.is_set
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)

@@ -4,6 +4,6 @@
 one. They talk over a socket in frames of a fixed layout (`wire`); nothing that the child says is ever executed.
 """
 
-from master.isolation.remote import IsolatedInstance, Isolation
+from master.isolation.remote import INIT_TIMEOUT, IsolatedInstance, Isolation
 
-__all__ = ["IsolatedInstance", "Isolation"]
+__all__ = ["INIT_TIMEOUT", "IsolatedInstance", "Isolation"]

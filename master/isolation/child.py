@@ -12,15 +12,14 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from master.errors import MasterError
-from master.instance import Group, Instance
+from master.instance import LONGEST_STATE, Group, Instance
 from master.isolation.wire import (
     HEADER,
-    LONGEST_STATE,
     LONGEST_TEXT,
     NUMBER,
     STEP,
@@ -30,16 +29,14 @@ from master.isolation.wire import (
     Channel,
     EndedError,
 )
+from master.supervision import die_with
 from master.system import Component, Fmu, Variable
-
-#: prctl(2): the signal that a process gets when its parent ends.
-_PR_SET_PDEATHSIG: Final = 1
 
 
 def main() -> None:
     """Serve the connection whose file descriptor is the first argument; the second is the master's process."""
     descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
-    _die_with(parent)
+    die_with(parent)
     # Ctrl-C is meant for the master, which tells its children when it is done.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EndedError):
@@ -48,14 +45,6 @@ def main() -> None:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(0)
-
-
-def _die_with(parent: int) -> None:
-    """End when the master ends, even in the middle of an endless loop; elsewhere than on Linux at the next request."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:
-        os._exit(0)
 
 
 class Child:
@@ -191,8 +180,7 @@ class Child:
         return text.encode("utf-8", "replace")[:LONGEST_TEXT]
 
     def _close(self, _argument: int, _length: int) -> bytes:
-        self._instance.close()
-        return b""
+        return self._instance.close().encode("utf-8", "replace")[:LONGEST_TEXT]
 
 
 def describe(component: Component, is_paced: bool) -> bytes:

@@ -11,11 +11,12 @@ import numpy as np
 
 from master.arrays import FloatArray
 from master.errors import SlaveError, one_line
+from master.instance import LONGEST_STATE
+from master.interruption import heeded_at_once, is_wished
 from master.isolation.child import describe
 from master.isolation.process import Process
 from master.isolation.wire import (
     HEADER,
-    LONGEST_STATE,
     LONGEST_TEXT,
     MOST_PREFETCHED,
     NUMBER,
@@ -28,6 +29,9 @@ from master.isolation.wire import (
 )
 from master.system import Component
 
+#: Seconds that an FMU has to load, or to get through a phase of its initialisation: many times what the longest line
+#: takes, kernels compiled and all.
+INIT_TIMEOUT: Final = 300.0
 #: Seconds that an FMU has to free itself when the run is over.
 _CLOSING_SECONDS: Final = 5.0
 
@@ -52,10 +56,13 @@ class Isolation:
         Seconds of wall time after which a step, or another call between steps, counts as an endless loop.
     is_paced : bool
         Whether the run goes by the wall clock: then no child collects garbage while it steps.
+    init_timeout : float
+        Seconds of wall time after which a call while loading or initialising counts as an endless loop.
     """
 
     step_timeout: float | None = None
     is_paced: bool = False
+    init_timeout: float = INIT_TIMEOUT
 
 
 class IsolatedGroup:
@@ -137,6 +144,7 @@ class IsolatedInstance:
         except OSError as error:
             raise SlaveError(f"{self._who} cannot be given a process of its own ({error})") from error
         self._channel = self._process.channel
+        self._limit(isolation.init_timeout, "--init-timeout")
         self._lay_out()
         self._post(_Owed("loading"), Ask.LOAD, 0, describe(component, isolation.is_paced))
 
@@ -165,7 +173,7 @@ class IsolatedInstance:
         self._tell_inputs()
         self._ask(_Owed("its initialization"), Ask.FINISH)
         self._is_fresh = False
-        self._channel.limit(self._isolation.step_timeout)
+        self._limit(self._isolation.step_timeout, "--step-timeout")
 
     def write(self) -> None:
         """Take the bound inputs; the FMU is told them with the next message."""
@@ -241,22 +249,39 @@ class IsolatedInstance:
         said = self._ask(_Owed("a request for its warnings", LONGEST_TEXT, is_exact=False), Ask.REMARK, 1)
         return tuple(one_line(text) for text in said.decode("utf-8", "replace").split("\n") if text)
 
-    def close(self) -> None:
-        """Free the instance, end its process and remove its files; one that hangs or has died is only ended."""
+    def close(self) -> str:
+        """Free the instance, end its process and remove its files; one that hangs or has died is only ended.
+
+        Returns
+        -------
+        str
+            What went wrong, empty if nothing did: what was computed is not touched by how an FMU ends.
+        """
         if self._dead:
             self._process.end()
-            return
+            return ""
         self._dead = True
+        if self._owed is not None and is_wished():  # nobody waits for what is not wanted any more
+            self._process.end(grace=0.0)
+            return ""
         self._channel.limit(_CLOSING_SECONDS)
         try:
             if self._owed is not None:
                 self._channel.receive(LONGEST_STATE)
             self._channel.send(Ask.CLOSE)
-            self._channel.receive(LONGEST_TEXT)
-        except (EndedError, ProtocolError, TimeoutError):
-            self._process.end(grace=0.0)  # what was computed is not touched by how an FMU ends
-        else:
-            self._process.end()
+            _, _, length = self._channel.receive(LONGEST_TEXT)
+        except (EndedError, ProtocolError, TimeoutError) as error:
+            self._limit_text = f"{_CLOSING_SECONDS:g} s"
+            said = str(self._lost(_Owed("its termination"), error))
+            self._process.end(grace=0.0)
+            return said
+        said = one_line(self._channel.rest(length).decode("utf-8", "replace"))
+        self._process.end()
+        return said
+
+    def _limit(self, seconds: float | None, option: str) -> None:
+        self._channel.limit(seconds)
+        self._limit_text = "" if seconds is None else f"{seconds:g} s ({option})"
 
     def _lay_out(self) -> None:
         """Make the buffers: for a request with all inputs, for an answer with all outputs and groups."""
@@ -325,9 +350,14 @@ class IsolatedInstance:
         if owed is None:
             return b""
         try:
-            length = self._receive(owed)
+            with heeded_at_once():
+                length = self._receive(owed)
         except (EndedError, ProtocolError, TimeoutError) as error:
             raise self._lost(owed, error) from error
+        except KeyboardInterrupt:
+            self._dead, self._owed = True, None
+            self._process.end(grace=0.0)
+            raise
         if not owed.is_values:
             return self._channel.rest(length)
         count = length // NUMBER
@@ -352,8 +382,8 @@ class IsolatedInstance:
         doing = f"{owed.doing}{self._where}"
         if isinstance(error, TimeoutError):
             self._process.end(grace=0.0)
-            limit = f"{self._isolation.step_timeout:g} s (--step-timeout)"
-            return SlaveError(f"{self._who} did not finish {doing} within {limit}; its process was ended")
+            text = f"{self._who} did not finish {doing} within {self._limit_text}; its process was ended"
+            return SlaveError(text)
         if isinstance(error, ProtocolError):
             self._process.end(grace=0.0)
             return SlaveError(f"{self._who} disturbed the exchange with the master in {doing} ({error})")

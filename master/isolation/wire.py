@@ -11,6 +11,7 @@ import os
 import select
 import socket
 import struct
+from contextlib import suppress
 from enum import IntEnum
 from time import perf_counter
 from typing import Final
@@ -27,9 +28,8 @@ NUMBER: Final = 8
 MOST_PREFETCHED: Final = 64
 #: Time for which an awaited frame is looked out for before the process sleeps [s].
 _WATCHFUL: Final = 1e-4
-#: Longest text, and longest serialised state, that is accepted from a child [bytes].
+#: Longest text that is accepted from a child [bytes].
 LONGEST_TEXT: Final = 1 << 16
-LONGEST_STATE: Final = 1 << 30
 
 
 class Ask(IntEnum):
@@ -137,6 +137,11 @@ class Channel:
     def rest(self, length: int) -> bytes:
         """Return what followed the header of the last frame."""
         return bytes(self._frame[HEADER.size : HEADER.size + length])
+
+    def shut(self) -> None:
+        """Let nothing more come in, so that nobody waits for it; what has come is still there."""
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RD)
 
     def close(self) -> None:
         """Close the connection."""

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
 
-from master import compare, export, report, results
+from master import compare, export, folder_lock, report, results
 from master.errors import MasterError
 from master.report import tables
 from master.report.comparison import columns, comparison_page
@@ -37,21 +38,41 @@ def add_report_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is wanted."""
-    done = results.read(options.run)
-    summary = {**done.summary, **results.figures(done), "format": results.FORMAT}
-    summary["settings"] = {**summary.get("settings", {}), "filter": results.filter_data(done.evaluation.filter)}
-    done = replace(done, summary=summary)
-    measured = _measured(done, options.measured, options.contact) if options.measured else None
-    results.write_forces(done)
-    results.write_json(done.folder / results.SUMMARY, summary)
-    print(report.write(done, measured))
-    if options.parquet:
-        print(*export.write_parquet(done.folder), sep="\n")
+    results.identity(options.run)  # a folder that is none of ours is left alone
+    with _claimed(options.run):
+        done = results.read(options.run)
+        summary = {**done.summary, **results.figures(done), "format": results.FORMAT}
+        summary["settings"] = {**summary.get("settings", {}), "filter": results.filter_data(done.evaluation.filter)}
+        done = replace(done, summary=summary)
+        measured = _measured(done, options.measured, options.contact) if options.measured else None
+        results.write_forces(done)
+        results.write_json(done.folder / results.SUMMARY, summary)
+        print(report.write(done, measured))
+        if options.parquet:
+            print(*export.write_parquet(done.folder), sep="\n")
+    _warn_of_open_runs([done])
     if options.film:
         print(_film(done, options))
     if measured is not None:
         _say_measured(measured)
     return 0
+
+
+@contextmanager
+def _claimed(folder: Path) -> Iterator[None]:
+    """Keep others out of a results folder while its report is written."""
+    with ExitStack() as claim:
+        with suppress(PermissionError):  # writing the report will say it
+            claim.enter_context(folder_lock.claimed(folder, "wait for it to end"))
+        yield
+
+
+def _warn_of_open_runs(runs: Sequence[Results]) -> None:
+    """Say which runs were ended before they could say how: what they show is a part."""
+    for done in runs:
+        if done.summary.get("status") == "running":
+            text = f"warning: the run in {done.folder} was ended before it had finished; figures are of what it left"
+            Console(stderr=True).print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
 
 
 def report_what_there_is(folder: Path) -> None:
@@ -98,8 +119,9 @@ def add_compare_arguments(parser: argparse.ArgumentParser) -> None:
 def run_compare(options: argparse.Namespace) -> int:
     """Compare runs with the first one."""
     runs = [results.read(folder) for folder in (options.first, *options.others)]
+    _warn_of_open_runs(runs)
     if options.report:
-        options.report.write_text(comparison_page(runs), encoding="utf-8")
+        results.write_text(options.report, comparison_page(runs))
     pairs = [compare.compare(runs[0], other) for other in runs[1:]]
     if options.json:
         others = [(other, c) for other, found in zip(runs[1:], pairs, strict=True) for c in found]

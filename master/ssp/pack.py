@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -35,7 +36,7 @@ def pack(root: Path, archive: Path, added: Mapping[str, Path] = _NOTHING) -> Pat
     members = {path.relative_to(root).as_posix(): path for path in _members(root)}
     for place, folder in added.items():
         members |= {f"{place}/{path.relative_to(folder).as_posix()}": path for path in _members(folder)}
-    temporary = archive.with_name(archive.name + ".part")
+    temporary = archive.with_name(f".{archive.name}.{os.getpid()}.part")  # two that pack do not mix
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file:

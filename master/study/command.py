@@ -10,6 +10,7 @@ from typing import Final
 
 from rich.console import Console
 
+from master.calibrate import unchanged
 from master.errors import UsageError
 from master.progress import ProgressObserver
 from master.simulation import Observer
@@ -75,8 +76,10 @@ def _calibrated(
 ) -> tuple[Family, tuple[Variant, ...]]:
     """Find and store the forces of variants, one after the other; return the family as it is then."""
     for variant in chosen:
-        found = calibrate_variant(family, variant, runner)
-        store_values(family, variant.name, {name: f.value for name, f in found.items()})
+        with unchanged(family.folder) as check:
+            found = calibrate_variant(family, variant, runner)
+            check()
+            store_values(family, variant.name, {name: f.value for name, f in found.items()})
     renewed = load_family(str(family.folder))
     return renewed, renewed.chosen(options.only)
 

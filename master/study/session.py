@@ -14,6 +14,7 @@ from master.study.family import Family, Variant, folder_name
 from master.study.outcome import GENERATOR, Done, Outcome, as_csv, as_data
 from master.study.page import page
 from master.study.variants import Runner, finished
+from master.supervision import unfinished
 
 JSON: Final = "study.json"
 CSV: Final = "study.csv"
@@ -54,7 +55,13 @@ def study(
     MasterError
         If the folder holds something else.
     """
-    results.take_over(folder, JSON, GENERATOR, "study")
+    with results.taken_over(folder, JSON, GENERATOR, "study"), unfinished(folder / JSON):
+        return _study(family, chosen, folder, runner, again, show)
+
+
+def _study(
+    family: Family, chosen: Sequence[Variant], folder: Path, runner: Runner, again: bool, show: Callable[[Done], None]
+) -> Outcome:
     state = Outcome(family, datetime.now(UTC).isoformat(timespec="seconds"), results.versions())
     write(state, folder)
     try:

@@ -10,6 +10,7 @@ from typing import Final
 
 from master import results
 from master.errors import InterruptedRunError
+from master.supervision import unfinished
 from master.verify import page
 from master.verify.case import Case
 from master.verify.outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
@@ -45,9 +46,14 @@ def verify(
     MasterError
         If the folder holds something else.
     """
-    results.take_over(folder, JSON, GENERATOR, "verification")
+    with results.taken_over(folder, JSON, GENERATOR, "verification"), unfinished(folder / JSON):
+        return _verify(cases, runs, show, _Writer(folder))
+
+
+def _verify(
+    cases: Sequence[Case], runs: Runs, show: Callable[[CaseOutcome], None], writer: _Writer
+) -> Verification:
     state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), results.versions(), len(cases))
-    writer = _Writer(folder)
     writer.write(state)
     try:
         for case in cases:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from master.caution import Caution, CautionObserver
 from master.cli import main
 from master.network import Network
 from master.report.page import _head
+from master.results import Results
 
 
 @pytest.fixture
@@ -88,7 +90,7 @@ def test_a_quiet_run_keeps_them_in_its_summary(toy, tmp_path, capfd):
 def test_the_report_does_not_take_them_for_markup():
     said = [{"component": "<b>", "text": "<script>"}]
     summary = {"status": "complete", "warnings": said, "scenario_warnings": ["<i>"]}
-    page = _head(summary, ())
+    page = _head(Results(Path(), summary, (), {}), ())
     assert "&lt;b&gt; warns: &lt;script&gt;" in page
     assert "<script>" not in page
     assert "<i>" not in page

@@ -8,8 +8,9 @@ import pytest
 
 from master.algorithm import Jacobi
 from master.errors import MasterError, SlaveError
+from master.interruption import interruptible
 from master.network import Network
-from master.simulation import TimeGrid, interruptible, simulate
+from master.simulation import TimeGrid, simulate
 from master.ssp.units import Conversion
 from master.system import Connection
 

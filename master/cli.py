@@ -36,10 +36,13 @@ from master.ssp.archive import SSD_NAME, Package, Sources
 from master.ssp.pack import pack
 from master.ssp.ssd import read_structure
 from master.ssp.xml import Reader
+from master.store import write_runtime
 from master.study import command as study_command
 from master.system import System
 from master.verify import command as verify_command
 
+#: Where an archive holds one Python for all its FMUs.
+RUNTIME: Final = "resources/runtime"
 VERBS: Final = ("run", "pack", "validate", "compare", "report", "calibrate", "verify", "study")
 _WIDTH: Final = 80
 _PLAIN: Final = Manner()
@@ -86,6 +89,11 @@ def _parser() -> argparse.ArgumentParser:
     _add_tolerance(checking)
     packing = _add(verbs, "pack", "write a scenario as a .ssp archive, FMUs included", _pack, scenario=True)
     packing.add_argument("--out", type=Path, metavar="FILE", help="default: dist/NAME.ssp")
+    packing.add_argument(
+        "--standalone",
+        action="store_true",
+        help=f"with the Python that the FMUs run in, as {RUNTIME}, for tools where OPENPANTO_RUNTIME names it",
+    )
     commands.add_compare_arguments(_add(verbs, "compare", commands.COMPARE_HELP, commands.run_compare))
     commands.add_report_arguments(_add(verbs, "report", commands.REPORT_HELP, commands.run_report))
     _add_calibrate(verbs)
@@ -406,7 +414,9 @@ def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
 
 
 def _validate(options: argparse.Namespace) -> int:
-    with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
+    with open_scenario(
+        options.scenario, _overrides(options), _tell, build=not options.no_build, is_check=True
+    ) as scenario:
         system = scenario.system
         _tell_warnings(system, _tell)
         counts = f"{len(system.components)} components, {len(system.connections)} connections"
@@ -439,8 +449,19 @@ def _pack(options: argparse.Namespace) -> int:
         archive = options.out or Path("dist") / f"{scenario.system.name}.ssp"
         if archive.is_dir():
             raise UsageError(f"{archive} is a folder; choose another name with --out")
-        print(pack(scenario.package.root, archive))
+        with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
+            added = {RUNTIME: _runtime(Path(folder))} if options.standalone else {}
+            print(pack(scenario.package.root, archive, added))
     return 0
+
+
+def _runtime(folder: Path) -> Path:
+    """Write the Python that FMUs run in on a machine that has none; return its folder."""
+    try:
+        write_runtime(folder)
+    except ValueError as error:
+        raise MasterError(f"the archive cannot be standalone: {error}") from error
+    return folder
 
 
 def _calibrate(options: argparse.Namespace) -> int:

@@ -31,8 +31,8 @@ WHOLE = {
     "master/durable.py": {"write_whole"}, "master/report/__init__.py": {"write"}, "master/export.py": {"_write"},
     "master/report/film.py": {"write_film"}, "master/verify/page.py": {"_picture"}, "master/ssp/pack.py": {"pack"},
     "models/commands/output_files.py": {"write_whole", "write_csv", "write_figure"},
-    "models/numerics/kernel_cache.py": None, "fmus/build.py": {"_describe", "archive", "_write_whole"},
-    "fmus/shim.py": {"compile_shim"},
+    "models/numerics/kernel_cache.py": None, "fmus/build.py": {"_describe", "_zipped", "_write_whole"},
+    "fmus/loader/runtime.py": {"_archive", "_replace"},
 }  # fmt: skip
 #: Functions that are called ``write_text`` and ``save`` and are no writing by a file's name.
 HARMLESS = {"results.write_text", "slave.save", "self.save", "self._instance.save"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -13,19 +14,28 @@ from master.errors import MasterError
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 _UNIX: Final = 3
 _PLAIN_FILE: Final = 0o100644 << 16
+_NOTHING: Final[Mapping[str, Path]] = {}
 
 
-def pack(root: Path, archive: Path) -> Path:
+def pack(root: Path, archive: Path, added: Mapping[str, Path] = _NOTHING) -> Path:
     """Write all files under ``root`` into ``archive``, sorted, with fixed times and modes; return it.
 
     Hidden files and files that editors leave behind stay out.
+
+    Parameters
+    ----------
+    root, archive : Path
+    added : mapping
+        Folder in the archive -> folder whose files are written into it besides.
 
     Raises
     ------
     MasterError
         If the archive cannot be written, or ``root`` holds symbolic links.
     """
-    members = _members(root)
+    members = {path.relative_to(root).as_posix(): path for path in _members(root)}
+    for place, folder in added.items():
+        members |= {f"{place}/{path.relative_to(folder).as_posix()}": path for path in _members(folder)}
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -34,8 +44,8 @@ def pack(root: Path, archive: Path) -> Path:
         whole_file(archive) as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file,
     ):
-        for path in members:
-            file.writestr(_info(path.relative_to(root).as_posix()), _content(path))
+        for name, path in sorted(members.items()):
+            file.writestr(_info(name), _content(path))
     return archive
 
 

@@ -324,7 +324,11 @@ DANGEROUS_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "mars
 DANGEROUS_ATTRIBUTES = {("np", "load"), ("numpy", "load"), ("os", "system"), ("os", "popen"), ("torch", "load")}
 #: What is looked at before it is read: numba keeps machine code as pickles. Owner, rights and checksum of a file come
 #: first (`tests/models/numerics/test_kernel_cache.py`, `tests/robustness/test_caches.py`).
-GUARDED = {"models/numerics/kernel_cache.py": ["pickle"]}
+#: A runtime compiles modules of the Python, numpy and scipy that it is made of, which the builder runs anyway.
+GUARDED = {
+    "models/numerics/kernel_cache.py": ["pickle"],
+    "fmus/loader/runtime.py": ["marshal", "compile"],
+}
 SOURCES_OF_THE_PACKAGES = [p for package in ("models", "fmus",
     "master") for p in sorted((ROOT / package).rglob("*.py"))]
 

@@ -8,7 +8,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fmus import doctor
-from fmus.build import MAX_PORTS, BuildError, Recipe, UnknownFmuError, build, fingerprint, known_names, recipe
+from fmus.build import (
+    MAX_PORTS,
+    BuildError,
+    Recipe,
+    UnknownFmuError,
+    build,
+    fingerprint,
+    known_names,
+    recipe,
+    why_no_loader,
+)
+from fmus.builder.standalone import bundled_platform, runtime_of, write_runtime
+from fmus.loader.runtime import Runtime
+from models.definition import printable
 
 DEFAULT_FOLDER = Path("build/fmus")
 
@@ -18,17 +31,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         code: int | None = options.run(options)
+        sys.stdout.flush()  # here, where an error can still be told
     except (UnknownFmuError, BuildError) as error:
         return _fail(str(error))
     except OSError as error:
-        return _fail(f"{error.filename or 'a file'}: {error.strerror or error}")
+        return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         return _fail("interrupted")
     return code or 0
 
 
 def _fail(text: str) -> int:
-    print(f"error: {text}", file=sys.stderr)
+    print(f"error: {printable(text)}", file=sys.stderr)
     return 1
 
 
@@ -36,16 +50,27 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs, and see whether they run here.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     verb = verbs.add_parser("build", help="build FMUs, all of the library if none is named")
-    verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, ...")
+    verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, path/to/LINE.toml ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
-    verb.add_argument("--shim", action="store_true", help="bring Python into hosts that are not Python (Linux)")
+    verb.add_argument(
+        "--standalone",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="bring Python, numpy and scipy along (default: as the FMU that is replaced)",
+    )
+    verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to bring along (the present one)")
     verb.set_defaults(run=_build)
+    verb = verbs.add_parser("runtime", help="write the Python that several FMUs share (OPENPANTO_RUNTIME)")
+    verb.add_argument("--out", type=Path, default=Path("build/runtime"), metavar="DIR", help="folder (%(default)s)")
+    verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to take it from (the present one)")
+    verb.set_defaults(run=_write_runtime)
     verb = verbs.add_parser("doctor", help="say what this machine lacks for running an FMU")
     verb.add_argument("fmu", type=Path, metavar="FILE", help="X.fmu")
     verb.set_defaults(run=_examine)
     verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
-    verb.add_argument("name", metavar="NAME")
+    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
+    verb.add_argument("name", metavar="NAME", help="as for build")
     verb.add_argument("--if-known", action="store_true", help="print nothing for a name that no FMU has")
     verb.set_defaults(run=_fingerprint)
     verb = verbs.add_parser("list", help="list the FMUs that can be built")
@@ -60,8 +85,39 @@ def _count(text: str) -> int:
 
 
 def _build(options: argparse.Namespace) -> None:
+    if options.runtime is not None and options.standalone is False:
+        raise BuildError("--runtime is for standalone FMUs, which --no-standalone excludes")
     for wanted in _recipes(options.names or known_names(), options.pantographs):
-        print(build(wanted, options.out, options.shim))
+        runtime = _runtime(options, options.out / f"{wanted.name}.fmu")
+        print(build(wanted, options.out, runtime=runtime.files if runtime else None))
+    if why := why_no_loader():
+        print(f"note: the FMUs have pythonfmu's own library only, without our loader: {why}", file=sys.stderr)
+
+
+def _runtime(options: argparse.Namespace, replaced: Path) -> Runtime | None:
+    """Return the Python that an FMU is to bring along, if it is asked for or the FMU that it replaces brings one."""
+    if options.standalone or options.runtime is not None:
+        return _told(runtime_of(options.runtime))
+    there = bundled_platform(replaced) if options.standalone is None else ""
+    if not there:
+        return None
+    runtime = runtime_of(None)
+    if runtime.platform != there:
+        raise BuildError(
+            f"{replaced} brings a Python for {there}, this one is for {runtime.platform}; build it with "
+            "--runtime DIR, the folder of such a Python, or with --no-standalone"
+        )
+    return runtime
+
+
+def _told(runtime: Runtime) -> Runtime:
+    if not runtime.was_tried:
+        print(f"note: the Python for {runtime.platform} could not be tried out on this system", file=sys.stderr)
+    return runtime
+
+
+def _write_runtime(options: argparse.Namespace) -> None:
+    print(write_runtime(_told(runtime_of(options.runtime)), options.out))
 
 
 def _examine(options: argparse.Namespace) -> int:
@@ -75,7 +131,7 @@ def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:
 
 def _fingerprint(options: argparse.Namespace) -> None:
     try:
-        wanted = recipe(options.name)
+        wanted = recipe(options.name, options.pantographs)
     except UnknownFmuError:
         if options.if_known:
             return

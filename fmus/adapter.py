@@ -1,10 +1,10 @@
 """The FMI side of a part: variables, phases, state and errors; no physics.
 
 pythonfmu calls the methods of ``Adapter`` from C++. An exception that reached it would become
-``fmi2Fatal`` and leave an instance that crashes when it is freed, so none may leave a method here. Only
+``fmi2Fatal`` and leave an instance that crashes when it is freed, so none may leave a method here. To pythonfmu only
 ``do_step`` can return another status than OK: a failure anywhere else is told at once (log and standard
-error), the computed variables become NaN, so that a host that reads no log cannot take them for results,
-and the next ``do_step`` is refused with the text.
+error; the loader, which sees the log, makes it the status of the call), the computed variables become NaN, so that
+a host that reads neither cannot take them for results, and the next ``do_step`` is refused with the text.
 """
 
 from __future__ import annotations
@@ -166,11 +166,14 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
     def exit_initialization_mode(self) -> None:
         """Build the part if nobody asked for an output yet; parameters are fixed from here on."""
         self._phase = _Phase.INITIALIZING
+        known = self._failure
         self._initialise_if_changed()
         self._phase = _Phase.STEPPING
         self._stale_from = _NOTHING
         if not self._failure:
             self._look_at_start()
+        elif self._failure == known:
+            self.log(known, Fmi2Status.error)  # told before; the loader makes it the status of this call too
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Step the part; False (``fmi2Discard``) with the reason in the log if it cannot."""
@@ -530,7 +533,10 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         return self._refused or self._broken
 
     def _refuse(self, error: BaseException) -> None:
-        self._refused = self._refused or self._tell(_explain(error))
+        if self._refused:
+            self.log(_clean(_explain(error)), Fmi2Status.error)  # the status of this call too
+        else:
+            self._refused = self._tell(_explain(error))
         self._forget_results()
 
     def _break(self, error: BaseException) -> None:

@@ -23,8 +23,8 @@ import pythonfmu
 from fmus.bundle import BundleError, Module, collect, rewrite
 from fmus.documentation import About, page
 from fmus.icon import icon
+from fmus.loader.loader_build import DESCRIPTION, LoaderError, sources, with_loader, with_windows_loader
 from fmus.repair import repaired
-from fmus.shim import NATIVE, ShimError, with_shim
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 LIBRARY = REPOSITORY / "models" / "library"
@@ -44,11 +44,15 @@ _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
     "multibody": ("fmus.multibody", "MultibodyPantographSlave"),
 }
 #: Sources that are not carried along but decide about an FMU's bytes.
-_BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "repair.py", "shim.py")
+_BUILDERS = ("build.py", "bundle.py", "documentation.py", "icon.py", "repair.py")
 _REQUIREMENTS = b"numpy>=1.26\nscipy>=1.11\n"
 #: Most pantograph ports of a line: each costs variables, and no train has more.
 MAX_PORTS = 16
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
+#: In every FMU of ours: what it is, for the loader and for whoever wants to know whether it may be replaced.
+MARK = "resources/openpanto.txt"
+#: Where a standalone FMU holds its own Python.
+RUNTIME = "resources/runtime"
 
 _SCRIPT = '''"""Entry for pythonfmu. Generated; the name of this file holds the content hash."""
 
@@ -97,6 +101,8 @@ class Recipe:
         Class attributes of the adapter.
     roots : mapping
         Packages that are carried along, and their folders.
+    is_own : bool
+        Whether the definition is a file of the user's, not of the library: the FMU remembers where it lay.
     """
 
     name: str
@@ -106,6 +112,7 @@ class Recipe:
     definition: Path
     settings: Mapping[str, int] = field(default_factory=dict)
     roots: Mapping[str, Path] = field(default_factory=lambda: ROOTS)
+    is_own: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,8 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     Parameters
     ----------
     name : str
-        ``Catenary_LINE``, ``Catenary_LINE_P2`` for two pantograph ports, or ``Pantograph_NAME``.
+        ``Catenary_LINE``, ``Catenary_LINE_P2`` for two pantograph ports, ``Pantograph_NAME``, or the path of a
+        definition: ``path/to/LINE.toml``.
     pantographs : int, optional
         Number of pantograph ports of a line; the name gets the suffix ``_Pn``.
 
@@ -145,7 +153,11 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     ------
     UnknownFmuError
         If the library has no definition for it.
+    BuildError
+        If the file is not there, or is no definition.
     """
+    if name.endswith(".toml"):
+        return _own_recipe(Path(name), pantographs or 1)
     kind, _, rest = name.partition("_")
     stem, ports = _split_ports(rest, pantographs)
     if kind == "Catenary" and (path := _definition("lines", stem)) is not None:
@@ -167,58 +179,171 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     )
 
 
+def _own_recipe(path: Path, ports: int) -> Recipe:
+    """Return how to make the FMU of a user's definition; its file name gives the FMU's."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BuildError(f"{path} cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise BuildError(f"{path} is not a TOML file ({error})") from error
+    stem, kind = path.stem, data.get("type")
+    if not (stem.isascii() and stem.replace("_", "a").isalnum()):
+        raise BuildError(f"{path}: the FMU gets the file's name, which may hold letters, digits and _ only")
+    title = data.get("title") if isinstance(data.get("title"), str) else ""
+    if isinstance(kind, str) and kind in _PANTOGRAPHS:
+        if ports > 1:
+            raise BuildError(f"{path} is a pantograph; only lines have pantograph ports")
+        return Recipe(f"Pantograph_{stem}", title or f"Pantograph {stem}", *_PANTOGRAPHS[kind], path, is_own=True)
+    if "spans" in data or "contact_wire" in data:
+        suffix = f"_P{ports}" if ports > 1 else ""
+        line = title or f"Overhead contact line {stem}"
+        name, settings = f"Catenary_{stem}{suffix}", {"pantographs": ports}
+        return Recipe(name, line, "fmus.catenary", "CatenarySlave", path, settings, is_own=True)
+    kinds = " or ".join(f"'{name}'" for name in _PANTOGRAPHS)
+    raise BuildError(f"{path} defines neither a line (no [spans]) nor a pantograph (type {kinds})")
+
+
 def fingerprint(wanted: Recipe) -> str:
     """Return the content hash of an FMU, its GUID, without building it."""
     return _gather(wanted).fingerprint
 
 
-def build(wanted: Recipe, folder: Path, shim: bool = False) -> Path:
+def build(
+    wanted: Recipe, folder: Path, loader: bool = True, runtime: Mapping[str, bytes] | None = None
+) -> Path:
     """Write ``folder/NAME.fmu`` and return its path; other builds may run at the same time.
 
     Parameters
     ----------
     wanted : Recipe
     folder : Path
-    shim : bool
-        Whether the Linux library is to bring Python into hosts that are not Python (``fmus.shim``).
+    loader : bool
+        Whether our loader is to stand before pythonfmu's Linux library; where it cannot be had, it does not.
+    runtime : mapping, optional
+        The Python that the FMU is to bring along (``fmus.loader.runtime``): path -> content.
 
     Raises
     ------
     BuildError
-        If the definition or the sources do not make an FMU.
+        If the definition or the sources do not make an FMU, or it cannot be written.
     """
-    data = archive(wanted, shim)
+    data = archive(wanted, loader, _origin(wanted, folder), runtime)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
-    handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{wanted.name}.", suffix=".tmp")
+    try:
+        _write_whole(path, data)
+    except OSError as error:
+        raise BuildError(f"{path} cannot be written ({error.strerror or error})") from error
+    return path
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Write the file beside its place, of any process's own name there, and put it in its place when it is whole."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".tmp")
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    return path
 
 
-def archive(wanted: Recipe, shim: bool = False) -> bytes:
-    """Return the bytes of an FMU; the same sources give the same bytes (with the shim: and the same compiler)."""
-    files = _contents(wanted, _gather(wanted))
-    if shim:
-        try:
-            files = with_shim(files, wanted.name)
-        except ShimError as error:
-            raise BuildError(f"{wanted.name}: {error}") from error
+def archive(
+    wanted: Recipe,
+    loader: bool = True,
+    origin: Mapping[str, str] | None = None,
+    runtime: Mapping[str, bytes] | None = None,
+) -> bytes:
+    """Return the bytes of an FMU; the same sources give the same bytes (with the loader: and the same compiler).
+
+    Parameters
+    ----------
+    wanted : Recipe
+    loader : bool
+        See `build`.
+    origin : mapping, optional
+        What the mark says about a user's definition.
+    runtime : mapping, optional
+        See `build`.
+
+    Raises
+    ------
+    BuildError
+        If the definition or the sources do not make an FMU, or a runtime has no loader to open it.
+    """
+    gathered = _gather(wanted)
+    files = _contents(wanted, gathered)
+    if runtime:
+        files = _with_runtime(files, wanted.name, runtime)
+    elif loader and not why_no_loader():
+        files = with_loader(files, wanted.name)
+    files[MARK] = _mark(gathered.fingerprint, files, origin or {})
+    return _zipped(files)
+
+
+def _with_runtime(files: Mapping[str, bytes], name: str, runtime: Mapping[str, bytes]) -> dict[str, bytes]:
+    is_for_windows = b"\nplatform=win64\n" in runtime[DESCRIPTION]
+    try:
+        files = with_windows_loader(files, name) if is_for_windows else with_loader(files, name)
+    except LoaderError as error:
+        raise BuildError(f"{name} cannot be standalone: {error}") from error
+    return {**files, **{f"{RUNTIME}/{inner}": data for inner, data in runtime.items()}}
+
+
+def _zipped(files: Mapping[str, bytes]) -> bytes:
     buffer = io.BytesIO()
-    # Stored, not compressed: what a compressor makes of the same input differs between its versions.
+    # Stored, not compressed: what a compressor makes of the same input differs between its versions. A runtime is too
+    # large for that.
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as package:
         for name, data in sorted(files.items()):
             entry = zipfile.ZipInfo(name, _ZIP_DATE)
             entry.create_system = 3
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-            package.writestr(entry, data)
+            if name.startswith(f"{RUNTIME}/"):
+                package.writestr(entry, data, zipfile.ZIP_DEFLATED, 9)
+            else:
+                package.writestr(entry, data)
     return buffer.getvalue()
+
+
+def why_no_loader() -> str:
+    """Return why FMUs that are built here get pythonfmu's own library instead of our loader; empty if they do not."""
+    try:
+        with_loader(_binaries("X"), "X")
+    except LoaderError as error:
+        return str(error)
+    return ""
+
+
+def content_hash(files: Mapping[str, bytes]) -> str:
+    """Return a SHA-256 of an FMU's files but the mark, which holds it: of an FMU that nobody changed by hand."""
+    whole = hashlib.sha256()
+    for name, data in sorted(files.items()):
+        if name != MARK:
+            whole.update(f"{name}\0{len(data)}\0".encode() + data)
+    return whole.hexdigest()
+
+
+def _origin(wanted: Recipe, folder: Path) -> dict[str, str]:
+    """Return where a user's definition lies, seen from the FMU: so that it is known to be stale when that changes."""
+    if not wanted.is_own:
+        return {}
+    path = wanted.definition.resolve()
+    try:
+        path = Path(os.path.relpath(path, folder.resolve()))
+    except ValueError:  # on another drive
+        return {}
+    return {"definition": path.as_posix(), "pantographs": str(wanted.settings.get("pantographs", 1))}
+
+
+def _mark(guid: str, files: Mapping[str, bytes], origin: Mapping[str, str]) -> bytes:
+    lines = {"format": "1", "guid": guid, "content": content_hash(files), **origin}
+    return "".join(f"{key}={value}\n" for key, value in lines.items()).encode()
 
 
 def _definitions(folder: str) -> list[Path]:
@@ -264,8 +389,8 @@ def _gather(wanted: Recipe) -> _Sources:
 
 def _builders() -> dict[str, bytes]:
     here = Path(__file__).parent
-    files = [here / name for name in _BUILDERS] + sorted(NATIVE.glob("*.*"))
-    return {f"build/{path.name}": path.read_bytes() for path in files}
+    files = {name: (here / name).read_bytes() for name in _BUILDERS} | sources()
+    return {f"build/{name}": data for name, data in files.items()}
 
 
 def _recipe_bytes(wanted: Recipe) -> bytes:
@@ -289,11 +414,18 @@ def _binaries(name: str) -> dict[str, bytes]:
 
 
 def _licenses() -> dict[str, bytes]:
-    found = {"openpanto": REPOSITORY / "LICENSE"}
-    for info in PYTHONFMU.parent.glob(f"pythonfmu-{pythonfmu.__version__}.dist-info"):
-        found["pythonfmu"] = next(iter(sorted(info.rglob("LICENSE*"))), info)
-    files = {name: path for name, path in sorted(found.items()) if path.is_file()}
-    return {f"documentation/licenses/{name}.txt": path.read_bytes() for name, path in files.items()}
+    # An installed one first: beside installed packages a file LICENSE can be anybody's.
+    own = [*_installed_licenses(REPOSITORY, "openpanto"), REPOSITORY / "LICENSE"]
+    found = {"openpanto": own, "pythonfmu": _installed_licenses(PYTHONFMU.parent, "pythonfmu")}
+    files = {name: next((p for p in paths if p.is_file()), None) for name, paths in found.items()}
+    if lacking := [name for name, path in files.items() if path is None]:
+        raise BuildError(f"the licence of {' and '.join(lacking)} is not installed; install the package again")
+    return {f"documentation/licenses/{name}.txt": path.read_bytes() for name, path in files.items() if path}
+
+
+def _installed_licenses(folder: Path, package: str) -> list[Path]:
+    """Return the licence files of a package that was installed into a folder."""
+    return sorted(p for info in folder.glob(f"{package}-*.dist-info") for p in info.rglob("LICENSE*"))
 
 
 def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:

@@ -16,6 +16,9 @@ from fmus.ports import Signal, Table, Variable
 #: A fixed date: the same source must give the same FMU.
 DATE: Final = "1980-01-01T00:00:00Z"
 STEP_SIZE: Final = 1e-3
+#: What tools do that are told nothing else; the models keep their own steps and know no tolerance.
+STOP_TIME: Final = 1.0
+TOLERANCE: Final = 1e-6
 _VARIABILITY: Final = {
     "parameter": (Fmi2Variability.fixed, Fmi2Initial.exact),
     "calculatedParameter": (Fmi2Variability.fixed, Fmi2Initial.calculated),
@@ -57,7 +60,9 @@ def describe(slave: Any, table: Table, base: Callable[[dict[str, str]], Element]
     base : callable
         pythonfmu's own ``to_xml``, with the capabilities as argument.
     """
-    slave.default_experiment = DefaultExperiment(start_time=0.0, step_size=STEP_SIZE)
+    slave.default_experiment = DefaultExperiment(
+        start_time=0.0, stop_time=STOP_TIME, step_size=STEP_SIZE, tolerance=TOLERANCE
+    )
     for variable in table.variables:
         slave.register_variable(_pythonfmu_variable(variable), nested=False)
     root = base(_CAPABILITIES)

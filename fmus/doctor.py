@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final, Literal
 from xml.etree import ElementTree
 
-from fmus.shim import INNER_SUFFIX, probe_text
+from fmus.loader.loader_build import DESCRIPTION, INNER_SUFFIX, PROBE, needed_versions
 
 Level = Literal["ok", "note", "missing"]
 #: (system, machine) -> folder and suffix of an FMU's library.
@@ -39,6 +39,32 @@ _UNREADABLE: Final = (
     zlib.error,
     ElementTree.ParseError,
 )
+#: What a run does with an FMU: unpacked into a temporary folder, loaded from there, initialised, stepped.
+_RUN: Final = """
+import ctypes, os, sys
+folder, identifier, guid = sys.argv[1:]
+from fmpy.fmi2 import (FMU2Slave, fmi2CallbackAllocateMemoryTYPE, fmi2CallbackFreeMemoryTYPE, fmi2CallbackFunctions,
+                       fmi2CallbackLoggerTYPE)
+from fmpy import calloc, free
+said = []
+log = lambda _e, _n, status, _c, text: said.append(text.decode("utf-8", "replace")) if status > 1 else None
+calls = fmi2CallbackFunctions()
+calls.logger = fmi2CallbackLoggerTYPE(log)
+calls.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+calls.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+try:
+    fmu = FMU2Slave(guid=guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName="trial")
+    fmu.instantiate(callbacks=calls, loggingOn=True)
+    fmu.setupExperiment(startTime=0.0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.doStep(0.0, 1e-3)
+    fmu.terminate()
+    fmu.freeInstance()
+except Exception as error:
+    print(said[-1] if said else error)
+    sys.exit(1)
+"""
 _TRIAL: Final = """
 import sys
 folder, script, name = sys.argv[1:]
@@ -65,7 +91,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Interpreter:
-    """The Python that a tool would run the FMU with, in its own words (``native/probe.py``)."""
+    """The Python that a tool would run the FMU with, in its own words (``loader/python_probe.py``)."""
 
     executable: str
     version: str
@@ -81,6 +107,7 @@ class Package:
     names: frozenset[str]
     script: str
     identifier: str
+    guid: str
 
     def library(self) -> str:
         """Return the name of this platform's library, empty if FMUs have none for it."""
@@ -88,7 +115,7 @@ class Package:
         return f"binaries/{folder}/{self.identifier}{suffix}" if folder else ""
 
     @property
-    def has_shim(self) -> bool:
+    def has_loader(self) -> bool:
         """Whether it brings Python into hosts that are not Python."""
         return f"binaries/linux64/{self.identifier}{INNER_SUFFIX}" in self.names
 
@@ -100,7 +127,7 @@ def examine(path: Path) -> list[Finding]:
     except _UNREADABLE as error:
         return [Finding("missing", f"{path} is not an FMU of this kind ({error})")]
     python = ask()
-    found = [*_platform(package), *_python(python)]
+    found = [*_platform(package), *_libraries(package), *_bundled(package), *_run(package), *_python(python)]
     if python is None or python.lack:
         return found
     found += _trial(package, python)
@@ -126,12 +153,12 @@ def read_package(path: Path) -> Package:
         if "resources/slavemodule.txt" not in names:
             raise ValueError("it holds no Python code")
         script = file.read("resources/slavemodule.txt").decode().strip()
-    return Package(path, names, script, node.get("modelIdentifier", ""))
+    return Package(path, names, script, node.get("modelIdentifier", ""), root.get("guid", ""))
 
 
 def ask(name: str | None = None) -> Interpreter | None:
     """Ask an interpreter (default: the one that tools take) what it has; None if it cannot be run."""
-    command = [name or interpreter_name(), "-c", probe_text()]
+    command = [name or interpreter_name(), "-c", PROBE.read_text(encoding="utf-8")]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
     except (OSError, subprocess.TimeoutExpired):
@@ -153,7 +180,80 @@ def _platform(package: Package) -> Iterator[Finding]:
         yield Finding("ok", f"the FMU has a library for this platform ({here})")
     else:
         have = ", ".join(sorted({n.split("/")[1] for n in package.names if n.startswith("binaries/")}))
-        yield Finding("missing", f"the FMU has no library for this platform ({here}), only for {have or 'none'}")
+        held = f"it holds binaries for {have} only" if have else "it holds no binaries"
+        yield Finding("missing", f"the FMU has no library for this platform ({here}); {held}")
+
+
+def _libraries(package: Package) -> Iterator[Finding]:
+    """Compare the C library that the FMU's libraries need with this machine's."""
+    name, version = platform.libc_ver()
+    if name != "glibc":
+        return
+    here = _numbers(version)
+    library = package.library()
+    own = {library, library.removesuffix(".so") + INNER_SUFFIX} & package.names
+    with zipfile.ZipFile(package.path) as file:
+        needed = max((needed_versions(file.read(n)).get("GLIBC", (0,)) for n in own), default=(0,))
+    text = ".".join(str(part) for part in needed)
+    if needed > here:
+        older = f"need glibc {text} or newer; this machine is older, it has {version}"
+        yield Finding("missing", f"the FMU's libraries {older}")
+    elif own:
+        yield Finding("ok", f"the FMU's libraries need glibc {text} or newer; this machine has {version}")
+
+
+def _bundled(package: Package) -> Iterator[Finding]:
+    """Say what Python a standalone FMU brings, and whether this machine is too old for it."""
+    if f"resources/runtime/{DESCRIPTION}" not in package.names:
+        return
+    with zipfile.ZipFile(package.path) as file:
+        text = file.read(f"resources/runtime/{DESCRIPTION}").decode("utf-8")
+    about = dict(line.split("=", 1) for line in text.splitlines() if "=" in line)
+    brought = f"the FMU brings Python {about.get('python')} for {about.get('platform')}"
+    name, version = platform.libc_ver()
+    needed, here = (_numbers(text) for text in (about.get("glibc", "0"), version))
+    if name == "glibc" and needed > here:
+        yield Finding("missing", f"{brought}, which needs glibc {about['glibc']}; this machine has {version}")
+    else:
+        yield Finding("ok", f"{brought}, which tools that are not Python run it with")
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in version.split(".") if part.isdigit())
+
+
+def _run(package: Package) -> Iterator[Finding]:
+    """Load the FMU as a run does, with this Python, in the temporary folder that a run would use."""
+    if package.library() not in package.names:
+        return
+    place = tempfile.gettempdir()
+    try:
+        with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
+            with zipfile.ZipFile(package.path) as file:
+                file.extractall(folder)
+            command = [sys.executable, "-c", _RUN, folder, package.identifier, package.guid]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
+    except OSError as error:
+        yield Finding(
+            "missing", f"the FMU cannot be unpacked in {place} ({error.strerror}); name another folder in TMPDIR"
+        )
+        return
+    except subprocess.TimeoutExpired:
+        yield Finding("missing", f"loaded as a run does it, in {place}, the FMU made no step within {_SECONDS} s")
+        return
+    if done.returncode == 0:
+        yield Finding("ok", f"loaded as a run does it, in {place}, the FMU was initialised and made a step")
+    else:
+        yield Finding("missing", f"loaded as a run does it, in {place}, the FMU fails: {_why(done)}")
+
+
+def _why(done: subprocess.CompletedProcess[str]) -> str:
+    if done.returncode < 0:
+        return f"the process ended by signal {-done.returncode}"
+    text = (done.stdout.strip().splitlines() or done.stderr.strip().splitlines() or ["no reason given"])[-1]
+    if "failed to map segment" in text or "Operation not permitted" in text:
+        return f"{text}; programs may not be loaded from that folder: name another one in TMPDIR"
+    return text
 
 
 def _python(python: Interpreter | None) -> Iterator[Finding]:
@@ -199,13 +299,13 @@ def _other_hosts(package: Package, python: Interpreter) -> Iterator[Finding]:
             f"tools that are not Python cannot: {python.executable} has no shared library; install libpython "
             f"(Debian: apt-get install libpython{python.version}), or a Python built with --enable-shared",
         )
-    elif package.has_shim:
-        yield Finding("ok", f"tools that are not Python can run it too: its shim will load {python.library}")
+    elif package.has_loader:
+        yield Finding("ok", f"tools that are not Python can run it too: its loader will load {python.library}")
     else:
         first = Path(python.executable).parent
         yield Finding(
             "note",
-            "tools that are not Python need it built with --shim, or to be started like this: "
+            "tools that are not Python need it built with our loader, or to be started like this: "
             f"PATH={first}:$PATH LD_PRELOAD={python.library} the-tool",
         )
 

@@ -25,11 +25,11 @@ th{background:#f0f0f0}td:first-child{font-family:monospace;white-space:nowrap}
 pre{background:#f6f6f6;padding:1em;overflow:auto}"""
 _AXES: Final = "Axes: x along the track, y to the left, z up. Values are SI. Uplift is positive upwards."
 _RUNNING: Final = (
-    "This FMU contains Python code. The machine needs Python 3 with numpy and scipy "
-    "(<code>resources/requirements.txt</code>). A tool that is not Python itself needs libpython in its process: "
-    "an FMU built with <code>--shim</code> brings it by itself (it takes <code>python3</code> on PATH, or the "
-    "interpreter that the environment variable <code>OPENPANTO_PYTHON</code> names); otherwise set "
-    "<code>LD_PRELOAD</code> to libpython. <code>python -m fmus doctor FILE.fmu</code> says what is missing. "
+    "This FMU contains Python code. The machine needs Python 3.11 or newer with numpy and scipy "
+    "(<code>resources/requirements.txt</code>). On Linux (x86-64) the FMU's library brings Python into tools that are "
+    "not Python themselves: the interpreter that the environment variable <code>OPENPANTO_PYTHON</code> names, or "
+    "<code>python3</code> on PATH; elsewhere such a tool needs libpython in its process. "
+    "<code>python -m fmus doctor FILE.fmu</code> says what is missing. "
     "Parameters may be set until initialization mode ends. The state can be saved, restored and serialised."
 )
 

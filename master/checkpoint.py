@@ -23,6 +23,7 @@ from master.arrays import FloatArray
 from master.durable import write_whole
 from master.errors import MasterError, RequestError, RunError, one_line
 from master.network import Network
+from master.rounding import steps_in
 from master.simulation import TimeGrid
 from master.system import Component, System
 
@@ -72,6 +73,8 @@ class Checkpoint:
         Identity of the run that it comes from.
     observers : dict
         What observers remember, by their names.
+    options : dict
+        What the coupling scheme goes by (`scheme_options`).
     """
 
     start: float
@@ -85,6 +88,7 @@ class Checkpoint:
     scheme: str
     run: str = ""
     observers: dict[str, list[float | None]] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
 
     @property
     def time(self) -> float:
@@ -150,6 +154,13 @@ class Continuation:
             found.append(f"its step was {c.step:g} s from {c.start:g} s on, is {now}")
         if scheme != c.scheme:
             found.append(f"its scheme was {c.scheme}, is {scheme}")
+            return found
+        wanted = scheme_options(system)
+        found += [
+            f"the {name} of its scheme was {_told(c.options.get(name))}, is {_told(value)}"
+            for name, value in wanted.items()
+            if name in c.options and c.options[name] != value
+        ]
         return found
 
     def prepare(self, network: Network, algorithm: Algorithm, grid: TimeGrid) -> None:
@@ -269,7 +280,7 @@ def steps_between(system: System, period: float) -> int:
         If a component cannot be saved.
     """
     _check_serialisable(system, "--checkpoint-every")
-    return max(1, round(period / system.step))
+    return steps_in(period, system.step)
 
 
 def _check_serialisable(system: System, option: str) -> None:
@@ -279,6 +290,18 @@ def _check_serialisable(system: System, option: str) -> None:
     texts = [f"{c.name}.{name}" for c in system.components for name in c.texts]
     if texts:
         raise RequestError(f"{option}: '{texts[0]}' is a text that is exchanged, which a checkpoint cannot hold")
+
+
+def scheme_options(system: System) -> dict[str, Any]:
+    """Return what the coupling scheme goes by, as JSON has it; an order left open is that of the file."""
+    options = dict(system.settings.coupling.options)
+    if "order" in options:
+        options["order"] = list(options["order"] or (c.name for c in system.components))
+    return options
+
+
+def _told(value: Any) -> str:
+    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def take(
@@ -302,6 +325,7 @@ def take(
         algorithm.name,
         run,
         {observer.name: observer.memory() for observer in observers},
+        scheme_options(system),
     )
 
 
@@ -340,6 +364,7 @@ def pack(checkpoint: Checkpoint) -> bytes:
         "states": {name: len(state) for name, state in c.states.items()},
         "run": c.run,
         "observers": c.observers,
+        "options": c.options,
     }
     text = json.dumps(header, allow_nan=False).encode()
     raw = numbers.astype("<f8").tobytes() + c.memory.astype("<f8").tobytes() + b"".join(c.states.values())
@@ -395,6 +420,7 @@ def _unpack_body(header: dict[str, Any], raw: bytes) -> Checkpoint:
         header["scheme"],
         header.get("run", ""),
         header.get("observers", {}),
+        header.get("options", {}),
     )
 
 

@@ -27,7 +27,9 @@ from master.evaluation.contact_signals import EvaluationSettings
 from master.isolation import INIT_TIMEOUT, Isolation
 from master.progress import ProgressObserver
 from master.report import commands
+from master.report.terminal import Terminal, printable_json
 from master.results import Results
+from master.rounding import adjustments
 from master.run import Manner, run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.ssp.annotation import SCHEMES, Calibration
@@ -35,10 +37,13 @@ from master.ssp.archive import SSD_NAME, Package, Sources
 from master.ssp.pack import left_out, pack
 from master.ssp.ssd import read_structure
 from master.ssp.xml import Reader
+from master.store import write_runtime
 from master.study import command as study_command
 from master.system import System
 from master.verify import command as verify_command
 
+#: Where an archive holds one Python for all its FMUs.
+RUNTIME: Final = "resources/runtime"
 VERBS: Final = ("run", "pack", "validate", "compare", "report", "calibrate", "verify", "study")
 _WIDTH: Final = 80
 _PLAIN: Final = Manner()
@@ -50,9 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given and given[0] not in VERBS and given[0] not in ("-h", "--help"):
         given.insert(0, "run")
     options = _parser().parse_args(given)
-    error = Console(stderr=True, width=_WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
+    error = Terminal(stderr=True, width=_WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
     try:
         code: int = options.verb(options)
+        sys.stdout.flush()  # here, where an error can still be told
     except UsageError as failure:
         return _fail(error, failure, 2)
     except MasterError as failure:
@@ -62,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _fail(error, "interrupted", 1)
     except OSError as failure:
-        return _fail(error, f"{failure.filename or 'a file'}: {failure.strerror or failure}", 1)
+        return _fail(error, f"{failure.filename or 'standard output'}: {failure.strerror or failure}", 1)
     return code
 
 
@@ -84,6 +90,11 @@ def _parser() -> argparse.ArgumentParser:
     _add_tolerance(checking)
     packing = _add(verbs, "pack", "write a scenario as a .ssp archive, FMUs included", _pack, scenario=True)
     packing.add_argument("--out", type=Path, metavar="FILE", help="default: dist/NAME.ssp")
+    packing.add_argument(
+        "--standalone",
+        action="store_true",
+        help=f"with the Python that the FMUs run in, as {RUNTIME}, for tools where OPENPANTO_RUNTIME names it",
+    )
     commands.add_compare_arguments(_add(verbs, "compare", commands.COMPARE_HELP, commands.run_compare))
     commands.add_report_arguments(_add(verbs, "report", commands.REPORT_HELP, commands.run_report))
     _add_calibrate(verbs)
@@ -232,7 +243,7 @@ def _run_overrides(options: argparse.Namespace) -> Overrides:
 
 
 def _tell(text: str, console: Console | None = None) -> None:
-    (console or Console(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
+    (console or Terminal(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -259,7 +270,7 @@ def _tell_results(done: Results, options: argparse.Namespace) -> None:
     if options.parquet:
         export.write_parquet(done.folder)
     if options.json:
-        print((done.folder / results.SUMMARY).read_text(encoding="utf-8"), end="")
+        print(printable_json((done.folder / results.SUMMARY).read_text(encoding="utf-8")), end="")
     elif not options.quiet:
         _show(done)
 
@@ -324,7 +335,9 @@ def _continuation(options: argparse.Namespace) -> Continuation | None:
 def _run_shown(system: System, folder: Path, quiet: bool, manner: Manner = _PLAIN) -> Results:
     if quiet:
         return run(system, folder, (), manner)
-    console = Console(stderr=True)  # that of the progress bar, which then stays below
+    console = Terminal(stderr=True)  # that of the progress bar, which then stays below
+    for text in adjustments(system, manner.checkpoint_every):
+        _tell(f"warning: {text}", console)
     cautions = CautionObserver(lambda caution: _tell(str(caution), console))
     if manner.real_time is not None:  # drawing takes more time than a step has
         _tell(f"running for {(system.stop - system.start) / manner.real_time:g} s by the wall clock")
@@ -337,7 +350,7 @@ def _run_shown(system: System, folder: Path, quiet: bool, manner: Manner = _PLAI
 
 
 def _show(done: Results) -> None:
-    console = Console(width=_WIDTH, highlight=False)
+    console = Terminal(width=_WIDTH, highlight=False)
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
@@ -412,12 +425,14 @@ def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
 
 
 def _validate(options: argparse.Namespace) -> int:
-    with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
+    with open_scenario(
+        options.scenario, _overrides(options), _tell, build=not options.no_build, is_check=True
+    ) as scenario:
         system = scenario.system
         _tell_warnings(system, _tell)
         counts = f"{len(system.components)} components, {len(system.connections)} connections"
         times = f"{system.start:g} s to {system.stop:g} s in steps of {system.step:g} s"
-        for text in limits.warnings(system):
+        for text in (*limits.warnings(system), *adjustments(system)):
             _tell(f"warning: {text}")
         tolerance = _told_tolerance({c.name: c.tolerance for c in system.components})
         print(f"{system.name}: valid; {counts}, {times}, {system.settings.coupling.scheme}{tolerance}")
@@ -446,10 +461,21 @@ def _pack(options: argparse.Namespace) -> int:
         if archive.is_dir():
             raise RequestError(f"{archive} is a folder; choose another name with --out")
         root = scenario.package.root
-        print(pack(root, archive))
+        with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
+            added = {RUNTIME: _runtime(Path(folder))} if options.standalone else {}
+            print(pack(root, archive, added))
         if names := left_out(root):
             _tell(f"left out, for {SSD_NAME} does not name it: {', '.join(names)}")
     return 0
+
+
+def _runtime(folder: Path) -> Path:
+    """Write the Python that FMUs run in on a machine that has none; return its folder."""
+    try:
+        write_runtime(folder)
+    except ValueError as error:
+        raise MasterError(f"the archive cannot be standalone: {error}") from error
+    return folder
 
 
 def _calibrate(options: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -61,6 +62,17 @@ def read_fmu(path: Path) -> Fmu:
         units=_units(description.unitDefinitions, f"{path.name} ({_DESCRIPTION})"),
         tolerance=_tolerance(description.defaultExperiment),
     )
+
+
+def lacking_binary(path: Path, identifier: str) -> str:
+    """Return in words that an FMU has no library for this machine, empty if it has one."""
+    with zipfile.ZipFile(path) as file:
+        names = file.namelist()
+    if f"binaries/{fmpy.platform}/{identifier}{fmpy.sharedLibraryExtension}" in names:
+        return ""
+    folders = sorted({name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1})
+    held = f"binaries for {' and '.join(folders)} only" if folders else "no binaries"
+    return f"holds {held}; this machine needs one for {fmpy.platform}"
 
 
 def _tolerance(experiment: Any | None) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import math
@@ -18,10 +19,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from master import folder_lock, stored
+from master import folder_lock, summary_schema
 from master.checkpoint import NAME as CHECKPOINT
 from master.contacts import Contact
-from master.durable import PART, write_whole
+from master.durable import PART, safe_cell, write_whole
 from master.energy import Balance, drift_events, find_balances
 from master.errors import MasterError, RequestError
 from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
@@ -310,7 +311,7 @@ def read(folder: Path) -> Results:
 
 def _read(folder: Path) -> Results:
     summary = _summary(folder)
-    geometry = stored.read_geometry(folder / GEOMETRY) if (folder / GEOMETRY).is_file() else {}
+    geometry = summary_schema.read_geometry(folder / GEOMETRY) if (folder / GEOMETRY).is_file() else {}
     coarse = sorted(p for p in folder.glob("timeseries*.csv") if p.name != TIMESERIES)
     recordings = tuple(load(p) for p in (folder / TIMESERIES, *coarse))
     return Results(folder, summary, recordings, geometry)
@@ -319,7 +320,7 @@ def _read(folder: Path) -> Results:
 def _summary(folder: Path) -> dict[str, Any]:
     if not is_ours(folder):
         raise MasterError(f"{folder} is not a results folder: it has no {SUMMARY} written by this tool")
-    found = stored.read_summary(folder / SUMMARY)
+    found = summary_schema.read_summary(folder / SUMMARY)
     if found.get("format", 1) > FORMAT:
         raise MasterError(
             f"{folder / SUMMARY} has format {found['format']}, this version reads up to {FORMAT}; "
@@ -365,7 +366,8 @@ def write_forces(done: Results) -> None:
     titles, columns = force_table(done.signals)
     formats = [_EXACT if title.endswith(".filtered_force [N]") else NUMBER_FORMAT for title in titles]
     text = io.StringIO()
-    np.savetxt(text, np.column_stack(columns), fmt=formats, delimiter=",", header=",".join(titles), comments="")
+    csv.writer(text, lineterminator="\n").writerow(map(safe_cell, titles))
+    np.savetxt(text, np.column_stack(columns), fmt=formats, delimiter=",")
     write_text(done.folder / FORCES, text.getvalue())
 
 

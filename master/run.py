@@ -34,18 +34,15 @@ from master.interruption import heeded_at_once, interruptible
 from master.isolation import IsolatedInstance, Isolation
 from master.line import GeometryObserver
 from master.network import Network
-from master.pattern import matcher
 from master.realtime import Pacer
 from master.recorder import Recorder, Recording, Source
 from master.results import Results
+from master.rounding import adjustments, is_recordable, record_of, steps_in
 from master.simulation import Observer, Outcome, TimeGrid, simulate
-from master.ssp.annotation import Record
 from master.supervision import phase, unfinished
 from master.system import Component, System, Variable
 from master.track_watch import TrackWatch
 from master.watch import ContactWatch
-
-_MEASURED: Final = ("output", "local")
 
 
 @dataclass(frozen=True)
@@ -275,12 +272,12 @@ def recording_plans(system: System) -> tuple[Plan, ...]:
 
 def _steps_between_rows(component: Component, variable: Variable, system: System) -> int:
     """Return how often a variable is recorded, 0 for never (or with the exchanged ones)."""
-    if variable.type == "String" or variable.causality not in _MEASURED or variable.name in component.outputs:
+    if not is_recordable(component, variable):
         return 0
-    record = _last_match(f"{component.name}.{variable.name}", system.settings.records)
+    record = record_of(f"{component.name}.{variable.name}", system.settings.records)
     if record is None:
         return 1 if variable.causality == "output" else 0
-    return max(1, round(record.every / system.step))
+    return steps_in(record.every, system.step)
 
 
 def recording_name(plan: Plan, step: float) -> str:
@@ -387,6 +384,7 @@ class _Session:
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
+            "adjustments": list(adjustments(self._system, self._manner.checkpoint_every)),
             "warnings": [{"component": w.component, "text": w.text} for w in self._cautions.warnings],
             "scenario_warnings": list(self._system.warnings),
         }
@@ -501,11 +499,6 @@ def _exchanged(system: System, network: Network) -> Source:
         values[:] = network.outputs[places]
 
     return Source([network.output_names[i] for i in places], values, read)
-
-
-def _last_match(name: str, records: Sequence[Record]) -> Record | None:
-    fits = [r for r in records if any(matcher(p)(name) for p in r.variables)]
-    return fits[-1] if fits else None
 
 
 def _description(system: System, identity: str) -> dict[str, Any]:

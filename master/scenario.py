@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from master import energy, scenario_checks, store
 from master.errors import Problem, RequestError, ScenarioError
-from master.fmu_file import read_fmu
+from master.fmu_file import lacking_binary, read_fmu
 from master.pattern import matcher
 from master.ssp.annotation import DEFAULT_RECORDS, Record, RunSettings, Scheme
 from master.ssp.archive import SSD_NAME, Package, Sources, open_package
@@ -88,6 +89,7 @@ def open_scenario(
     overrides: Overrides | None = None,
     tell: Callable[[str], None] = lambda _: None,
     build: bool = True,
+    is_check: bool = False,
 ) -> Iterator[Scenario]:
     """Open, build what is missing, check and resolve a scenario.
 
@@ -101,24 +103,38 @@ def open_scenario(
         Is told what takes time (building FMUs).
     build : bool
         Whether missing or stale FMUs are built.
+    is_check : bool
+        Whether nothing may be written: FMUs are built into a temporary folder, to be looked at only.
 
     Raises
     ------
     ScenarioError
         With every problem found.
     """
-    with open_package(path) as package:
-        yield Scenario(package, load_system(package, overrides or Overrides(), tell, build))
+    with open_package(path) as package, _scratch(is_check) as scratch:
+        yield Scenario(package, load_system(package, overrides or Overrides(), tell, build, scratch))
 
 
-def load_system(package: Package, overrides: Overrides, tell: Callable[[str], None], build: bool) -> System:
-    """Read and check the files of ``package``."""
+@contextmanager
+def _scratch(is_wanted: bool) -> Iterator[Path | None]:
+    if not is_wanted:
+        yield None
+        return
+    with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
+        yield Path(folder)
+
+
+def load_system(
+    package: Package, overrides: Overrides, tell: Callable[[str], None], build: bool, scratch: Path | None = None
+) -> System:
+    """Read and check the files of ``package``; FMUs are built into ``scratch`` if there is one."""
     reader = Reader(SSD_NAME)
     sources = Sources(package.root, overrides.outside)
     structure = read_structure(sources, reader)
     if structure is EMPTY:  # without it everything would be missing
         raise ScenarioError(reader.problems)
-    fmus = _fmus(package, sources, structure.components, reader.problems, tell, build)
+    provision = _Provision(build and package.writable, tell, scratch)
+    fmus = _fmus(sources, structure.components, reader.problems, provision)
     checker = Checker(structure, fmus, reader.problems, reader.warnings)
     connections = checker.connections()
     components = checker.components(connections)
@@ -167,12 +183,10 @@ def _sorted(problems: Iterable[Problem]) -> list[Problem]:
 
 
 def _fmus(
-    package: Package,
     sources: Sources,
     components: Iterable[SsdComponent],
     problems: list[Problem],
-    tell: Callable[[str], None],
-    build: bool,
+    provision: _Provision,
 ) -> dict[str, Fmu]:
     found: dict[str, Fmu] = {}
     by_path: dict[Path, Fmu | str] = {}
@@ -183,7 +197,8 @@ def _fmus(
             problems.append(Problem(SSD_NAME, c.line, "source", text))
             continue
         if path not in by_path:
-            by_path[path] = _provide(path, package.writable and build and sources.is_inside(path), tell)
+            may_build = provision.build and sources.is_inside(path)
+            by_path[path] = _provide(path, replace(provision, build=may_build))
         fmu = by_path[path]
         if isinstance(fmu, str):
             problems.append(Problem(SSD_NAME, c.line, "fmu", f"component '{c.name}': {c.source} {fmu}"))
@@ -192,13 +207,22 @@ def _fmus(
     return found
 
 
-def _provide(path: Path, build: bool, tell: Callable[[str], None]) -> Fmu | str:
+@dataclass(frozen=True)
+class _Provision:
+    """How FMUs are had: whether they may be built, who is told, and where to if not in their place."""
+
+    build: bool
+    tell: Callable[[str], None]
+    scratch: Path | None
+
+
+def _provide(path: Path, provision: _Provision) -> Fmu | str:
     try:
-        if build:
-            store.ensure(path, tell)
-        if not path.is_file():
+        place = store.ensure(path, provision.tell, provision.scratch) if provision.build else path
+        if not place.is_file():
             return "does not exist"
-        return read_fmu(path)
+        fmu = read_fmu(place)
+        return lacking_binary(place, fmu.identifier) or fmu
     except ValueError as error:
         return str(error)
 

@@ -6,6 +6,7 @@ knows nothing, is used as it is.
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import os
 import subprocess
@@ -13,6 +14,7 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
@@ -20,6 +22,9 @@ from xml.etree import ElementTree
 #: Seconds after which asking for a fingerprint, or building, is given up.
 _ASK_SECONDS: Final = 60
 _BUILD_SECONDS: Final = 600
+#: What an FMU of ours is known by; see docs/interoperability.md.
+_MARK: Final = "resources/openpanto.txt"
+_LONGEST_MARK: Final = 1 << 16
 #: What a damaged, encrypted or exotically compressed archive raises.
 _UNREADABLE: Final = (
     OSError,
@@ -34,8 +39,23 @@ _UNREADABLE: Final = (
 )
 
 
-def ensure(path: Path, tell: Callable[[str], None]) -> None:
-    """Build the FMU at ``path`` if it is missing, or older than the sources it is built from.
+def ensure(path: Path, tell: Callable[[str], None], scratch: Path | None = None) -> Path:
+    """Build the FMU at ``path`` if it is missing, or ours and older than the sources it is built from.
+
+    What does not carry our mark, or was changed since it was built, is kept, and that is said.
+
+    Parameters
+    ----------
+    path : Path
+    tell : callable
+        Is told what takes time, and what is kept.
+    scratch : Path, optional
+        Folder to build into instead, where nothing may be written beside ``path``.
+
+    Returns
+    -------
+    Path
+        Where the FMU to be used lies.
 
     Raises
     ------
@@ -43,12 +63,81 @@ def ensure(path: Path, tell: Callable[[str], None]) -> None:
         With the builder's own words, if an FMU that is missing cannot be built.
     """
     if not has_builder():
-        return
-    wanted = fingerprint(path.stem)
+        return path
+    origin = _origin(path)
+    if origin is not None and not origin.definition.is_file():
+        tell(f"{path.name} is used as it is: {origin.definition}, which it was built from, is not there")
+        return path
+    wanted = fingerprint(origin.definition.as_posix(), origin.pantographs) if origin else fingerprint(path.stem)
     if wanted is None or (path.is_file() and _matches(wanted, stored_guid(path))):
-        return
+        return path
+    if path.exists() and (why := why_not_ours(path)):
+        tell(f"{path.name} is used as it is: {why}; to have it built anew, remove it")
+        return path
+    place = scratch / path.name if scratch else path
     tell(f"building {path.name}" + (" again: its sources have changed" if path.is_file() else ""))
-    build(path)
+    build(place, origin)
+    return place
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A user's definition that an FMU was built from."""
+
+    definition: Path
+    pantographs: str
+
+
+def read_mark(path: Path) -> dict[str, str]:
+    """Return what our mark in an FMU says, empty if it has none."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            text = file.read(_MARK)[:_LONGEST_MARK].decode("utf-8")
+    except _UNREADABLE:
+        return {}
+    pairs = (line.partition("=") for line in text.splitlines())
+    return {key: value for key, separator, value in pairs if separator}
+
+
+def why_not_ours(path: Path) -> str:
+    """Return why an FMU may be somebody's own work; empty if it is ours, as we built it."""
+    mark, guid = read_mark(path), stored_guid(path)
+    if not guid:
+        return "it is not an FMU that could be read"
+    try:
+        with zipfile.ZipFile(path) as file:
+            if not mark:
+                return "" if _is_older_build(file, path.stem, guid) else "it was not built by this project"
+            if mark.get("guid") == guid.strip("{}") and mark.get("content") == _content_hash(file):
+                return ""
+    except _UNREADABLE:
+        pass
+    return "it was changed since it was built"
+
+
+def _origin(path: Path) -> Origin | None:
+    mark = read_mark(path) if path.is_file() else {}
+    if not mark.get("definition"):
+        return None
+    return Origin(Path(os.path.normpath(path.parent / mark["definition"])), mark.get("pantographs", "1"))
+
+
+def _is_older_build(file: zipfile.ZipFile, name: str, guid: str) -> bool:
+    """Whether it was built before there was a mark: the script's name holds the GUID's beginning."""
+    script = f"{name}_{guid.strip('{}').replace('-', '')[:12]}"
+    if {f"resources/{script}.py", "resources/slavemodule.txt"} <= set(file.namelist()):
+        return file.read("resources/slavemodule.txt").decode("utf-8").strip() == script
+    return False
+
+
+def _content_hash(file: zipfile.ZipFile) -> str:
+    """Return the hash that the mark should hold, over all other files (``content_hash`` of ``fmus``)."""
+    whole = hashlib.sha256()
+    for info in sorted(file.infolist(), key=lambda info: info.filename):
+        if info.filename != _MARK and not info.is_dir():
+            data = file.read(info)
+            whole.update(f"{info.filename}\0{len(data)}\0".encode() + data)
+    return whole.hexdigest()
 
 
 def has_builder() -> bool:
@@ -58,8 +147,15 @@ def has_builder() -> bool:
     return any((Path(folder) / "__main__.py").is_file() for folder in folders)
 
 
-def fingerprint(name: str) -> str | None:
+def fingerprint(name: str, pantographs: str = "") -> str | None:
     """Return the content hash that a build of ``name`` would have, None if ``fmus`` does not know it.
+
+    Parameters
+    ----------
+    name : str
+        As for ``python -m fmus build``: an FMU's name or the path of a definition.
+    pantographs : str, optional
+        Number of ports of a line that is given by its path.
 
     Raises
     ------
@@ -67,7 +163,7 @@ def fingerprint(name: str) -> str | None:
         With the builder's own words, if it knows the name but cannot tell.
     """
     try:
-        answer = _fmus("fingerprint", "--if-known", "--", name, seconds=_ASK_SECONDS)
+        answer = _fmus("fingerprint", "--if-known", *_ports(pantographs), "--", name, seconds=_ASK_SECONDS)
     except subprocess.TimeoutExpired:
         return None
     if answer.returncode != 0:
@@ -87,14 +183,37 @@ def stored_guid(path: Path) -> str:
     return ""
 
 
-def build(path: Path) -> None:
-    """Build ``path`` from the definition of the same name."""
+def build(path: Path, origin: Origin | None = None) -> None:
+    """Build ``path`` from the definition of the same name, or from a user's."""
+    name, ports = (origin.definition.as_posix(), _ports(origin.pantographs)) if origin else (path.stem, [])
     try:
-        answer = _fmus("build", "--out", str(path.parent), "--", path.stem, seconds=_BUILD_SECONDS)
+        answer = _fmus("build", "--out", str(path.parent), *ports, "--", name, seconds=_BUILD_SECONDS)
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"could not be built: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0 or not path.is_file():
         raise ValueError(f"could not be built: {_last_line(answer)}")
+
+
+def _ports(number: str) -> list[str]:
+    return ["--pantographs", number] if number not in ("", "1") else []
+
+
+def write_runtime(folder: Path) -> None:
+    """Write the Python that standalone FMUs run in into a folder.
+
+    Raises
+    ------
+    ValueError
+        With the builder's own words, if it cannot be made here.
+    """
+    if not has_builder():
+        raise ValueError("it takes the package fmus, which is not installed")
+    try:
+        answer = _fmus("runtime", "--out", str(folder), seconds=_BUILD_SECONDS)
+    except subprocess.TimeoutExpired as error:
+        raise ValueError(f"it could not be made: no answer within {_BUILD_SECONDS} s") from error
+    if answer.returncode != 0:
+        raise ValueError(_last_line(answer))
 
 
 def _last_line(answer: subprocess.CompletedProcess[str]) -> str:
@@ -109,5 +228,10 @@ def _matches(fingerprint: str, guid: str) -> bool:
 
 def _fmus(*arguments: str, seconds: float) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "fmus", *arguments]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(_places())}
     return subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False, env=environment)
+
+
+def _places() -> list[str]:
+    """Return where modules come from, without FMUs that ran here: they leave their folders, with a pythonfmu each."""
+    return [place for place in sys.path if not (Path(place) / "slavemodule.txt").is_file()]

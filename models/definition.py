@@ -64,7 +64,16 @@ def one_line(text: str) -> str:
     if len(text) > _LONGEST:
         half = _LONGEST // 2
         text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    return "".join(map(_printed, text))
+
+
+def printable(text: str) -> str:
+    """Return text whose characters all print, lines kept: for what others have written, on its way to a terminal."""
+    return "".join(c if c == "\n" else _printed(c) for c in text)
+
+
+def _printed(c: str) -> str:
+    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from master.evaluation.contact_quality import Quality, figures_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals
 from master.evaluation.en50367_limits import Criterion, judge
 from master.evaluation.filters import evaluated, stands_in
-from master.line import Geometry, Uplift, indexed, met, period_of, support_uplifts
+from master.line import Geometry, Uplift, indexed, met, passages, period_of, support_uplifts
 from master.recorder import Recording
 
 #: A pantograph's effect on a dropper begins this long before it passes, and is followed this long after [s].
@@ -211,10 +211,7 @@ def _droppers_met(
     x = geometry.get(f"{name.removeprefix(f'{contact.catenary}.').removesuffix('.force')}.x")
     if x is None:
         return np.zeros(0)
-    period = period_of(geometry)
-    laps = np.arange(np.ceil((limits[0] - x) / period), np.floor((limits[1] - x) / period) + 1.0) if period else 0.0
-    places = x + period * np.atleast_1d(laps)
-    return places[(places >= limits[0]) & (places <= limits[1])]
+    return passages(x, limits, limits, period_of(geometry))
 
 
 def _count_slack(recording: Recording, name: str, begin: FloatArray, end: FloatArray) -> int:

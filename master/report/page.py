@@ -191,7 +191,7 @@ def _inputs(summary: dict[str, Any]) -> str:
     for component in summary.get("components", []):
         rows = "".join(_input_row(i) for i in inputs_of(component))
         heads = "<tr><th>parameter</th><th class='n'>value</th><th>unit</th><th>what</th><th>source</th></tr>"
-        head = f"<summary>{markup.text(component['name'])}: {markup.text(component['fmu'])}</summary>"
+        head = f"<summary>{markup.text(component['name'])}: {markup.text(component.get('fmu', '-'))}</summary>"
         parts.append(f"<details>{head}<div class='scroll'><table>{heads}{rows}</table></div></details>")
     return "".join([*parts, "</section>"])
 

@@ -19,7 +19,7 @@ Everything is optional. The macro step is read from ``osp:FixedStepAlgorithm``, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 from lxml import etree
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -30,7 +30,14 @@ NAMESPACE: Final = "urn:openpanto:ssp"
 OSP_TYPE: Final = "com.opensimulationplatform"
 
 Scheme = Literal["jacobi", "gauss-seidel", "iterative"]
-SCHEMES: Final = ("jacobi", "gauss-seidel", "iterative")
+SCHEMES: Final[tuple[Scheme, ...]] = get_args(Scheme)
+#: Options of each scheme: those settings of `Coupling` that it goes by. `master.algorithm` makes it with just these,
+#: the summary, comparisons and checkpoints show just these.
+OPTIONS: Final[dict[Scheme, tuple[str, ...]]] = {
+    "jacobi": (),
+    "gauss-seidel": ("order",),
+    "iterative": ("tolerance", "max_iterations", "weight"),
+}
 
 
 class _Settings(BaseModel):
@@ -59,6 +66,11 @@ class Coupling(_Settings):
     tolerance: float = Field(1e-8, gt=0)
     max_iterations: int = Field(50, ge=2, alias="maxIterations")
     weight: float = Field(1.0, gt=0, le=1)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Return the options of the scheme, by name."""
+        return {name: getattr(self, name) for name in OPTIONS[self.scheme]}
 
 
 class Interval(_Settings):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
+from master.durable import cannot_write, whole_file
 from master.errors import MasterError
 from master.ssp.archive import SSD_NAME, Sources
 from master.ssp.xml import XmlError, safe_root
@@ -16,30 +16,40 @@ from master.ssp.xml import XmlError, safe_root
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 _UNIX: Final = 3
 _PLAIN_FILE: Final = 0o100644 << 16
+_NOTHING: Final[Mapping[str, Path]] = {}
 
 
-def pack(root: Path, archive: Path) -> Path:
+def pack(root: Path, archive: Path, added: Mapping[str, Path] = _NOTHING) -> Path:
     """Write the system structure description and the files that it names into ``archive``; return it.
 
     Sorted, with fixed times and modes. Whatever else lies in the folder stays out (`left_out`): the FMU of a pantograph
     that was replaced must not travel along.
+
+    Parameters
+    ----------
+    root, archive : Path
+    added : mapping
+        Folder in the archive -> folder whose files are written into it besides.
 
     Raises
     ------
     MasterError
         If the archive cannot be written, or ``root`` holds symbolic links.
     """
-    members = _members(root)
-    temporary = archive.with_name(f".{archive.name}.{os.getpid()}.part")  # two that pack do not mix
+    members = {path.relative_to(root.resolve()).as_posix(): path for path in _members(root)}
+    for place, folder in added.items():
+        files = (path for path in folder.rglob("*") if path.is_file())
+        members |= {f"{place}/{path.relative_to(folder).as_posix()}": path for path in files}
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file:
-            for path in members:
-                file.writestr(_info(path.relative_to(root.resolve()).as_posix()), path.read_bytes())
-        temporary.replace(archive)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise MasterError(f"{archive} cannot be written ({error.strerror})") from error
+        raise cannot_write(archive, error) from error
+    with (
+        whole_file(archive) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file,
+    ):
+        for name, path in sorted(members.items()):
+            file.writestr(_info(name), _content(path))
     return archive
 
 
@@ -48,6 +58,13 @@ def left_out(root: Path) -> tuple[str, ...]:
     kept = {path.resolve() for path in _members(root)}
     files = (p for p in root.rglob("*") if p.is_file() and p.resolve() not in kept)
     return tuple(sorted(p.relative_to(root).as_posix() for p in files))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
 
 
 def _members(root: Path) -> list[Path]:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import Any, Final
 
+from master.durable import safe_cell
 from master.results import Results
 from master.study.family import Family, Interval, Variant
 from master.study.figures import Entry, entries
@@ -158,10 +159,11 @@ def as_csv(outcome: Outcome) -> str:
     for interval in outcome.family.settings.interval:
         for e in outcome.entries(interval):
             values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
+            named = map(safe_cell, (e.variant, interval.name, e.pantograph))
             told = _values_of(outcome.family, e.variant)
             own = [told.get(name, "") for name in swept]
             cells = [*values, verdict(e), filtered[e.variant], *_sharing_cells(e), *own]
-            writer.writerow([e.variant, interval.name, e.pantograph, *cells])
+            writer.writerow([*named, *cells])
     return text.getvalue()
 
 

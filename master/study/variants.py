@@ -15,6 +15,7 @@ from master.calibrate import Found, find_values
 from master.caution import CautionObserver
 from master.errors import MasterError, RequestError
 from master.results import Results
+from master.rounding import adjustments
 from master.run import run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.simulation import Observer
@@ -51,6 +52,8 @@ class Runner:
 
     def run(self, system: System, folder: Path) -> Results:
         """Run one system."""
+        for text in adjustments(system):
+            self.tell(f"{system.name}: warning: {text}")
         cautions = CautionObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
         with self.watching(system) as observers:
             return run(system, folder, [cautions, *observers])
@@ -83,7 +86,7 @@ def _is_of(summary: dict[str, Any], system: System) -> bool:
     components = [[c.name, c.fmu.sha256, c.parameters] for c in system.components]
     times = {"start": system.start, "stop": system.stop, "step": system.step}
     wanted = [components, {**times, **system.settings.model_dump(mode="json")}]
-    found = [[c["name"], c["sha256"], c["parameters"]] for c in summary.get("components", [])]
+    found = [[c["name"], c.get("sha256"), c.get("parameters")] for c in summary.get("components", [])]
     return bool(json.loads(json.dumps(wanted)) == [found, summary.get("settings")])
 
 

@@ -10,7 +10,7 @@ from models.catenary.compiled import KernelError
 from models.catenary.equilibrium import EquilibriumError
 from models.catenary.local_response import LocalSolutionError
 from models.commands import couple, identify, pantograph, statics
-from models.definition import DefinitionError
+from models.definition import DefinitionError, printable
 from models.library import UnknownNameError
 from models.pantograph.multibody.mechanism import MechanismError
 from models.part import ParameterError
@@ -25,7 +25,6 @@ _USER_ERRORS = (
     MechanismError,
     ParameterError,
     UnknownNameError,
-    OSError,
 )
 
 
@@ -37,10 +36,16 @@ def main(argv: Sequence[str]) -> int:
         verb.add(subparsers)
     arguments = parser.parse_args(argv)
     try:
-        return int(arguments.run(arguments))
+        code = int(arguments.run(arguments))
+        sys.stdout.flush()  # here, where an error can still be told
+    except OSError as error:
+        text = f"{error.filename or 'standard output'}: {error.strerror or error}"
+        print(f"error: {printable(text)}", file=sys.stderr)
+        return 1
     except _USER_ERRORS as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {printable(str(error))}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 1
+    return code

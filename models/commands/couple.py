@@ -30,6 +30,7 @@ from models.commands.options import (
     settings,
     warn,
 )
+from models.commands.output_files import write_csv
 from models.coupled import CoupledModel, CoupledRecord
 from models.library import load_line, load_lumped
 from models.pantograph.lumped_advice import working_height_warning
@@ -210,7 +211,7 @@ def write_timeseries(path: Path, run_of: Evaluated) -> None:
     columns += [low_pass(sampled.force, sampled.step, run_of.filter), sampled.inside.astype(np.float64)]
     names += [f"catenary.support[{i + 1}].uplift [m]" for i in range(record.uplift.shape[1])]
     columns += list(record.uplift.T)
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.17g")
+    write_csv(path, names, columns, 17)
 
 
 def _span_of(arguments: argparse.Namespace, line: CatenaryModel) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from models.commands.options import print_table
+from models.commands.output_files import write_figure
 from models.pantograph.identify import (
     RESPONSE_KINDS,
     IdentifiedModel,
@@ -49,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_table("Identified stages, bottom to top", ("value", "found", "standard deviation"), _rows(model))
     print(f"root mean square misfit {100.0 * model.misfit:.3g} %")
     if arguments.plot is not None:
-        _plot(response, model).savefig(arguments.plot, dpi=120)
+        write_figure(arguments.plot, _plot(response, model), 120)
         print(f"plot: {arguments.plot}")
     return 0
 

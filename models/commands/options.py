@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
-from models.definition import LARGEST, SMALLEST
+from models.definition import LARGEST, SMALLEST, printable
 from models.part import Definition, ParameterError
 from models.units import to_si
 
@@ -131,11 +131,11 @@ def positive(text: str) -> float:
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table, first column left, others right."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=printable(title), title_justify="left")
     for i, column in enumerate(columns):
         table.add_column(column, justify="left" if i == 0 else "right")
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(printable, row))
     # Without markup: "[m]" is a unit here.
     Console(width=None if Console().is_terminal else 100, markup=False).print(table)
 
@@ -143,7 +143,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
 def warn(texts: Iterable[str]) -> None:
     """Tell what deserves a second look; the command goes on."""
     for text in filter(None, texts):
-        print(f"warning: {text}", file=sys.stderr)
+        print(f"warning: {printable(text)}", file=sys.stderr)
 
 
 def new_folder(path: Path) -> Path:

@@ -7,7 +7,9 @@ import shutil
 from pathlib import Path
 
 import fmpy
+import pytest
 from fmpy import calloc, free
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
     fmi2CallbackAllocateMemoryTYPE,
@@ -20,6 +22,11 @@ from fmus.build import ROOTS, Recipe
 from models.library import line_path
 
 TOY = Path(__file__).parent / "toy"
+
+
+def refused():
+    """Expect a call that returns fmi2Error, neither more nor less."""
+    return pytest.raises(FMICallException, match=r"failed with status 3 \(error\)")
 
 
 class Instance:

@@ -88,6 +88,8 @@ def test_outputs_have_no_direct_feedthrough_and_all_are_initial_unknowns(descrip
 
 def test_default_experiment_and_identity(description, toy_fmu):
     assert math.isclose(float(description.defaultExperiment.stepSize), 1e-3)
+    assert float(description.defaultExperiment.stopTime) == 1.0
+    assert float(description.defaultExperiment.tolerance) == 1e-6
     with zipfile.ZipFile(toy_fmu) as archive:
         root = ET.fromstring(archive.read("modelDescription.xml"))
         script = archive.read("resources/slavemodule.txt").decode()

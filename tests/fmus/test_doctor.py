@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 from fmus import doctor
 from fmus.__main__ import main
-from fmus.shim import INNER_SUFFIX, probe_text
+from fmus.loader.loader_build import INNER_SUFFIX, PROBE
 
 
 @pytest.fixture(autouse=True)
@@ -64,13 +65,37 @@ def test_no_shared_library_of_python(toy_fmu, monkeypatch):
     assert "has no shared library; install libpython" in _said(toy_fmu)["missing"]
 
 
-def test_with_and_without_shim(toy_fmu, tmp_path):
-    assert doctor.ask().library == "" or "LD_PRELOAD=" in _said(toy_fmu)["note"]
+def test_with_and_without_the_loader(toy_fmu, tmp_path):
+    assert doctor.ask().library == "" or "its loader will load" in _said(toy_fmu)["ok"]
     inner = f"binaries/linux64/Toy{INNER_SUFFIX}"
-    copy = _changed(toy_fmu, tmp_path, lambda n, d: (n, d))
-    with zipfile.ZipFile(copy, "a") as file:
-        file.writestr(inner, b"")
-    assert doctor.ask().library == "" or "its shim will load" in _said(copy)["ok"]
+    copy = _changed(toy_fmu, tmp_path, lambda n, d: None if n == inner else (n, d))
+    assert doctor.ask().library == "" or "LD_PRELOAD=" in _said(copy)["note"]
+
+
+def test_the_fmu_is_loaded_as_a_run_does_in_the_runs_folder(toy_fmu, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    said = _said(toy_fmu)
+    assert f"loaded as a run does it, in {tmp_path}, the FMU was initialised and made a step" in said["ok"]
+    assert list(tmp_path.iterdir()) == []
+
+    def spoil(name, data):
+        return name, data.replace(b"mass =", b"mess =") if name == "resources/definition.toml" else data
+
+    copies = tmp_path / "copies"
+    copies.mkdir()
+    assert "the FMU fails: " in (text := _said(_changed(toy_fmu, copies, spoil))["missing"])
+    assert "mass: is missing" in text
+
+
+def test_a_folder_that_cannot_be_written(toy_fmu, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    found = list(doctor._run(doctor.read_package(toy_fmu)))
+    assert "cannot be unpacked in" in found[0].text
+
+
+def test_an_older_machine(toy_fmu, monkeypatch):
+    monkeypatch.setattr(doctor.platform, "libc_ver", lambda: ("glibc", "2.17"))
+    assert "need glibc 2.32 or newer; this machine is older, it has 2.17" in _said(toy_fmu)["missing"]
 
 
 def test_code_that_does_not_run(toy_fmu, tmp_path):
@@ -88,9 +113,10 @@ def test_what_is_no_fmu(tmp_path, content):
     assert "is not an FMU of this kind" in _said(tmp_path / "none.fmu")["missing"]
 
 
-def test_the_probe_is_understood_by_a_shell_and_an_old_python():
-    compile(probe_text(), "probe", "exec", dont_inherit=True)
-    answer = subprocess.run(f"'{sys.executable}' -c '{probe_text()}'", shell=True, capture_output=True, text=True)
+def test_the_probe_answers_line_by_line():
+    probe = PROBE.read_text(encoding="utf-8")
+    compile(probe, "probe", "exec", dont_inherit=True)
+    answer = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     lines = answer.stdout.splitlines()
     assert Path(lines[0]).resolve() == Path(sys.executable).resolve()
     assert lines[1] == f"{sys.version_info.major}.{sys.version_info.minor}"

@@ -50,7 +50,7 @@ def test_other_files_stay_as_they_are(data):
 @linux
 def test_an_fmu_carries_the_repaired_library(toy_fmu):
     with zipfile.ZipFile(toy_fmu) as file:
-        assert file.read("binaries/linux64/Toy.so") == repaired(LIBRARY.read_bytes()) != LIBRARY.read_bytes()
+        assert file.read("binaries/linux64/Toy.pythonfmu.so") == repaired(LIBRARY.read_bytes()) != LIBRARY.read_bytes()
 
 
 @linux

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import fmpy
 import pytest
 
 from tests.interop.support import ROOT, ToolRun, run_tool
@@ -34,3 +36,14 @@ def tool_run(packed: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable
         return done[tool, stop]
 
     return run
+
+
+@pytest.fixture(scope="session")
+def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The C host, compiled with FMPy's copy of the FMI headers."""
+    headers = Path(fmpy.__file__).parent / "c-code"
+    program = tmp_path_factory.mktemp("host") / "host"
+    source = Path(__file__).parent / "host" / "host.c"
+    command = [os.environ.get("CC", "cc"), "-std=gnu11", "-O1", "-Wall", "-Werror", f"-I{headers}", str(source)]
+    subprocess.run([*command, "-o", str(program), "-ldl"], check=True)
+    return program

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import shutil
 import subprocess
@@ -12,34 +11,25 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import fmpy
 import pytest
 
 from fmus.build import build, recipe
-from fmus.shim import INNER_SUFFIX
+from fmus.loader.loader_build import INNER_SUFFIX
 from master.run import loaded
 from master.scenario import open_scenario
 from master.ssp.archive import extract
 from tests.interop.support import STEP
 
-pytestmark = pytest.mark.skipif(
+linux = pytest.mark.skipif(
     not sys.platform.startswith("linux") or shutil.which(os.environ.get("CC", "cc")) is None,
     reason="needs Linux and a C compiler (set CC, or install gcc)",
 )
-SOURCE = Path(__file__).parent / "host" / "host.c"
+pytestmark = linux
 STEPS = 200
 EXCHANGES = 6
 FORCE = "pantograph[1].contact.force"
 LIBPYTHON = Path(sysconfig.get_config_var("LIBDIR") or "") / (sysconfig.get_config_var("INSTSONAME") or "none")
-
-
-@pytest.fixture(scope="module")
-def host(tmp_path_factory):
-    """The host, compiled with FMPy's copy of the FMI headers."""
-    headers = Path(importlib.util.find_spec("fmpy").origin).parent / "c-code"
-    program = tmp_path_factory.mktemp("host") / "host"
-    command = [os.environ.get("CC", "cc"), "-std=gnu11", "-O1", "-Wall", "-Werror", f"-I{headers}", str(SOURCE)]
-    subprocess.run([*command, "-o", str(program), "-ldl"], check=True)
-    return program
 
 
 @dataclass(frozen=True)
@@ -48,10 +38,19 @@ class Unpacked:
 
     folder: Path
     name: str
+    fmu: Path
 
     @property
     def library(self):
         return self.folder / "binaries" / "linux64" / f"{self.name}.so"
+
+    @property
+    def guid(self):
+        return fmpy.read_model_description(str(self.fmu)).guid
+
+    @property
+    def references(self):
+        return {v.name: v.valueReference for v in fmpy.read_model_description(str(self.fmu)).modelVariables}
 
 
 @pytest.fixture(scope="module")
@@ -65,27 +64,32 @@ def system(packed, tmp_path_factory):
 def unpack(fmu, folder):
     with zipfile.ZipFile(fmu) as file:
         file.extractall(folder / fmu.stem)
-    return Unpacked(folder / fmu.stem, fmu.stem)
+    return Unpacked(folder / fmu.stem, fmu.stem, fmu)
 
 
 @pytest.fixture(scope="module")
-def plain(system, tmp_path_factory):
+def unpacked(system, tmp_path_factory):
     """The scenario's FMUs, unpacked."""
-    folder = tmp_path_factory.mktemp("plain")
+    folder = tmp_path_factory.mktemp("unpacked")
     return [unpack(c.fmu.path, folder) for c in system.components]
 
 
 @pytest.fixture(scope="module")
-def shimmed(system, tmp_path_factory):
-    """The same FMUs with the shim."""
-    built, folder = tmp_path_factory.mktemp("built"), tmp_path_factory.mktemp("shimmed")
-    return [unpack(build(recipe(c.fmu.path.stem), built, shim=True), folder) for c in system.components]
+def stock(system, tmp_path_factory):
+    """The same FMUs with pythonfmu's library alone."""
+    built, folder = tmp_path_factory.mktemp("built"), tmp_path_factory.mktemp("stock")
+    return [unpack(build(recipe(c.fmu.path.stem), built, loader=False), folder) for c in system.components]
+
+
+def order(*words):
+    """An order of the host with words that may hold blanks."""
+    return "\x01".join(map(str, words))
 
 
 def plan(system, unpacked):
     """The host's orders."""
     pairs = zip(unpacked, system.components, strict=True)
-    lines = [f"fmu {u.library} {c.fmu.guid} file://{u.folder}/resources" for u, c in pairs]
+    lines = [order("fmu", u.library, c.fmu.guid, f"file://{u.folder}/resources") for u, c in pairs]
     names = [c.name for c in system.components]
     variables = [c.fmu.variables for c in system.components]
     for i, component in enumerate(system.components):
@@ -124,10 +128,12 @@ def in_python(system):
     return values
 
 
-def run(host, orders, **environment):
+def run_host(host, orders, **environment):
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "LD_"))}
-    clean |= {"OMP_NUM_THREADS": "1", **environment}
-    return subprocess.run([host], input=orders, env=clean, capture_output=True, text=True, check=False)
+    clean |= {"OMP_NUM_THREADS": "1", "PATH": "/usr/bin:/bin", **environment}
+    done = subprocess.run(host, input=os.fsencode(orders), env=clean, capture_output=True, check=False)
+    told = done.stderr.decode("utf-8", "backslashreplace")
+    return subprocess.CompletedProcess(done.args, done.returncode, done.stdout.decode(), told)
 
 
 def numbers(done):
@@ -136,35 +142,36 @@ def numbers(done):
     return [float.fromhex(line) for line in done.stdout.split()]
 
 
-def test_bits_as_in_python_with_the_shim(host, system, shimmed, in_python):
-    """Nothing is preloaded, PATH does not lead to this Python: one variable names it."""
-    assert all(u.library.with_suffix(INNER_SUFFIX).is_file() for u in shimmed)
-    done = run(host, plan(system, shimmed), PATH="/usr/bin:/bin", OPENPANTO_PYTHON=sys.executable)
+def test_bits_as_in_python(host, system, unpacked, in_python):
+    """Nothing is preloaded, PATH does not lead to this Python: one variable names it. The host stays as it was."""
+    assert all(u.library.with_suffix(INNER_SUFFIX).is_file() for u in unpacked)
+    done = run_host(host, plan(system, unpacked), OPENPANTO_PYTHON=sys.executable, HOST_STAYS="1", LC_ALL="C.UTF-8")
     assert numbers(done) == in_python
 
 
-def test_bits_as_in_python_with_the_shim_and_python_on_path(host, system, shimmed, in_python):
-    done = run(host, plan(system, shimmed), PATH=f"{Path(sys.executable).parent}:/usr/bin:/bin")
+def test_bits_as_in_python_with_python_on_path(host, system, unpacked, in_python):
+    done = run_host(host, plan(system, unpacked), PATH=f"{Path(sys.executable).parent}:/usr/bin:/bin")
     assert numbers(done) == in_python
 
 
 @pytest.mark.skipif(not LIBPYTHON.is_file(), reason="this Python has no shared library that could be preloaded")
-def test_bits_as_in_python_without_the_shim(host, system, plain, in_python):
-    """The FMU as built by default: libpython is preloaded, this Python is the first on PATH."""
+@pytest.mark.parametrize("which", ["stock", "unpacked"])
+def test_bits_as_in_python_with_libpython_preloaded(host, system, request, in_python, which):
+    """As FMUs without our loader need it; with it, it does no harm."""
     path = f"{Path(sys.executable).parent}:/usr/bin:/bin"
-    done = run(host, plan(system, plain), PATH=path, LD_PRELOAD=str(LIBPYTHON))
-    assert numbers(done) == in_python
+    orders = plan(system, request.getfixturevalue(which))
+    assert numbers(run_host(host, orders, PATH=path, LD_PRELOAD=str(LIBPYTHON))) == in_python
 
 
 @pytest.mark.parametrize(
     ("python", "text"),
     [("/nowhere/python3", "no Python 3 found"), ("BARE", "lacks the packages numpy and scipy")],
 )
-def test_the_shim_says_what_is_missing(host, system, shimmed, tmp_path, python, text):
+def test_the_loader_says_what_is_missing(host, system, unpacked, tmp_path, python, text):
     if python == "BARE":
         subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "bare")], check=True)
         python = str(tmp_path / "bare" / "bin" / "python")
-    done = run(host, plan(system, shimmed), PATH="/usr/bin:/bin", OPENPANTO_PYTHON=python)
+    done = run_host(host, plan(system, unpacked), OPENPANTO_PYTHON=python)
     assert done.returncode == 1
     assert text in done.stderr
     assert "cannot be instantiated" in done.stderr
@@ -178,10 +185,10 @@ for path in sys.argv[1:]:
 """
 
 
-def test_the_shim_keeps_out_of_the_way_where_the_host_is_python(system, tmp_path):
+def test_the_loader_keeps_out_of_the_way_where_the_host_is_python(system, tmp_path):
     pantograph = system.components[1].fmu.path
-    with_shim = build(recipe(pantograph.stem), tmp_path, shim=True)
-    command = [sys.executable, "-c", _IN_PYTHON, str(pantograph), str(with_shim)]
+    stock = build(recipe(pantograph.stem), tmp_path, loader=False)
+    command = [sys.executable, "-c", _IN_PYTHON, str(pantograph), str(stock)]
     environment = {**os.environ, "OPENPANTO_PYTHON": "/nowhere/python3"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -1,16 +1,19 @@
 """The command line: exit codes and what is said."""
 
 import json
+import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 
-from master import results
+from master import cli, results
 from master.cli import main
 
 ROOT = Path(__file__).parents[2]
+SCENARIOS = ROOT / "ssp_scenarios"
 
 
 @pytest.mark.parametrize(
@@ -108,6 +111,30 @@ def test_parameters_that_cannot_be_set(toy, in_folder, capsys, assignment, text)
     assert not (in_folder / "results").exists()
 
 
+def test_a_standalone_archive_holds_one_python_beside_the_fmus(toy, in_folder, monkeypatch):
+    def write(folder):
+        (folder / "lib").mkdir()
+        (folder / "runtime.txt").write_text("format=1\n")
+        (folder / "lib" / "libpython.so").write_bytes(b"library")
+
+    monkeypatch.setattr(cli, "write_runtime", write)
+    assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 0
+    with zipfile.ZipFile("packed.ssp") as file:
+        assert file.read("resources/runtime/lib/libpython.so") == b"library"
+        assert "SystemStructure.ssd" in file.namelist()
+    assert main(["validate", "packed.ssp", "--no-build"]) == 0
+
+
+def test_why_an_archive_cannot_be_standalone_is_said(toy, in_folder, monkeypatch, capsys):
+    def write(folder):
+        raise ValueError("the Python in /usr has no shared library")
+
+    monkeypatch.setattr(cli, "write_runtime", write)
+    assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 1
+    assert "cannot be standalone: the Python in /usr has no shared library" in capsys.readouterr().err
+    assert not (in_folder / "packed.ssp").exists()
+
+
 def test_a_packed_scenario_runs_like_its_folder(toy, in_folder):
     common = ["--quiet", "--no-report", "--no-build"]
     assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build"]) == 0
@@ -129,6 +156,57 @@ def test_an_fmu_that_is_none(toy, capsys):
     (toy / "resources" / "ToyCatenary.fmu").write_text("not a zip")
     assert main(["validate", str(toy), "--no-build"]) == 1
     assert "is not a readable FMU" in capsys.readouterr().err
+
+
+def _only_for(path, *folders):
+    """Leave an FMU binaries for these platforms only."""
+    with zipfile.ZipFile(path) as file:
+        members = {n: file.read(n) for n in file.namelist() if not n.startswith("binaries/")}
+    members |= {f"binaries/{folder}/{path.stem}.x": b"" for folder in folders}
+    with zipfile.ZipFile(path, "w") as file:
+        for name, data in members.items():
+            file.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    ("folders", "text"),
+    [
+        (["win64"], "holds binaries for win64 only; this machine needs one for "),
+        (["darwin64", "win64"], "holds binaries for darwin64 and win64 only; "),
+        ([], "holds no binaries; "),
+    ],
+)
+def test_an_fmu_for_other_machines_is_found_without_a_run(toy, capsys, folders, text):
+    _only_for(toy / "resources" / "ToyCatenary.fmu", *folders)
+    assert main(["validate", str(toy), "--no-build"]) == 1
+    assert f"component 'catenary': resources/ToyCatenary.fmu {text}" in capsys.readouterr().err
+
+
+def _files(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_validate_writes_nothing_where_fmus_are_missing_or_stale(tmp_path, capsys):
+    scenario = tmp_path / "cx_ln2.ssp"
+    shutil.copytree(SCENARIOS / "cx_ln2.ssp", scenario, ignore=shutil.ignore_patterns("resources"))
+    before = _files(tmp_path)
+    assert main(["validate", str(scenario)]) == 0
+    assert "cx_ln2: valid" in capsys.readouterr().out
+    assert _files(tmp_path) == before
+    assert not (scenario / "resources").exists()
+
+
+def test_an_fmu_of_somebody_with_a_name_of_ours_is_kept(toy, capsys):
+    """The scenario names Pantograph_CX, but what lies there is another model."""
+    path = toy / "SystemStructure.ssd"
+    path.write_text(path.read_text().replace("ToyPantograph.fmu", "Pantograph_CX.fmu"))
+    theirs = (toy / "resources" / "ToyPantograph.fmu").rename(toy / "resources" / "Pantograph_CX.fmu")
+    before = theirs.read_bytes()
+    for command in (["validate", str(toy)], ["pack", str(toy), "--out", str(toy.parent / "x.ssp")]):
+        assert main(command) == 0
+        said = capsys.readouterr()
+        assert "Pantograph_CX.fmu is used as it is: it was not built by this project" in said.out + said.err
+        assert theirs.read_bytes() == before
 
 
 def test_validate_lists_all_problems_with_lines(toy, capsys):

@@ -3,10 +3,21 @@
 import struct
 import subprocess
 import zipfile
+from pathlib import Path
 
 import pytest
 
 from master import store
+
+
+def write_fmu(path, guid, **mark):
+    """Write an FMU that carries our mark."""
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml", f'<fmiModelDescription guid="{{{guid}}}"/>')
+    with zipfile.ZipFile(path) as file:
+        mark = {"format": 1, "guid": guid, "content": store._content_hash(file), **mark}
+    with zipfile.ZipFile(path, "a") as file:
+        file.writestr("resources/openpanto.txt", "".join(f"{key}={value}\n" for key, value in mark.items()))
 
 
 class Builder:
@@ -14,16 +25,17 @@ class Builder:
 
     def __init__(self, fingerprint="AB-12", code=0, said=""):
         self.fingerprint, self.code, self.said = fingerprint, code, said
-        self.asked = []
+        self.asked, self.orders = [], []
+        self.mark = {}
 
     def __call__(self, *arguments, seconds):
         self.asked.append(arguments[0])
+        self.orders.append(arguments)
         if arguments[0] == "fingerprint":
             return subprocess.CompletedProcess(arguments, self.code, self.fingerprint + "\n", self.said)
         if not self.said:
-            name, folder = arguments[4], arguments[2]
-            with zipfile.ZipFile(f"{folder}/{name}.fmu", "w") as file:
-                file.writestr("modelDescription.xml", f'<fmiModelDescription guid="{{{self.fingerprint.lower()}}}"/>')
+            name, folder = arguments[-1], arguments[2]
+            write_fmu(Path(folder) / f"{Path(name).stem}.fmu", self.fingerprint.lower(), **self.mark)
         return subprocess.CompletedProcess(arguments, 1 if self.said else 0, "", self.said)
 
 
@@ -54,6 +66,79 @@ def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
     store.ensure(tmp_path / "X.fmu", print)
     assert builder.asked == ["fingerprint"]
     assert (tmp_path / "X.fmu").read_text() == "foreign"
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"resources/definition.toml": b"mine"}, "it was changed since it was built"),
+        ({"resources/openpanto.txt": None}, "it was not built by this project"),
+        ({"modelDescription.xml": b'<fmiModelDescription guid="{other}"/>'}, "it was changed since it was built"),
+        ({"modelDescription.xml": None}, "it is not an FMU that could be read"),
+    ],
+)
+def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, change, why):
+    path, told = tmp_path / "X.fmu", []
+    store.ensure(path, told.append)
+    with zipfile.ZipFile(path) as file:
+        members = {name: file.read(name) for name in file.namelist()} | change
+    with zipfile.ZipFile(path, "w") as file:
+        for name, data in members.items():
+            if data is not None:
+                file.writestr(name, data)
+    before = path.read_bytes()
+    builder.fingerprint = "CD-34"
+    assert store.ensure(path, told.append) == path
+    assert path.read_bytes() == before
+    assert told[1:] == [f"X.fmu is used as it is: {why}; to have it built anew, remove it"]
+
+
+@pytest.mark.parametrize(("script", "is_ours"), [("X_ab1234567890", True), ("X_cd1234567890", False), ("own", False)])
+def test_older_builds_are_known_by_the_name_of_their_script(builder, tmp_path, script, is_ours):
+    path = tmp_path / "X.fmu"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml", '<fmiModelDescription guid="ab123456-7890-1111"/>')
+        file.writestr("resources/slavemodule.txt", script)
+        file.writestr(f"resources/{script}.py", "")
+    builder.fingerprint = "CD-34"
+    store.ensure(path, lambda _: None)
+    assert builder.asked == (["fingerprint", "build"] if is_ours else ["fingerprint"])
+
+
+def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
+    (tmp_path / "lines").mkdir()
+    (tmp_path / "lines" / "Mine.toml").write_text("")
+    path, told = tmp_path / "Mine.fmu", []
+    write_fmu(path, "ab-12", definition="lines/Mine.toml", pantographs="2")
+    builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
+    store.ensure(path, told.append)
+    assert told == []
+    ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+    assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
+    builder.fingerprint = "CD-34"
+    store.ensure(path, told.append)
+    assert told == ["building Mine.fmu again: its sources have changed"]
+    assert builder.orders[-1][3:] == ports
+    (tmp_path / "lines" / "Mine.toml").unlink()
+    store.ensure(path, told.append)
+    assert "which it was built from, is not there" in told[-1]
+    assert len(builder.asked) == 3
+
+
+def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    assert store.ensure(tmp_path / "X.fmu", lambda _: None, scratch) == scratch / "X.fmu"
+    assert not (tmp_path / "X.fmu").exists()
+
+
+def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypatch):
+    (tmp_path / "slavemodule.txt").write_text("x")
+    (tmp_path / "pythonfmu").mkdir()
+    (tmp_path / "pythonfmu" / "__init__.py").write_text("raise ImportError('of another FMU')")
+    before = store.fingerprint("Pantograph_CX")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert store.fingerprint("Pantograph_CX") == before
 
 
 def test_the_builders_words_are_passed_on(builder, tmp_path):

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import fmpy
 from hypothesis import HealthCheck, settings
 
 #: Inputs tried so far in this process, by kind; `test_total` adds them up.
@@ -126,7 +127,7 @@ Declared = tuple[str, str, str]
 
 
 def make_fmu(path: Path, variables: Sequence[Declared], attributes: str = "", before: str = "") -> Path:
-    """Write an FMU that holds a description only: name, causality and unit of every variable.
+    """Write an FMU that holds a description and an empty library: name, causality and unit of every variable.
 
     ``attributes`` go to every variable, ``before`` stands before the root element.
     """
@@ -142,6 +143,7 @@ def make_fmu(path: Path, variables: Sequence[Declared], attributes: str = "", be
     )
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("modelDescription.xml", xml)
+        file.writestr(f"binaries/{fmpy.platform}/{name}{fmpy.sharedLibraryExtension}", "")
     return path
 
 

@@ -138,7 +138,7 @@ WORDS = ["run", "validate", "pack", "compare", "report", "calibrate", "--step", 
          "--quiet", "--json", "--report", "--contact", "--measured", "--no-build", "jacobi", "0.001", "a.b=1",
          "none.ssp",
          "-x", "--", "", "-", "nan", "1e999", "\x1b[2J", "ä", "../..", "a" * 300, "statics", "couple", "LN2.toml",
-         "--fix", "doctor", "fingerprint", "--pantographs", "--shim", "%s%n", "\udcff"]  # fmt: skip
+         "--fix", "doctor", "fingerprint", "--pantographs", "--standalone", "%s%n", "\udcff"]  # fmt: skip
 
 
 @pytest.mark.parametrize("who", MAINS)

@@ -322,6 +322,13 @@ def test_files_that_are_no_fmu(tmp_path, data):
 DANGEROUS = {"eval", "exec", "compile", "__import__"}
 DANGEROUS_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal", "joblib", "yaml", "jsonpickle"}
 DANGEROUS_ATTRIBUTES = {("np", "load"), ("numpy", "load"), ("os", "system"), ("os", "popen"), ("torch", "load")}
+#: What is looked at before it is read: numba keeps machine code as pickles. Owner, rights and checksum of a file come
+#: first (`tests/models/numerics/test_kernel_cache.py`, `tests/robustness/test_caches.py`).
+#: A runtime compiles modules of the Python, numpy and scipy that it is made of, which the builder runs anyway.
+GUARDED = {
+    "models/numerics/kernel_cache.py": ["pickle"],
+    "fmus/loader/runtime.py": ["marshal", "compile"],
+}
 SOURCES_OF_THE_PACKAGES = [p for package in ("models", "fmus",
     "master") for p in sorted((ROOT / package).rglob("*.py"))]
 
@@ -354,7 +361,8 @@ def _dangerous_call(node):
 
 @pytest.mark.parametrize("path", SOURCES_OF_THE_PACKAGES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_nothing_that_is_read_is_run(path):
-    assert list(dangers(ast.parse(path.read_text(encoding="utf-8")))) == []
+    guarded = GUARDED.get(path.relative_to(ROOT).as_posix(), [])
+    assert list(dangers(ast.parse(path.read_text(encoding="utf-8")))) == guarded
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -387,23 +387,40 @@ class _Reader:
             given["axis_i"] = self._axis(table, "axis_i")
         if kind in _WITH_AXIS_J:
             given["axis_j"] = self._axis(table, "axis_j")
-        body_i = "" if kind == "prescribed_motion" else table.text("body_i")
-        return Joint(name, kind, body_i, table.text("body_j"), **given)
+        body_i = "" if kind == "prescribed_motion" else self._body_name(table, "body_i")
+        return Joint(name, kind, body_i, self._body_name(table, "body_j"), **given)
+
+    def _body_name(self, table: Table, key: str) -> str:
+        """Read which body is meant; that there is one of the name is checked when all are known."""
+        name = table.text(key)
+        if not name and isinstance(table.data.get(key), str):
+            table.problem(key, "names no body: it is empty")
+        return name
 
     def _force(self, name: str, table: Table) -> Force:
         kind = table.text("kind", choices=FORCE_KINDS)
         if kind == "joint_friction":
             return self._friction(name, table)
-        given: dict[str, Any] = {"body_i": table.text("body_i"), "body_j": table.text("body_j")}
+        given: dict[str, Any] = {key: self._body_name(table, key) for key in ("body_i", "body_j")}
         if kind != "actuator_moment":
             for side in ("i", "j"):
                 given[f"point_{side}"] = self.triple(
                     table, f"point_{side}", "m", f"{name}: point on body {side}", _PLACE
                 )
-        reader = getattr(self, f"_{kind}", None)
-        if reader is not None:
-            given |= reader(name, table)
+        if kind in FORCE_KINDS:  # of another the table has told already
+            given |= self._force_readers[kind](name, table)
         return Force(name, kind, **given)
+
+    @property
+    def _force_readers(self) -> dict[str, Callable[[str, Table], dict[str, Any]]]:
+        """What reads the values of a force of each kind, but for the friction of a joint."""
+        return {
+            "spring_damper": self._spring_damper,
+            "actuator_force": self._actuator_force,
+            "actuator_moment": self._actuator_moment,
+            "bump_stop": self._bump_stop,
+            "bushing": self._bushing,
+        }
 
     def _direction(self, table: Table) -> dict[str, Any]:
         return {"direction": self._axis(table, "direction") if table.has("direction") else None}
@@ -415,8 +432,13 @@ class _Reader:
             table.problem("free_length", "is given although the spring is set to carry the weights")
         if not carries:
             length = self.number(table, "free_length", "m", f"{name}: length without force", _LENGTH, default=0.0)
+        if not (table.has("stiffness") or table.has("damping")):
+            table.problem("", "needs a stiffness or a damping: without either it does nothing")
+        stiffness = self.number(table, "stiffness", "N/m", f"{name}: stiffness", _STIFFNESS, default=0.0)
+        if carries and stiffness == 0.0:
+            table.problem("stiffness", "must be greater than 0: a spring set to carry the weights has to give way")
         return self._direction(table) | {
-            "stiffness": self.number(table, "stiffness", "N/m", f"{name}: stiffness", _STIFFNESS, default=0.0),
+            "stiffness": stiffness,
             "damping": self.number(table, "damping", "N.s/m", f"{name}: damping", _DAMPING, default=0.0),
             "free_length": length,
         }
@@ -470,7 +492,7 @@ class _Reader:
         if table is None:
             return None
         return Strip(
-            table.text("body"),
+            self._body_name(table, "body"),
             self.number(table, "height", "m", "height of the strip above its body's centre", _LENGTH, default=0.0),
         )
 
@@ -479,7 +501,7 @@ class _Reader:
         if table is None:
             return Assembly("", "", 0.02)
         return Assembly(
-            table.text("body", default=""),
+            self._body_name(table, "body") if table.has("body") else "",
             table.text("coordinate", default="z", choices=COORDINATES),
             table.quantity("largest_gap", "m", default=0.02, minimum=_GAP.minimum, maximum=_GAP.maximum),
         )
@@ -583,6 +605,10 @@ class _Reader:
             if body and body not in names:
                 listed = ", ".join(sorted(names))
                 self.root.problem(f"{where}.{key}", f"there is no body '{body}' (bodies: {listed})")
+        driven = {j.body_j for j in d.joints if j.kind == "prescribed_motion"}
+        if d.strip is not None and d.strip.body in driven:
+            text = f"body '{d.strip.body}' has a prescribed motion; put the strip on one that the contact can move"
+            self.root.problem("strip.body", text)
         self._check_pairs(d)
         self._check_friction(d)
 

@@ -1,7 +1,8 @@
 /* A small FMI 2.0 host in plain C, which drives FMUs as a tool does that is not Python.
  *
  * It reads a plan on standard input, one order a line:
- *     fmu LIBRARY GUID RESOURCES          the next FMU
+ *     fmu LIBRARY GUID RESOURCES          the next FMU; byte 1 between, for paths hold anything else
+ *     refuse LIBRARY GUID RESOURCES       an FMU that is to make no instance ("-": NULL); says what it made, twice
  *     parameter FMU REFERENCE VALUE
  *     connect FMU OUTPUT FMU INPUT        FMUs count from 0
  *     observe FMU REFERENCE
@@ -11,6 +12,8 @@
  * taken over by the other system, instances reset. It prints the observed values of every step as hexadecimal numbers.
  */
 #include <dlfcn.h>
+#include <locale.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -109,6 +112,14 @@ static void load(Fmu *fmu, const char *path) {
     fmu->deserialise = find(l, "fmi2DeSerializeFMUstate");
 }
 
+static void refuse(Fmu *f) {
+    const char *guid = strcmp(f->guid, "-") ? f->guid : NULL;
+    const char *resources = strcmp(f->resources, "-") ? f->resources : NULL;
+    fmi2Component made = f->instantiate("part", fmi2CoSimulation, guid, resources, &callbacks, fmi2False, fmi2False);
+    puts(made ? "an instance" : "NULL");
+    if (made) f->free(made);
+}
+
 static void read_plan(void) {
     char line[8192], path[4096];
     while (fgets(line, sizeof line, stdin)) {
@@ -116,7 +127,10 @@ static void read_plan(void) {
         Parameter *p = &parameters[parameter_count];
         Wire *w = &wires[wire_count];
         Place *o = &places[place_count];
-        if (sscanf(line, "fmu %4095s %127s %4095s", path, f->guid, f->resources) == 3) load(f, path), fmu_count++;
+        if (sscanf(line, "fmu\1%4095[^\1]\1%127[^\1]\1%4095[^\n]", path, f->guid, f->resources) == 3)
+            load(f, path), fmu_count++;
+        else if (sscanf(line, "refuse\1%4095[^\1]\1%127[^\1]\1%4095[^\n]", path, f->guid, f->resources) == 3)
+            load(f, path), refuse(f), refuse(f), exit(0);
         else if (sscanf(line, "parameter %d %u %lf", &p->fmu, &p->reference, &p->value) == 3) parameter_count++;
         else if (sscanf(line, "connect %d %u %d %u", &w->from, &w->output, &w->to, &w->input) == 4) wire_count++;
         else if (sscanf(line, "observe %d %u", &o->fmu, &o->reference) == 2) place_count++;
@@ -226,9 +240,19 @@ static void release(System *s, fmi2FMUstate *states) {
     for (int i = 0; i < fmu_count; i++) check(fmus[i].release(s->part[i], &states[i]), "freeing a state");
 }
 
+/* What a library may not change in its host. */
+static void check_host(const struct sigaction *before) {
+    struct sigaction interrupt;
+    sigaction(SIGINT, NULL, &interrupt);
+    if (interrupt.sa_handler != before->sa_handler) die("the host's handler of SIGINT was replaced");
+    if (strcmp(setlocale(LC_ALL, NULL), "C")) die("the host's locale was changed to %s", setlocale(LC_ALL, NULL));
+}
+
 int main(void) {
     System one, two;
     fmi2FMUstate states[8];
+    struct sigaction before;
+    sigaction(SIGINT, NULL, &before);
     read_plan();
     double *table = calloc((size_t)steps * place_count, sizeof *table);
     double *again = calloc((size_t)steps * place_count, sizeof *again);
@@ -263,6 +287,7 @@ int main(void) {
     advance(&one, 0, 2, again);
     same(table, again, 0, 2, "instances made after the first ones were freed");
     finish(&one);
+    if (getenv("HOST_STAYS")) check_host(&before);
     for (int n = 0; n < steps * place_count; n++) printf("%a\n", table[n]);
     return 0;
 }

@@ -1,6 +1,6 @@
 """Asked of the Python that an FMU would run in; prints one answer a line.
 
-The shim carries this text: no single quotes, no backslashes, nothing that Python 3.8 does not know.
+The loader carries this text. Nothing that Python 3.8 does not know.
 """
 
 import importlib.util

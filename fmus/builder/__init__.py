@@ -1,0 +1,1 @@
+"""From a definition and the sources to one archive."""

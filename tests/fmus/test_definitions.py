@@ -1,0 +1,104 @@
+"""FMUs of a user's own definitions, and the mark that says whose an FMU is."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+
+import pytest
+
+from fmus.__main__ import main
+from fmus.build import MARK, BuildError, build, content_hash, fingerprint, recipe
+from master import store
+from models.library import line_path, pantograph_path
+from tests.fmus.support import Instance
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Definitions of a user: a line and two kinds of pantograph."""
+    folder = tmp_path / "my definitions"
+    folder.mkdir()
+    shutil.copy(line_path("C270"), folder / "Mine.toml")
+    shutil.copy(pantograph_path("CX"), folder / "Light.toml")
+    shutil.copy(pantograph_path("CX_multibody"), folder / "Bodies.toml")
+    return folder
+
+
+def test_a_file_becomes_an_fmu_of_its_name(own, tmp_path, capsys):
+    words = [str(own / f"{name}.toml") for name in ("Light", "Bodies")]
+    assert main(["build", *words, "--out", str(tmp_path / "out")]) == 0
+    built = [tmp_path / "out" / f"Pantograph_{name}.fmu" for name in ("Light", "Bodies")]
+    assert capsys.readouterr().out.split() == [str(path) for path in built]
+    instance = Instance(built[0])
+    instance.initialise(**{"contact.force": 100.0})
+    instance.step(0.0)
+    assert instance["A.z"] < 5.02
+    instance.free()
+
+
+def test_a_line_gets_as_many_ports_as_wanted(own, tmp_path, capsys):
+    assert main(["build", str(own / "Mine.toml"), "--pantographs", "2", "--out", str(tmp_path)]) == 0
+    path = tmp_path / "Catenary_Mine_P2.fmu"
+    assert capsys.readouterr().out.strip() == str(path)
+    assert main(["fingerprint", "--pantographs", "2", str(own / "Mine.toml")]) == 0
+    guid = capsys.readouterr().out.strip()
+    mark = store.read_mark(path)
+    assert (mark["guid"], mark["definition"], mark["pantographs"]) == (guid, "my definitions/Mine.toml", "2")
+    assert store.why_not_ours(path) == ""
+
+
+def test_the_guid_follows_the_file_and_not_its_place(own, tmp_path):
+    path = own / "Light.toml"
+    before = fingerprint(recipe(str(path)))
+    (tmp_path / "other").mkdir()
+    shutil.copy(path, tmp_path / "other")
+    assert fingerprint(recipe(str(tmp_path / "other" / "Light.toml"))) == before
+    path.write_text(path.read_text().replace("168", "170"))
+    assert fingerprint(recipe(str(path))) != before
+
+
+def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
+    path, told = build(recipe(str(own / "Light.toml")), tmp_path), []
+    assert store.ensure(path, told.append) == path
+    assert told == []
+    (own / "Light.toml").write_text((own / "Light.toml").read_text().replace("168", "170"))
+    store.ensure(path, told.append)
+    assert told == ["building Pantograph_Light.fmu again: its sources have changed"]
+    assert store.stored_guid(path) == fingerprint(recipe(str(own / "Light.toml")))
+    store.ensure(path, told.append)
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("none.toml", None, "cannot be read (No such file or directory)"),
+        ("broken.toml", "type = ", "is not a TOML file"),
+        ("other.toml", 'type = "boat"', "defines neither a line"),
+        ("two words.toml", 'type = "lumped"', "may hold letters, digits and _ only"),
+        ("b\u00fcgel.toml", 'type = "lumped"', "may hold letters, digits and _ only"),
+        ("empty.toml", 'type = "lumped"', "Pantograph_empty cannot be built"),
+    ],
+)
+def test_what_is_no_definition_is_refused_in_words(tmp_path, capsys, name, text, said):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    assert main(["build", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
+
+
+def test_a_pantograph_has_no_ports(own):
+    with pytest.raises(BuildError, match="only lines have pantograph ports"):
+        recipe(str(own / "Light.toml"), 2)
+
+
+def test_the_mark_holds_the_hash_of_all_other_files(tmp_path):
+    with zipfile.ZipFile(build(recipe("Pantograph_CX"), tmp_path)) as file:
+        files = {name: file.read(name) for name in file.namelist()}
+    mark = dict(line.split("=", 1) for line in files[MARK].decode().splitlines())
+    assert mark["content"] == content_hash(files)
+    assert content_hash({**files, "resources/definition.toml": b""}) != mark["content"]
+    assert "definition" not in mark  # of the library

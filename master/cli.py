@@ -381,8 +381,8 @@ def _show_verdict(console: Console, assessment: Assessment, settings: Evaluation
     if rows := report.filter_rows(assessment.quality, settings.filter):
         console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
         console.print(report.plain_table(report.FILTER_HEADS, rows))
-    if assessment.drift:
-        console.print(f"warning: {assessment.contact.pantograph}: {assessment.drift}", markup=False, soft_wrap=True)
+    for warning in assessment.warnings:
+        console.print(f"warning: {assessment.contact.pantograph}: {warning}", markup=False, soft_wrap=True)
 
 
 def _closing_lines(done: Results) -> list[str]:

@@ -54,11 +54,37 @@ def filter_note(runs: Sequence[Results]) -> str:
     told = [run.evaluation.filter.short for run in runs]
     if len(set(told)) < 2:
         return ""
-    named = "; ".join(f"{run.folder.name}: {text}" for run, text in zip(runs, told, strict=True))
     return (
-        f"the filters differ ({named}), so the figures do even for the same force; "
+        f"the filters differ ({_told(runs, told)}), so the figures do even for the same force; "
         "differences of the forces are taken with the first one's"
     )
+
+
+def setting_notes(runs: Sequence[Results]) -> tuple[str, ...]:
+    """Return a sentence for each setting in which runs differ that are evaluated differently for it."""
+    intervals = [_interval_words(run.evaluation.interval) for run in runs]
+    limits = [run.evaluation.limits for run in runs]
+    found = [filter_note(runs)]
+    if len(set(intervals)) > 1:
+        told = _told(runs, intervals)
+        found.append(
+            f"the intervals of interest differ ({told}), so the figures are of other parts of the line; "
+            "differences of the forces are taken in the first one's"
+        )
+    if len(set(limits)) > 1:
+        told = _told(runs, [choice.title for choice in limits])
+        found.append(f"the runs are judged by other limits ({told}), so a verdict may differ for the same figures")
+    return tuple(filter(None, found))
+
+
+def _told(runs: Sequence[Results], texts: Sequence[str]) -> str:
+    return "; ".join(f"{run.folder.name}: {text}" for run, text in zip(runs, texts, strict=True))
+
+
+def _interval_words(interval: tuple[float | None, float | None]) -> str:
+    start, end = interval
+    begin = "settled contact" if start is None else f"{start:g} m"
+    return f"{begin} to {'the end of the run' if end is None else f'{end:g} m'}"
 
 
 def _difference(a: Results, b: Results, first: Assessment, second: Assessment) -> tuple[float | None, float | None]:

@@ -138,6 +138,9 @@ class Results:
     @property
     def verdict_withheld(self) -> str:
         """Why figures are given without a verdict, empty if they are given with one."""
+        status = str(self.summary.get("status") or "complete")
+        if status != "complete":
+            return f"the run {_ENDS.get(status, f'is {status}')}; these are its figures so far"
         beyond = [b.what for b in self.balances if b.exceeded is not None]
         return f"the energy of {', '.join(beyond)} does not balance; try a smaller --step" if beyond else ""
 
@@ -329,6 +332,10 @@ def _summary(folder: Path) -> dict[str, Any]:
     return found
 
 
+#: How runs end that are not complete.
+_ENDS: Final = {"running": "was not finished", "failed": "has failed", "interrupted": "was interrupted"}
+
+
 def figures(done: Results) -> dict[str, Any]:
     """Return the figures, verdicts, events and energy balances for summary.json."""
     events = done.events
@@ -353,6 +360,8 @@ def _assessed(a: Assessment) -> dict[str, Any]:
         "slack_droppers": a.slack,
         "spans": [asdict(s) for s in a.spans],
         "drift": a.drift,
+        "early": a.early,
+        "unchecked": a.unchecked,
         "criteria": [{**asdict(c), "verdict": c.word} for c in a.criteria],
         "passed": None if a.withheld else a.passed,
         "withheld": a.withheld,

@@ -374,11 +374,14 @@ class _Session:
 
     def conclude(self, outcome: Outcome, recordings: tuple[Recording, ...]) -> Results:
         """Write the summary and return the results, of what is in the files."""
-        description = {**_description(self._system, self._identity), **self._not_judged(outcome, recordings[0])}
+        description = {
+            **_description(self._system, self._identity),
+            **_ending(outcome),
+            **self._not_judged(outcome, recordings[0]),
+        }
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
             **description,
-            **_ending(outcome),
             **_origin(self._manner.continuation),
             **results.figures(done),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],

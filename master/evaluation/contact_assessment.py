@@ -11,9 +11,9 @@ import numpy as np
 
 from master.arrays import FloatArray
 from master.contacts import Contact, leading_first, running_position
-from master.evaluation.contact_quality import Quality, figures_of
-from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals
-from master.evaluation.en50367_limits import Criterion, judge
+from master.evaluation.contact_quality import Quality, early_warning, figures_of
+from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, settling_of
+from master.evaluation.en50367_limits import HEIGHT_RANGE, UPLIFT, Criterion, judge
 from master.evaluation.filters import evaluated, stands_in
 from master.line import Geometry, Uplift, indexed, met, passages, period_of, support_uplifts
 from master.recorder import Recording
@@ -28,6 +28,11 @@ _SHORTEST_SPAN: Final = 10.0
 _DRIFT_SHARE: Final = 0.1
 _DRIFT_CORRELATION: Final = 0.8
 _FEWEST_SPANS: Final = 3
+#: Limits that need more than the contact force, each with what is said where that is missing.
+_NEEDED: Final = {
+    UPLIFT: f"{UPLIFT}, for no support of the interval has a recorded uplift",
+    HEIGHT_RANGE: f"{HEIGHT_RANGE}, for the height of the contact point is not recorded",
+}
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,8 @@ class Assessment:
         Every whole span after the contact has settled.
     withheld : str
         Why there is no verdict; there are no criteria then. Empty if there is one.
+    early : str
+        A warning if the interval begins while the pantograph is still being raised; else empty.
     """
 
     contact: Contact
@@ -84,6 +91,24 @@ class Assessment:
     slack: float | None = None
     spans: tuple[SpanFigures, ...] = ()
     withheld: str = ""
+    early: str = ""
+
+    @property
+    def unchecked(self) -> str:
+        """Which limits the verdict says nothing of, because nothing was recorded to hold them to; else empty."""
+        held = {c.name for c in self.criteria}
+        missing = [] if self.withheld else [why for name, why in _NEEDED.items() if name not in held]
+        return f"not checked: {'; '.join(missing)}" if missing else ""
+
+    @property
+    def at_limit(self) -> tuple[str, ...]:
+        """What passes only as being at its limit."""
+        return tuple(c.name for c in self.criteria if c.is_at_limit)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the figures and the verdict do not say themselves, and a reader has to know."""
+        return tuple(filter(None, (self.early, self.drift, self.unchecked)))
 
     @property
     def passed(self) -> bool:
@@ -149,6 +174,7 @@ def _assessment(
         supports=len(inside),
         slack=slack_share(line.recordings, line.geometry, s.contact, followers.get(s.contact), limits),
         spans=tuple(_spans(s, line.geometry, limits)),
+        early=early_warning(s.sampled, settling_of(s.raw, s.time, settings)),
     )
 
 

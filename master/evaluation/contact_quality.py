@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
-from master.evaluation.filters import ForceFilter, band_pass, evaluated, low_pass
+from master.evaluation.filters import SETTLING, ForceFilter, band_pass, evaluated, low_pass
 
 #: Bands whose standard deviation is reported [Hz].
 BANDS: Final = ((0.0, 2.0), (0.0, 5.0), (5.0, 20.0))
@@ -85,10 +86,20 @@ class Quality:
     others: tuple[Filtered, ...]
 
     @property
+    def sigma_share(self) -> float:
+        """Sigma over mean; infinite where the mean is not above zero."""
+        return sigma_share(self.mean, self.sigma)
+
+    @property
     def told(self) -> tuple[Filtered, ...]:
         """The other filters' figures if maximum or minimum moves by more than `TOLD_SHARE`, else nothing."""
         pairs = [(o.maximum, self.maximum) for o in self.others] + [(o.minimum, self.minimum) for o in self.others]
         return self.others if any(abs(a - b) > TOLD_SHARE * abs(b) for a, b in pairs) else ()
+
+
+def sigma_share(mean: float, sigma: float) -> float:
+    """Return sigma over mean; infinite where the mean is not above zero."""
+    return sigma / mean if mean > 0.0 else math.inf
 
 
 def find_losses(force: FloatArray, step: float) -> Losses:
@@ -204,6 +215,35 @@ def figures_of(record: Sampled, chosen: ForceFilter, contact: int = 1) -> Qualit
         histogram_edges=tuple(float(e) for e in edges),
         histogram_share=tuple(float(c) for c in counts / len(cut)),
         others=tuple(_under(record, other) for other in chosen.others),
+    )
+
+
+def early_warning(record: Sampled, settling: float = SETTLING) -> str:
+    """Return a warning if samples count before the contact has settled; empty if none do.
+
+    Parameters
+    ----------
+    record : Sampled
+    settling : float
+        How long after the first contact it has settled [s].
+
+    Examples
+    --------
+    >>> x = np.linspace(0.0, 300.0, 301)
+    >>> force = np.ones(301)
+    >>> [early_warning(Sampled(force, x, 0.01, x > first)) for first in (100.0, 90.0)]  # doctest: +ELLIPSIS
+    ['', 'the interval of interest begins at 91 m, less than 1 s after the first contact: ...']
+    """
+    settled = evaluated(record.force, record.position, record.step, (None, None), settling)
+    if not np.any(record.inside & ~settled):
+        return ""
+    begins = f"the interval of interest begins at {record.position[record.inside][0]:.6g} m"
+    if not settled.any():
+        within = f"the run ends within {settling:g} s of the first contact"
+        return f"{begins}, and {within}: the raising is part of the figures"
+    return (
+        f"{begins}, less than {settling:g} s after the first contact: the raising is part of the figures; let the "
+        f"pantograph start earlier, or the interval begin at {record.position[settled][0]:.6g} m or later"
     )
 
 

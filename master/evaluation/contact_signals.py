@@ -96,11 +96,17 @@ def _has_force(recording: Recording, contact: Contact) -> bool:
     return contact.force in recording and recording.units[recording.names.index(contact.force)] in _FORCE_UNITS
 
 
+def settling_of(force: FloatArray, time: FloatArray, settings: EvaluationSettings) -> float:
+    """Return how long after its first contact a record has settled [s]: 0 for one that goes on in contact."""
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    goes_on = settings.begin is not None and time[0] > settings.begin + 0.5 * step and force[0] > 0.0
+    return 0.0 if goes_on else SETTLING
+
+
 def contact_signals(recording: Recording, contact: Contact, settings: EvaluationSettings) -> Signals:
     """Return the signals of one contact."""
     step = float(recording.time[-1] - recording.time[0]) / (len(recording.time) - 1)
     position, force = track_position(recording, contact), recording[contact.force]
-    goes_on = settings.begin is not None and recording.time[0] > settings.begin + 0.5 * step and force[0] > 0.0
     has_height = contact.point("z") in recording
     return Signals(
         contact,
@@ -108,7 +114,7 @@ def contact_signals(recording: Recording, contact: Contact, settings: Evaluation
         position,
         force,
         low_pass(force, step, settings.filter),
-        evaluated(force, position, step, settings.interval, 0.0 if goes_on else SETTLING),
+        evaluated(force, position, step, settings.interval, settling_of(force, recording.time, settings)),
         np.where(force > 0.0, recording[contact.point("z")], np.nan) if has_height else None,
         lateral_position(recording, contact),
         step,

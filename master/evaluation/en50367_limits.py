@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Final, Literal
 
-from master.evaluation.contact_quality import Filtered, Quality
+from master.evaluation.contact_quality import Filtered, Quality, sigma_share
 
 Supply = Literal["AC", "DC3", "DC1.5"]
 SUPPLIES: Final[dict[Supply, str]] = {"AC": "AC", "DC3": "DC 3 kV", "DC1.5": "DC 1.5 kV"}
@@ -126,6 +126,9 @@ class Criterion:
 
 
 _AT: Final = "at the limit"
+#: Names of the limits that need more than the contact force.
+UPLIFT: Final = "uplift at supports"
+HEIGHT_RANGE: Final = "contact height range"
 
 
 def limits_at(speed: float, choice: LimitChoice) -> Limits:
@@ -192,9 +195,9 @@ def judge(quality: Quality, choice: LimitChoice, uplifts: Sequence[float] = ()) 
     nq = quality.losses.nq
     rows.append(_at_most("NQ (estimate)", f"{nq:.2f} %", f"<= {limits.nq.value:g} %", nq, limits.nq))
     if uplifts:
-        rows.append(_millimetres("uplift at supports", max(uplifts), limits.uplift))
+        rows.append(_millimetres(UPLIFT, max(uplifts), limits.uplift))
     if quality.contact_height_range is not None:
-        rows.append(_millimetres("contact height range", quality.contact_height_range, limits.height_range))
+        rows.append(_millimetres(HEIGHT_RANGE, quality.contact_height_range, limits.height_range))
     return tuple(rows)
 
 
@@ -253,7 +256,7 @@ def _force_rows(limits: Limits) -> tuple[_ForceRow, ...]:
 
 
 def _share(figures: Filtered) -> float:
-    return figures.sigma / figures.mean if figures.mean > 0 else math.inf
+    return sigma_share(figures.mean, figures.sigma)
 
 
 def _statistical_minimum(figures: Filtered) -> float:

@@ -26,7 +26,8 @@ def shortfall(recording: Recording, contacts: Iterable[Contact], interval: Inter
 
     Examples
     --------
-    >>> run = Recording(np.array([0.0, 1.0]), ("c.force", "c.x"), ("N", "m"), np.array([[1.0, 40.0], [1.0, 90.0]]))
+    >>> x = np.linspace(40.0, 90.0, 51)
+    >>> run = Recording(x / 50.0, ("c.force", "c.x"), ("N", "m"), np.column_stack((np.ones(51), x)))
     >>> shortfall(run, [Contact(1, "line", "train", "c")], (50.0, 100.0))
     "the run ends with 'train' at 90 m, before the end of the interval of interest, 100 m"
     """
@@ -43,7 +44,8 @@ def _place(recording: Recording, contact: Contact) -> FloatArray:
 
 def _lacking(x: FloatArray, pantograph: str, interval: Interval) -> str:
     start, end = interval
-    stride = float(np.abs(np.diff(x)).max(initial=0.0))  # a bound between two samples has been passed
+    # A bound between two samples has been passed; one jump of a position is no stride.
+    stride = float(np.median(np.abs(np.diff(x)))) if len(x) > 1 else 0.0
     first, last = float(x.min()), float(x.max())
     if end is not None and last + stride < end:
         where = f"{x[-1]:.6g} m, before the end of the interval of interest, {end:g} m"

@@ -68,10 +68,12 @@ def _claimed(folder: Path) -> Iterator[None]:
 
 
 def _warn_of_open_runs(runs: Sequence[Results]) -> None:
-    """Say which runs were ended before they could say how: what they show is a part."""
+    """Say which runs are not complete: what they show is a part."""
     for done in runs:
-        if done.summary.get("status") == "running":
-            text = f"warning: the run in {done.folder} was ended before it had finished; figures are of what it left"
+        status = done.summary.get("status") or "complete"
+        if status != "complete":
+            how = "was ended before it had finished" if status == "running" else f"is {status}"
+            text = f"warning: the run in {done.folder} {how}; figures are of what it left"
             Terminal(stderr=True).print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
 
 
@@ -96,7 +98,11 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
 
 def _say_measured(measured: Comparison) -> None:
     rows = tables.plain_table(("low-passed", "simulated", "measured", "difference"), report.comparison_rows(measured))
-    Terminal(width=_WIDTH, highlight=False).print(rows)
+    console = Terminal(width=_WIDTH, highlight=False)
+    console.print(rows)
+    console.print(f"compared from {measured.start:.1f} m to {measured.end:.1f} m", markup=False)
+    for warning in measured.warnings:
+        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
 
 
 def _film(done: Results, options: argparse.Namespace) -> Path:
@@ -136,7 +142,7 @@ def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]]
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
     console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
-    if note := compare.filter_note(runs):
+    for note in compare.setting_notes(runs):
         console.print(f"warning: {note}", markup=False, soft_wrap=True)
     for folder, differences in zip(options.others, pairs, strict=True):
         for c in differences:
@@ -153,5 +159,6 @@ def _as_json(c: compare.Comparison, first: Results, other: Results) -> Mapping[s
     difference = {n: getattr(two, n) - getattr(one, n) for n in names}
     filters = [run.evaluation.filter.short for run in (first, other)]
     same = len(set(filters)) == 1
-    known = {"contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
+    notes = list(compare.setting_notes([first, other]))
+    known = {"notes": notes, "contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
     return {**known, "filters": filters, "same_filter": same}

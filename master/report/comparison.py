@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.compare import filter_note
+from master.compare import setting_notes
 from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import Signals
@@ -116,6 +116,7 @@ def comparison_page(runs: Sequence[Results]) -> str:
         f"<h1>{markup.text(' | '.join(dict.fromkeys(names)))}</h1>",
         *(f"<p class='note'>{markup.text(r.folder.name)}</p>{note}" for r in runs if (note := status_note(r.summary))),
         *map(_verdict, found),
+        *(f"<p class='warning'>Warning: {markup.text(note)}.</p>" for note in setting_notes(runs)),
         "<h2>Figures</h2>",
         markup.table(["figure, low-passed", *names], _rows_with_differences(found)),
         f"<p class='note'>In brackets: difference from {markup.text(names[0])}. {_filters(runs)}</p>",
@@ -128,14 +129,12 @@ def comparison_page(runs: Sequence[Results]) -> str:
 
 
 def _verdict(c: Column) -> str:
-    return markup.verdict(c.assessment, c.name, c.run.evaluation.limits, c.run.summary.get("status") == "complete")
+    return markup.verdict(c.assessment, c.name, c.run.evaluation.limits)
 
 
 def _filters(runs: Sequence[Results]) -> str:
-    """Return which filter all runs were evaluated with, or a warning that it is not one."""
-    if note := filter_note(runs):
-        return f"<b>Warning:</b> {markup.text(note)}."
-    return f"Filter: {markup.text(runs[0].evaluation.filter.sentence)}."
+    """Return which filters the runs were evaluated with."""
+    return f"Filter: {markup.text('; '.join(dict.fromkeys(run.evaluation.filter.sentence for run in runs)))}."
 
 
 def _rows_with_differences(found: Sequence[Column]) -> list[tuple[str, ...]]:

@@ -101,27 +101,29 @@ def mark(criterion: Criterion) -> str:
     return f"<span class='{kind}'>{sign}<span class='word'> {criterion.word}</span></span>"
 
 
-def badge(passed: bool, title: str, complete: bool = True) -> str:
-    """Return the verdict as a whole."""
-    word = ("\u2713 passed" if passed else "\u2717 failed") + ("" if complete else " so far")
-    return f"<span class='badge {'pass' if passed else 'fail'}'>{text(title)} {word}</span>"
+def badge(passed: bool, title: str, at_limit: Sequence[str] = ()) -> str:
+    """Return the verdict as a whole, with what passes only as being at its limit."""
+    word = "\u2713 passed" if passed else "\u2717 failed"
+    aside = f", at the limit: {', '.join(at_limit)}" if passed and at_limit else ""
+    return f"<span class='badge {'pass' if passed else 'fail'}'>{text(title)} {word}{text(aside)}</span>"
 
 
-def verdict(assessment: Assessment, name: str, limits: LimitChoice, complete: bool = True) -> str:
+def verdict(assessment: Assessment, name: str, limits: LimitChoice) -> str:
     """Return the first screen of one contact: verdict and headline figures."""
     q = assessment.quality
     where = f"{q.start:.1f} m to {q.end:.1f} m at {3.6 * q.speed:.1f} km/h"
-    word = no_badge(limits.title) if assessment.withheld else badge(assessment.passed, limits.title, complete)
+    passed, at_limit = assessment.passed, assessment.at_limit
+    word = no_badge(limits.title) if assessment.withheld else badge(passed, limits.title, at_limit)
     aside = f"<span class='note'>{where}</span>{_broken(assessment)}"
     head = f"<div class='verdict'><b>{text(name)}</b> {word} {aside}</div>"
     tiles = "".join(
-        f"<div class='tile'><div class='name'><span>{text(h.name)}</span>{_sign(h.passed)}</div>"
+        f"<div class='tile'><div class='name'><span>{text(h.name)}</span>{_sign(h.passed, h.is_at_limit)}</div>"
         f"<div class='value'>{text(h.value)} <small>{text(h.unit)}</small></div>"
         f"<div class='limit'>{signs(h.limit)}</div></div>"
         for h in headlines(assessment, limits)
     )
-    drift = f"<p class='warning'>{text(assessment.drift)}</p>" if assessment.drift else ""
-    return f"{head}<div class='tiles'>{tiles}</div>{drift}"
+    warnings = "".join(f"<p class='warning'>{text(w)}</p>" for w in assessment.warnings)
+    return f"{head}<div class='tiles'>{tiles}</div>{warnings}"
 
 
 def _broken(assessment: Assessment) -> str:
@@ -131,9 +133,11 @@ def _broken(assessment: Assessment) -> str:
     return f" <span class='fail'>not kept: {text(names)}</span>" if names else ""
 
 
-def _sign(passed: bool | None) -> str:
+def _sign(passed: bool | None, is_at_limit: bool = False) -> str:
     if passed is None:
         return ""
+    if is_at_limit:
+        return "<span class='pass'>at the limit</span>"
     return "<span class='pass'>\u2713</span>" if passed else "<span class='fail'>\u2717</span>"
 
 

@@ -28,6 +28,8 @@ _DURATIONS: Final = {"s": 1.0, "ms": 1e-3, "": 1.0}
 _NEWTONS: Final = {"n": 1.0, "kn": 1e3, "": 1.0}
 #: Magnitude beyond which no time, place or force lies; sums and squares stay finite.
 _LARGEST: Final = 1e12
+#: Share of the interval of interest that counts as all of it: rows of a measurement seldom stand on its ends.
+_WHOLE: Final = 0.99
 _SPELLED: Final = {"m": "m", "km": "km", "s": "s", "ms": "ms", "n": "N", "kn": "kN"}
 
 
@@ -63,6 +65,10 @@ class Comparison:
         The simulated one.
     position, simulated, measured : ndarray, shape (n,)
         Track position [m] and forces [N] where both are known within the interval of interest.
+    part : str
+        Which part of the interval of interest that is; empty if all of it.
+    coarse : str
+        That the measurement's rows are too far apart for the filter's band; empty if they are not.
     """
 
     source: str
@@ -70,6 +76,13 @@ class Comparison:
     position: FloatArray
     simulated: FloatArray
     measured: FloatArray
+    part: str = ""
+    coarse: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the figures do not say themselves."""
+        return tuple(filter(None, (self.part, self.coarse)))
 
     @property
     def start(self) -> float:
@@ -223,7 +236,35 @@ def compare_measured(s: Signals, measurement: Measurement) -> Comparison:
             f"{measurement.source} ({first:g} {unit} to {last:g} {unit}) lies outside the interval of interest"
         )
     filtered = _filtered(s, measurement, there, known)
-    return Comparison(measurement.source, s.contact.pantograph, s.position[both], s.filtered[both], filtered[both])
+    texts = _part(s, both), _coarse(s, measurement, there, both)
+    return Comparison(
+        measurement.source, s.contact.pantograph, s.position[both], s.filtered[both], filtered[both], *texts
+    )
+
+
+def _part(s: Signals, both: BoolArray) -> str:
+    shared, whole = np.count_nonzero(both), np.count_nonzero(s.inside)
+    if shared >= _WHOLE * whole:
+        return ""
+    return f"only {100.0 * shared / whole:.3g} % of the interval of interest is measured: both columns are of that part"
+
+
+def _coarse(s: Signals, measurement: Measurement, there: FloatArray, both: BoolArray) -> str:
+    """Return that neighbouring rows are too far apart, in what is compared, to tell the force up to the cut-off."""
+    rows = np.interp(measurement.abscissa, *_increasing(there[both], s.time[both]), left=np.nan, right=np.nan)
+    times = np.concatenate(([s.time[both][0]], rows[np.isfinite(rows)], [s.time[both][-1]]))
+    longest, needed = float(np.diff(times).max()), 0.5 / s.filter.cutoff
+    if longest <= needed * (1.0 + 1e-6):
+        return ""
+    return (
+        f"rows of the measurement lie up to {1e3 * longest:.3g} ms apart; {s.filter.cutoff:g} Hz needs at most "
+        f"{1e3 * needed:g} ms: what lies between them is a straight line, and its sigma and extremes are too small"
+    )
+
+
+def _increasing(places: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    order = np.argsort(places, kind="stable")
+    return places[order], times[order]
 
 
 def _filtered(s: Signals, measurement: Measurement, there: FloatArray, known: BoolArray) -> FloatArray:

@@ -76,12 +76,11 @@ def _outputs(done: Results, charts: list[Chart]) -> list[str]:
 
 def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool = True) -> str:
     summary, limits = done.summary, done.evaluation.limits
-    complete = summary.get("status") == "complete"
     name = markup.text(summary.get("scenario", ""))
     key = "verdict" if is_coupling else "run"
     parts = [f"<section id='{key}'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
     parts.append(_cautions(summary))
-    parts += [markup.verdict(a, a.contact.pantograph, limits, complete) for a in assessments]
+    parts += [markup.verdict(a, a.contact.pantograph, limits) for a in assessments]
     if reason := summary.get("not_judged", ""):
         parts.append(f"<p class='warning'><b>Not judged.</b> There are no figures: {markup.text(reason)}.</p>")
     elif not assessments and is_coupling:
@@ -182,6 +181,7 @@ def _measured(found: Comparison, chart: Chart) -> list[str]:
     rows = markup.table(heads, comparison_rows(found))
     where = f"compared from {found.start:.1f} m to {found.end:.1f} m"
     note = f"<p class='note'>Measured: {markup.text(found.source)}; {where}.</p>"
+    note += "".join(f"<p class='warning'>Warning: {markup.text(w)}.</p>" for w in found.warnings)
     return ["<section id='measured'><h2>Measured beside simulated</h2>", note, rows, markup.chart(chart), "</section>"]
 
 

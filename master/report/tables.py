@@ -61,6 +61,8 @@ class Headline:
         As shown.
     passed : bool, optional
         Whether the limit is kept, None where there is none.
+    is_at_limit : bool
+        Whether it is kept only as being at the limit.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Headline:
     unit: str
     limit: str
     passed: bool | None = None
+    is_at_limit: bool = False
 
 
 def figure_rows(assessments: Sequence[Assessment]) -> list[tuple[str, ...]]:
@@ -121,7 +124,7 @@ def _kept(criterion: Criterion | None) -> bool | None:
 def _headline(name: str, value: str, unit: str, criterion: Criterion | None) -> Headline:
     """Return a figure with the limit that it is held to, if it is judged."""
     limit = "" if criterion is None else criterion.limit.removesuffix(f" {unit}")
-    return Headline(name, value, unit, limit, _kept(criterion))
+    return Headline(name, value, unit, limit, _kept(criterion), criterion is not None and criterion.is_at_limit)
 
 
 def verdict_table(assessment: Assessment, limits: LimitChoice) -> Table:

@@ -21,7 +21,7 @@ FORMAT: Final = 2
 FIGURES: Final[tuple[tuple[str, str, Callable[[Entry], float | None], int], ...]] = (
     ("mean", "N", lambda e: e.assessment.quality.mean, 1),
     ("sigma", "N", lambda e: e.assessment.quality.sigma, 1),
-    ("sigma / mean", "1", lambda e: e.assessment.quality.sigma / e.assessment.quality.mean, 3),
+    ("sigma / mean", "1", lambda e: e.assessment.quality.sigma_share, 3),
     ("maximum", "N", lambda e: e.assessment.quality.maximum, 1),
     ("minimum", "N", lambda e: e.assessment.quality.minimum, 1),
     ("amplitude", "N", lambda e: e.assessment.quality.amplitude, 1),
@@ -88,7 +88,7 @@ def verdict(entry: Entry) -> str:
     failed = [c.name for c in criteria if not c.passed]
     if failed:
         return f"fails: {', '.join(failed)}"
-    at_limit = [c.name for c in criteria if c.is_at_limit]
+    at_limit = entry.assessment.at_limit
     return f"passes, at the limit: {', '.join(at_limit)}" if at_limit else "passes"
 
 
@@ -110,7 +110,7 @@ def filter_remarks(found: Sequence[Entry]) -> list[str]:
         told = "; ".join(f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.told)
         remarks += [f"{who}: {told}"] if told else []
         remarks += [f"{who}: {c.name}: {c.remark}" for c in e.assessment.criteria if c.remark and not c.is_at_limit]
-        remarks += [f"{who}: {e.assessment.drift}"] if e.assessment.drift else []
+        remarks += [f"{who}: {warning}" for warning in e.assessment.warnings]
     return remarks
 
 
@@ -220,6 +220,9 @@ def _entry_data(e: Entry) -> dict[str, Any]:
         **figures,
         "other_filters": [asdict(f) for f in e.quality.others],
         "drift": e.assessment.drift,
+        "early": e.assessment.early,
+        "unchecked": e.assessment.unchecked,
+        "withheld": e.assessment.withheld,
         "criteria": [asdict(c) for c in e.assessment.criteria],
         "sharing": asdict(e.sharing) if e.sharing is not None else None,
     }

@@ -43,7 +43,7 @@ def figures_table(interval: Interval, found: Sequence[Entry], outcome: Outcome) 
     table = _table(f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
     for e in found:
         q = e.assessment.quality
-        numbers = (q.mean, q.sigma, q.sigma / q.mean, q.maximum, q.minimum, q.statistical_minimum)
+        numbers = (q.mean, q.sigma, q.sigma_share, q.maximum, q.minimum, q.statistical_minimum)
         texts = [shown(v, d) for v, d in zip(numbers, (1, 1, 3, 0, 0, 0), strict=True)]
         uplift = shown(None if e.uplift is None else 1e3 * e.uplift, 0)
         slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
@@ -54,7 +54,11 @@ def figures_table(interval: Interval, found: Sequence[Entry], outcome: Outcome) 
 
 
 def _name(e: Entry) -> str:
-    return escape(f"{e.variant}, {e.pantograph}")
+    return escape(_name_of(e))
+
+
+def _name_of(e: Entry) -> str:
+    return f"{e.variant}, {e.pantograph}"
 
 
 def _failing(found: Sequence[Entry], title: str) -> str:
@@ -64,10 +68,13 @@ def _failing(found: Sequence[Entry], title: str) -> str:
         for criterion in e.assessment.criteria:
             if not criterion.passed:
                 failing.setdefault(criterion.name, []).append(f"{e.variant}, {e.pantograph}")
+    withheld = [f"{_name_of(e)}: {e.assessment.withheld}" for e in found if e.assessment.withheld]
+    not_judged = "".join(f"\nnot judged: {text}" for text in withheld)
     if not failing:
-        return f"{title}: all pass"
+        others = "all others pass" if withheld else "all pass"
+        return f"{title}: {others if len(withheld) < len(found) else 'none is judged'}{not_judged}"
     words = (f"{what}: {'all' if len(who) == len(found) else '; '.join(who)}" for what, who in failing.items())
-    return f"{title} is not met by\n" + "\n".join(words)
+    return f"{title} is not met by\n" + "\n".join(words) + not_judged
 
 
 def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, float]]]) -> Table:

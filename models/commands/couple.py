@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from master.evaluation.contact_quality import Quality, Sampled, figures_of
+from master.evaluation.contact_quality import Quality, Sampled, early_warning, figures_of
 from master.evaluation.filters import SETTLING, ForceFilter, evaluated, low_pass, stands_in
 from models.catenary import limits
 from models.catenary.model import CatenaryModel
@@ -93,6 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     run_of = Evaluated.of(record, line, pantograph.strip_offset, tuple(arguments.interval or (None, None)), chosen)
     if arguments.out is not None:
         write_timeseries(new_folder(arguments.out) / "timeseries.csv", run_of)
+    warn([early_warning(run_of.sampled)])
     _print(run_of, stop / wall)
     return 0
 

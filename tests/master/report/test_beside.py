@@ -45,6 +45,28 @@ def test_units_separators_and_further_columns(signals, tmp_path):
     assert rows["correlation"][2] == "1.000"
 
 
+@pytest.mark.parametrize(("every", "gap", "is_coarse"), [(1, None, False), (20, None, False), (40, None, True),
+                                                         (1, (70.0, 72.4), True)])  # fmt: skip
+def test_rows_too_far_apart_for_the_filter_are_told(signals, tmp_path, every, gap, is_coarse):
+    """20 Hz needs a row every 25 ms at least; at 60 m/s a gap of 2.4 m takes 40 ms."""
+    kept = np.zeros(len(signals.time), dtype=bool)
+    kept[::every] = True
+    if gap is not None:
+        kept &= (signals.position < gap[0]) | (signals.position > gap[1])
+    for title, there in (("time [s]", signals.time), ("position [m]", signals.position)):
+        path = write(tmp_path / "m.csv", as_csv(f"{title},force [N]", there[kept], signals.raw[kept]))
+        found = compare_measured(signals, read_measured(path))
+        assert bool(found.coarse) == is_coarse
+        assert not is_coarse or "40 ms apart; 20 Hz needs at most 25 ms" in found.coarse.replace("41 ms", "40 ms")
+        assert found.part == ""
+
+
+def test_a_measurement_of_a_part_of_the_interval_is_told(signals, tmp_path):
+    half = signals.position < 80.0
+    path = write(tmp_path / "m.csv", as_csv("time [s],force [N]", signals.time[half], signals.raw[half]))
+    assert "only 49.9 % of the interval" in compare_measured(signals, read_measured(path)).part
+
+
 def test_noise_above_20_hz_does_not_disturb(signals, tmp_path):
     noise = 40.0 * np.sin(2 * np.pi * 80.0 * signals.time)
     path = write(tmp_path / "m.csv", as_csv("time [s],force [N]", signals.time, signals.raw + noise))

@@ -35,6 +35,8 @@ def test_text_is_escaped_and_incompleteness_is_said_first(made_up):
     assert "<broke>" not in page
     assert page.index("Incomplete") < page.index("class='tiles'")
     assert "so far" in page
+    assert "EN 50367, AC not judged" in page
+    assert "EN 50367, AC \u2713" not in page
 
 
 def test_the_first_screen_has_what_en_50367_asks_for(made_up):

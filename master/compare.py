@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import Signals, contact_signals
 from master.results import Results
+
+#: Contacts this near to each other at equal times are at the same place [m].
+SAME_PLACE: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -25,12 +29,25 @@ class Comparison:
         Root mean square difference of the low-passed forces at equal times in the first run's interval [N].
     largest : float, optional
         Largest magnitude of that difference [N].
+    apart : float, optional
+        How far apart along the track the two are at most at these times [m].
     """
 
     first: Assessment
     second: Assessment
     rms: float | None
     largest: float | None
+    apart: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What the forces' difference is, or why there is none."""
+        if self.rms is None or self.largest is None:
+            return "no difference of the forces: the second run has no time in common with the first one's interval"
+        text = f"low-passed forces differ by {self.rms:.3g} N (rms), {self.largest:.3g} N (largest)"
+        if self.apart is None or self.apart <= SAME_PLACE:
+            return text
+        return f"{text}, at equal times, at which the two are up to {self.apart:.3g} m apart: not at the same places"
 
 
 def compare(a: Results, b: Results) -> tuple[Comparison, ...]:
@@ -87,14 +104,17 @@ def _interval_words(interval: tuple[float | None, float | None]) -> str:
     return f"{begin} to {'the end of the run' if end is None else f'{end:g} m'}"
 
 
-def _difference(a: Results, b: Results, first: Assessment, second: Assessment) -> tuple[float | None, float | None]:
-    """Return the differences of the forces, both low-passed with the first run's filter."""
+def _difference(
+    a: Results, b: Results, first: Assessment, second: Assessment
+) -> tuple[float | None, float | None, float | None]:
+    """Return the differences of the forces, both low-passed with the first run's filter, and of the places."""
     one, two = _signals(a, first), contact_signals(b.recordings[0], second.contact, a.evaluation)
     inside = one.inside & (one.time >= two.time[0]) & (one.time <= two.time[-1])
     if not inside.any():
-        return None, None
+        return None, None, None
     difference = np.interp(one.time[inside], two.time, two.filtered) - one.filtered[inside]
-    return float(np.sqrt(np.mean(difference**2))), float(np.abs(difference).max())
+    apart = np.abs(np.interp(one.time[inside], two.time, two.position) - one.position[inside])
+    return float(np.sqrt(np.mean(difference**2))), float(np.abs(difference).max()), float(apart.max())
 
 
 def _signals(run: Results, assessment: Assessment) -> Signals:

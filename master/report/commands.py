@@ -142,13 +142,12 @@ def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]]
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
     console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
-    for note in compare.setting_notes(runs):
+    warnings = [f"{c.name}: {warning}" for c in found for warning in c.assessment.warnings]
+    for note in (*compare.setting_notes(runs), *warnings):
         console.print(f"warning: {note}", markup=False, soft_wrap=True)
     for folder, differences in zip(options.others, pairs, strict=True):
         for c in differences:
-            if c.rms is not None and c.largest is not None:
-                who = f"{folder}, {c.first.contact.pantograph}: low-passed forces differ by"
-                console.print(f"{who} {c.rms:.3g} N (rms), {c.largest:.3g} N (largest)", markup=False, soft_wrap=True)
+            console.print(f"{folder}, {c.first.contact.pantograph}: {c.sentence}", markup=False, soft_wrap=True)
     if options.report:
         console.print(f"report in {options.report}", markup=False, soft_wrap=True)
 
@@ -160,5 +159,6 @@ def _as_json(c: compare.Comparison, first: Results, other: Results) -> Mapping[s
     filters = [run.evaluation.filter.short for run in (first, other)]
     same = len(set(filters)) == 1
     notes = list(compare.setting_notes([first, other]))
-    known = {"notes": notes, "contact": one.contact, "difference": difference, "rms": c.rms, "largest": c.largest}
+    forces = {"rms": c.rms, "largest": c.largest, "apart": c.apart}
+    known = {"notes": notes, "contact": one.contact, "difference": difference, **forces}
     return {**known, "filters": filters, "same_filter": same}

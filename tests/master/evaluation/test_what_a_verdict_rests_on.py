@@ -131,3 +131,18 @@ def test_a_study_does_not_pass_what_it_has_not_judged(statuses, said):
     assert f": {said}" in text
     assert ("not judged: interrupted, pantograph" in text) == ("interrupted" in statuses)
     assert [bool(f["withheld"]) for f in as_data(outcome)["figures"]] == [s != "complete" for s in statuses]
+
+
+def test_forces_at_equal_times_and_other_places_are_not_called_the_same():
+    one = made(**LIMITS)
+    moved, later = made(**LIMITS), made(**LIMITS)
+    moved.recordings[0].values[:, 1] += 5.0
+    (found,) = compare.compare(one, moved)
+    assert found.apart == pytest.approx(5.0)
+    assert "up to 5 m apart" in found.sentence
+    assert "apart" not in compare.compare(one, made(**LIMITS))[0].sentence
+    late = later.recordings[0]
+    shifted = Recording(late.time + 10.0, late.names, late.units, late.values)
+    (none,) = compare.compare(one, dataclasses.replace(later, recordings=(shifted,)))
+    assert none.rms is None
+    assert "no time in common" in none.sentence

@@ -164,7 +164,9 @@ class Record(_Settings):
 
 
 #: Bulky variables of a catenary, recorded at a coarser rate unless the scenario says otherwise.
-DEFAULT_RECORDS: Final = (Record(variables=("*.dropper[*].force", "*.support[*].uplift"), every=0.005),)
+DEFAULT_RECORDS: Final = (
+    Record(variables=("*.dropper[*].force", "*.dropper[*].slack", "*.support[*].uplift"), every=0.005),
+)
 
 
 class RunSettings(_Settings):

@@ -19,7 +19,8 @@ _ROUNDING: Final = 1e-6
 class Variable:
     """A variable of an FMU, as its modelDescription.xml declares it.
 
-    ``initial`` is that of the standard where the file leaves it open; ``items`` are those of an enumeration.
+    ``initial`` is that of the standard where the file leaves it open; ``items`` are those of an enumeration;
+    ``is_difference`` tells a relative quantity, to which the offset of its unit does not apply.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Variable:
     description: str = ""
     initial: str = ""
     items: tuple[tuple[str, int], ...] = ()
+    is_difference: bool = False
 
 
 @dataclass(frozen=True)

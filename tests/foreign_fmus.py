@@ -13,6 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from master.errors import ScenarioError
+from master.run import Manner, run
+from master.scenario import Overrides, open_scenario
+
 SOURCE = r"""
 #include <stdlib.h>
 #include <string.h>
@@ -225,3 +229,22 @@ def ssd(inside: str, rest: str = "", version: str = "1.0", stop: str = ' stopTim
         f'<ssd:DefaultExperiment startTime="0"{stop}>{OSP}</ssd:DefaultExperiment>\n'
         "</ssd:SystemStructureDescription>\n"
     )
+
+
+def opened(folder, **overrides):
+    with open_scenario(folder, Overrides(**overrides), build=False) as found:
+        return found.system
+
+
+def problems(folder, **overrides):
+    with pytest.raises(ScenarioError) as caught:
+        opened(folder, **overrides)
+    return [str(p) for p in caught.value.problems]
+
+
+def ran(folder, tmp_path, manner=None, **overrides):
+    """The recording of a run, by name the values at all times."""
+    with open_scenario(folder, Overrides(**overrides), build=False) as found:
+        done = run(found.system, tmp_path / "out", manner=manner or Manner())
+    recording = done.recordings[0]
+    return {name: recording[name] for name in recording.names}

@@ -40,6 +40,7 @@ class UnitChecks:
         line: int,
         file: str = SSD_NAME,
         own: Mapping[str, Unit] | None = None,
+        is_difference: bool = False,
     ) -> Conversion:
         """Return the conversion from one unit to another, none where either is empty.
 
@@ -53,6 +54,8 @@ class UnitChecks:
             Where that is written.
         own : mapping, optional
             Units that the file itself declares.
+        is_difference : bool
+            Whether it is the difference of two values, from which offsets fall out.
         """
         if source == target or not source or not target:
             return Conversion()
@@ -71,15 +74,17 @@ class UnitChecks:
                 self._report(line, f"{where}: '{source}' and '{target}' do not measure the same thing", file)
             self._unlike.add((file, line, source, target))
             return Conversion()
-        return found
+        return Conversion(found.factor) if is_difference else found
 
-    def along(self, unit: str, legs: Sequence[Leg], where: str) -> tuple[Conversion, str]:
+    def along(
+        self, unit: str, legs: Sequence[Leg], where: str, is_difference: bool = False
+    ) -> tuple[Conversion, str]:
         """Return the conversion of a value in ``unit`` along connections, and the unit that it has at their end."""
         total = Conversion()
         for leg in legs:
             wanted = leg.unit or unit
             if not leg.suppress_unit_conversion:
-                total = total.then(self.convert(unit, wanted, where, leg.line))
+                total = total.then(self.convert(unit, wanted, where, leg.line, is_difference=is_difference))
             total, unit = total.then(leg.transformation), wanted
         return total, unit
 

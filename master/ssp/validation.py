@@ -241,10 +241,12 @@ class Checker:
         # The FMU's own unit is what the number is in; the connector's unit is what the SSD talks in.
         fmu_units = [v.unit if v else "" for v in variables]
         written = [end.connector.unit or u for end, u in zip((source, target), fmu_units, strict=True)]
-        total = self._units.convert(fmu_units[0], written[0], where, c.line)
+        is_difference = any(v is not None and v.is_difference for v in variables)
+        total = self._units.convert(fmu_units[0], written[0], where, c.line, is_difference=is_difference)
         legs = (*c.before, Leg(written[1], c.transformation, c.suppress_unit_conversion, c.line))
-        way, unit = self._units.along(written[0], legs, where)
-        total = total.then(way).then(self._units.convert(unit, fmu_units[1], where, c.line))
+        way, unit = self._units.along(written[0], legs, where, is_difference)
+        way_in = self._units.convert(unit, fmu_units[1], where, c.line, is_difference=is_difference)
+        total = total.then(way).then(way_in)
         if not (math.isfinite(total.factor) and math.isfinite(total.offset)):
             text = f"{where}: factor {total.factor:g} and offset {total.offset:g} are not finite"
             self._report(c.line, "number", text)

@@ -1,0 +1,58 @@
+"""What FMUs and systems of others say in passing: units, limits, aliases, types on the way. Nothing of it is lost."""
+
+# ruff: noqa: E501 (XML, a thing a line)
+
+from __future__ import annotations
+
+import pytest
+
+from tests.foreign_fmus import component, connector, description, opened, problems, ran, ssd, system, values, wire
+
+U, K, Y = connector("u", "input"), connector("k", "parameter"), connector("y", "output")
+KELVIN, CELSIUS = '<Unit name="K"><BaseUnit K="1"/></Unit>', '<Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>'
+
+
+def changed(*pairs, **options):
+    """A description with other texts in places."""
+    text = description(**options)
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new, 1)
+    return text
+
+
+def typed(attributes):
+    """A type ``T`` of Real variables."""
+    return "<TypeDefinitions>", f'<TypeDefinitions><SimpleType name="T"><Real {attributes}/></SimpleType>'
+
+
+def two(bound="1"):
+    """y of ``a`` to u of ``b``, each of an FMU of its own."""
+    first = component("a", Y, source="resources/one.fmu", bindings=values(("u", f'Real value="{bound}"')))
+    return ssd(system(first + component("b", U, Y, source="resources/other.fmu"), wire("a.y", "b.u")))
+
+
+# Relative quantities and limits, of variables and of their types.
+
+OWN = changed(('<Real unit="degC"/>', '<Real unit="degC" relativeQuantity="true"/>'), units=("", "degC"))
+OF_TYPE = changed(('continuous"><Real/>', 'continuous"><Real declaredType="T"/>'), typed('unit="degC" relativeQuantity="true"'))
+OWN_NOT = changed(('continuous"><Real/>', 'continuous"><Real declaredType="T" relativeQuantity="false"/>'), typed('unit="degC" relativeQuantity="true"'))
+
+
+@pytest.mark.parametrize(("told", "wanted"), [(OWN, 2.0), (OF_TYPE, 2.0), (OWN_NOT, 275.15), (description(("", "degC")), 275.15)])
+def test_the_offset_of_a_unit_falls_out_of_a_difference(scenario, tmp_path, told, wanted):
+    folder = scenario(two("2"), one=told, other=description(("K", "")))
+    assert ran(folder, tmp_path)["b.y"][-1] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_so_it_does_from_a_value_of_the_scenario(scenario):
+    told = changed(('<Real start="1"/>', '<Real start="1" unit="K" relativeQuantity="1"/>'))
+    bound = values(("k", 'Real value="20" unit="degC"'), ("u", 'Real value="20" unit="degC"'))
+    folder = scenario(ssd(system(component("a", Y, bindings=bound))), panel=told.replace('start="0.5"', 'start="0.5" unit="K"'))
+    assert opened(folder).components[0].parameters == pytest.approx({"k": 20.0, "u": 293.15})
+
+
+def test_limits_of_a_type_hold(scenario):
+    told = changed(('<Real start="1"/>', '<Real start="1" declaredType="T"/>'), typed('min="0" max="2" unit="m"'))
+    text = ssd(system(component("a", Y, bindings=values(("k", 'Real value="3"')))))
+    assert problems(scenario(text, panel=told)) == ["SystemStructure.ssd:3: parameter 'a.k' = 3 m is above its maximum 2 [range]"]

@@ -83,7 +83,7 @@ class Checker:
     def connections(self) -> tuple[SystemConnection, ...]:
         """Return the connections that are sound, in the order of the SSD."""
         self._check_names()
-        self._problems += unit_problems(self._structure, self._fmus.values())
+        self._problems += unit_problems(self._structure, self._fmus)
         for component in self._known:
             for connector in component.connectors:
                 self._check_connector(component, connector)

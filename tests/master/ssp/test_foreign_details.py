@@ -56,3 +56,40 @@ def test_limits_of_a_type_hold(scenario):
     told = changed(('<Real start="1"/>', '<Real start="1" declaredType="T"/>'), typed('min="0" max="2" unit="m"'))
     text = ssd(system(component("a", Y, bindings=values(("k", 'Real value="3"')))))
     assert problems(scenario(text, panel=told)) == ["SystemStructure.ssd:3: parameter 'a.k' = 3 m is above its maximum 2 [range]"]
+
+
+# Units of FMUs: one name, one meaning.
+
+
+def unit(name, attributes):
+    return f'<Unit name="{name}"><BaseUnit {attributes}/></Unit>'
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "second", "told"),
+    [
+        ("pace", 'm="1" s="-1"', 'm="1" s="-1" factor="0.5"', "component 'b': unit 'pace' of its FMU has another meaning than in the FMU of 'a': it is declared with factor 0.5, there with factor 1"),
+        ("pace", 'm="1" s="-1"', 'kg="1"', "component 'b': unit 'pace' of its FMU has another meaning than in the FMU of 'a': it measures something else"),
+        ("km/h", 'm="1" s="-1" factor="0.5"', 'm="1" s="-1" factor="0.5"', "component 'a': unit 'km/h' of its FMU is declared with factor 0.5; everywhere else it has factor 0.277778"),
+        ("degC", 'K="1"', 'K="1"', "component 'a': unit 'degC' of its FMU is declared with factor 1; everywhere else it has factor 1 and offset 273.15"),
+        ("m", 'kg="1"', 'kg="1"', "component 'a': unit 'm' of its FMU is declared to measure something else than everywhere"),
+    ],
+)  # fmt: skip
+def test_a_unit_of_two_fmus_has_one_meaning(scenario, name, first, second, told):
+    one, other = (description((name, name), unit(name, attributes)) for attributes in (first, second))
+    assert problems(scenario(two(), one=one, other=other)) == [f"SystemStructure.ssd:3: {told} [unit]"]
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "second"),
+    [("deg", 'rad="1" factor="0.0174533"', 'factor="0.0174533"'), ("pace", 'm="1"', ""), ("%", "", 'factor="0.01"'),
+     ("N.m", 'kg="1" m="2" s="-2" rad="-1"', 'kg="1" m="2" s="-2"')],
+)  # fmt: skip
+def test_what_is_a_matter_of_taste_is_none(scenario, name, first, second):
+    one, other = (description((name, name), unit(name, attributes)) for attributes in (first, second))
+    assert opened(scenario(two(), one=one, other=other)).connections[0].conversion.is_identity
+
+
+def test_units_that_nobody_uses_may_differ(scenario):
+    one, other = (description(("", ""), unit("pace", f'm="1" factor="{f}"')) for f in (1, 2))
+    assert opened(scenario(two(), one=one, other=other)).connections

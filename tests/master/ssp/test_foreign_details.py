@@ -93,3 +93,40 @@ def test_what_is_a_matter_of_taste_is_none(scenario, name, first, second):
 def test_units_that_nobody_uses_may_differ(scenario):
     one, other = (description(("", ""), unit("pace", f'm="1" factor="{f}"')) for f in (1, 2))
     assert opened(scenario(two(), one=one, other=other)).connections
+
+
+# Bindings: what is written beside what is read.
+
+SET = '<ssv:ParameterSet version="1.0" name="p"><ssv:Parameters><ssv:Parameter name="k"><ssv:Real value="7"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>'
+ENTRY = '<ssm:ParameterMapping version="1.0"><ssm:MappingEntry source="k" target="k"/></ssm:ParameterMapping>'
+SSV = SET.replace(" version", ' xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version', 1)
+
+
+def inline(content=SET, attributes="", mapping=""):
+    return f"<ssd:ParameterBindings><ssd:ParameterBinding{attributes}><ssd:ParameterValues>{content}</ssd:ParameterValues>{mapping}</ssd:ParameterBinding></ssd:ParameterBindings>"
+
+
+def mapping(content, attributes=""):
+    return inline(mapping=f"<ssd:ParameterMapping{attributes}>{content}</ssd:ParameterMapping>")
+
+
+@pytest.mark.parametrize(
+    ("bound", "told"),
+    [
+        (inline(attributes=' source="p.ssv"'), "the ParameterBinding has a source, 'p.ssv', and content as well; remove one of them [binding]"),
+        (inline(SET + SET.replace("7", "9")), "the ParameterBinding holds 2 elements; one is allowed [binding]"),
+        ('<ssd:ParameterBindings><ssd:ParameterBinding type="text/csv" source="p.ssv"/></ssd:ParameterBindings>', "the ParameterBinding is of type 'text/csv'; only application/x-ssp-parameter-set is supported [unsupported]"),
+        (mapping(ENTRY, ' source="p.ssm"'), "the ParameterMapping has a source, 'p.ssm', and content as well; remove one of them [binding]"),
+        (mapping(ENTRY + ENTRY), "the ParameterMapping holds 2 elements; one is allowed [binding]"),
+        (mapping(ENTRY, ' type="text/csv"'), "the ParameterMapping is of type 'text/csv'; only application/x-ssp-parameter-mapping is supported [unsupported]"),
+    ],
+)  # fmt: skip
+def test_a_binding_is_of_one_content(scenario, bound, told):
+    folder = scenario(ssd(system(component("a", Y, bindings=bound))), {"p.ssv": SSV})
+    assert problems(folder) == [f"SystemStructure.ssd:3: {told}"]
+
+
+def test_an_empty_source_is_none(scenario):
+    """SSP 1.0 says of an inline set that the source must be empty."""
+    bound = inline(attributes=' source=""', mapping=f'<ssd:ParameterMapping source="">{ENTRY}</ssd:ParameterMapping>')
+    assert opened(scenario(ssd(system(component("a", Y, bindings=bound))))).components[0].parameters == {"k": 7.0}

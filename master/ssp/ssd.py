@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from master.ssp.annotation import Annotations, RunSettings, check_places, parse_annotations
 from master.ssp.archive import SSD_NAME, Sources
-from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, Feed, SystemNode
+from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, Feed, Joint, SystemNode
 from master.ssp.enumerations import Items, parse_enumerations
 from master.ssp.flatten import flatten
 from master.ssp.ssm import Entry, apply, parse_mapping, parse_transformation, read_mapping_file
@@ -44,6 +44,7 @@ class Structure:
     enumerations: dict[str, Items] = field(default_factory=dict)
     feeds: tuple[Feed, ...] = ()
     connectors: dict[str, Connector] = field(default_factory=dict)
+    joints: tuple[Joint, ...] = ()
 
 
 EMPTY: Final = Structure("", (), (), (), {}, 0.0, None, Annotations(RunSettings(), None))
@@ -81,6 +82,7 @@ def parse_structure(node: Any, sources: Sources, reader: Reader) -> Structure:
         parse_enumerations(child(node, SSD, "Enumerations"), reader),
         flat.feeds,
         flat.connectors,
+        flat.joints,
     )
 
 

@@ -6,7 +6,19 @@ from __future__ import annotations
 
 import pytest
 
-from tests.foreign_fmus import component, connector, description, opened, problems, ran, ssd, system, values, wire
+from tests.foreign_fmus import (
+    component,
+    connector,
+    connectors,
+    description,
+    opened,
+    problems,
+    ran,
+    ssd,
+    system,
+    values,
+    wire,
+)  # fmt: skip
 
 U, K, Y = connector("u", "input"), connector("k", "parameter"), connector("y", "output")
 KELVIN, CELSIUS = '<Unit name="K"><BaseUnit K="1"/></Unit>', '<Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>'
@@ -130,3 +142,40 @@ def test_an_empty_source_is_none(scenario):
     """SSP 1.0 says of an inline set that the source must be empty."""
     bound = inline(attributes=' source=""', mapping=f'<ssd:ParameterMapping source="">{ENTRY}</ssd:ParameterMapping>')
     assert opened(scenario(ssd(system(component("a", Y, bindings=bound))))).components[0].parameters == {"k": 7.0}
+
+
+# Connectors of systems: their types and units count, wherever they lead.
+
+OWN_Y = connector("y", "output", 'Real unit="m"')
+
+
+def through(what, out=""):
+    """y of ``a`` through an input of a system to u of ``b`` in it, and on to an output of the whole, each in its line."""
+    inner = system(component("b", U, Y), "\n" + wire(".w", "b.u"), connectors(connector("w", "input", what)), name="in")
+    wires = wire("a.y", "in.w") + "\n" + (wire("a.y", ".o") if out else "")
+    return ssd(system(component("a", OWN_Y) + inner, wires, connectors(connector("o", "output", out)) if out else ""))
+
+
+ITEMS = '<ssd:Enumerations><ssc:Enumeration name="Speed"><ssc:Item name="off" value="0"/></ssc:Enumeration></ssd:Enumerations>'
+E_OUT = '<ssd:Connector name="e_out" kind="output"/>'
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (through("Integer"), "SystemStructure.ssd:4: 'a.y' is Real and 'w' is Integer; only variables of the same type can be connected [type]"),
+        (through("Real", "Boolean"), "SystemStructure.ssd:5: 'a.y' is Real and 'o' is Boolean; only variables of the same type can be connected [type]"),
+        (through("Real", 'Real unit="kg"'), "SystemStructure.ssd:5: 'a.y' to 'o': 'm' and 'kg' do not measure the same thing [unit]"),
+        (ssd(system(component("a", Y) + component("b", Y), wire("a.y", ".o") + "\n" + wire("b.y", ".o"), connectors(connector("o", "output")))), "SystemStructure.ssd:3: connector 'o' of system 'whole' has 2 connections; one is allowed [connection]"),
+        (ssd(system(component("a", Y) + system(component("c", Y), wire(".i", ".o"), connectors(connector("i", "input"), connector("o", "output")), name="in"), "\n" + wire("in.o", "in.i"))), "SystemStructure.ssd:4: connector 'i' of system 'in' is fed by itself: the connections of systems form a circle, into which no component leads [connection]"),
+        (ssd(system(component("a", E_OUT), wire("a.e_out", ".o"), connectors(connector("o", "output", 'Enumeration name="Speed"'))), ITEMS), "SystemStructure.ssd:3: 'a.e_out' has the items off = 1, low = 2, high = 3, 'o' off = 0; connected enumerations must have the same ones [enumeration]"),
+        (ssd(system(component("a", E_OUT), wire("a.e_out", ".o"), connectors(connector("o", "output", 'Enumeration name="Speed"')))), "SystemStructure.ssd:3: connector 'o': enumeration 'Speed' is not declared in ssd:Enumerations [enumeration]"),
+    ],
+)  # fmt: skip
+def test_mistakes_at_connectors_of_systems(scenario, text, told):
+    assert problems(scenario(text)) == [told]
+
+
+def test_a_chain_through_connectors_without_a_type(scenario):
+    text = through("Real", "Real").replace('kind="input"><ssc:Real/>', 'kind="input">')
+    assert [c.target for c in opened(scenario(text)).connections] == ["in.b"]

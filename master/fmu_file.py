@@ -62,6 +62,7 @@ def read_fmu(path: Path) -> Fmu:
         can_serialise=bool(description.coSimulation.canSerializeFMUstate),
         units=_units(description.unitDefinitions, f"{path.name} ({_DESCRIPTION})"),
         tolerance=_tolerance(description.defaultExperiment),
+        is_single=bool(description.coSimulation.canBeInstantiatedOnlyOncePerProcess),
     )
 
 

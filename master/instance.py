@@ -27,6 +27,10 @@ _STATUS: Final = ("ok", "warning", "discard", "error", "fatal", "pending")
 #: Statuses after which a run may go on; whatever else comes, also what FMI does not know, has failed.
 _GOOD: Final = (0, 1)
 _FATAL: Final = 4
+_DISCARD: Final = 2
+#: Kinds of fmi2StatusKind: the time of the last step that succeeded, and whether the FMU wants to end.
+_LAST_TIME: Final = 2
+_TERMINATED: Final = 3
 #: Longest serialised state that is taken from an FMU [bytes].
 LONGEST_STATE: Final = 1 << 30
 
@@ -196,7 +200,8 @@ class Instance:
         status = self._do_step(self.handle, time, step, 1)
         self.stepping_time += perf_counter() - began
         if status not in _GOOD:
-            raise self.error("a step", status)
+            ended = self._ended() if status == _DISCARD else None
+            raise ended or self.error("a step", status)
 
     def save(self) -> c_void_p:
         """Return the FMU's state; hand it back to `release`."""
@@ -271,6 +276,21 @@ class Instance:
         at = f" at t = {self.time:.6g} s" if self.time == self.time else ""
         who = f"component '{self.name}' ({self.component.fmu.path.name})"
         return SlaveError(f"{who} failed in {doing}{at}, status {label}: {said}")
+
+    def _ended(self) -> SlaveError | None:
+        """Return the error of an FMU that has ended the simulation itself, None if it has not [FMI 2.0.4, 4.2.3]."""
+        ends, time = c_int(0), c_double(self.time)
+        try:
+            status = self.function("fmi2GetBooleanStatus")(self.handle, _TERMINATED, byref(ends))
+            if status != 0 or not ends.value:
+                return None
+            if self.function("fmi2GetRealStatus")(self.handle, _LAST_TIME, byref(time)) != 0:
+                time.value = self.time
+        except AttributeError:  # some libraries leave out what they do not use
+            return None
+        said = f": {words}" if (words := fmi_log.last_words(self.name)) else ""
+        who = f"component '{self.name}' ({self.component.fmu.path.name})"
+        return SlaveError(f"{who} has ended the simulation at t = {time.value:.6g} s, before the stop time{said}")
 
     def _call(self, doing: str, function: str, *arguments: Any) -> None:
         status = self.function(function)(self.handle, *arguments)

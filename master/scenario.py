@@ -22,7 +22,7 @@ from master.ssp.ssm import NOTE
 from master.ssp.start_values import out_of_range, settable
 from master.ssp.validation import Checker
 from master.ssp.xml import Reader
-from master.system import Component, Fmu, System, Variable
+from master.system import ROUNDING, Component, Fmu, System, Variable, step_count
 
 DEFAULT_STEP = 1e-3
 #: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
@@ -129,6 +129,8 @@ def load_system(
     connections = checker.connections()
     components = checker.components(connections)
     times = _times(structure, overrides, reader.problems)
+    if (text := _short_end(*times)) and not reader.problems:
+        reader.warn(0, "stop", text)
     settings = _settings(structure, overrides, components, reader.problems)
     reader.problems.extend(_filter_problems(settings, times[2]))
     problems = reader.problems or ([w for w in reader.warnings if w.rule != NOTE] if overrides.strict else [])
@@ -156,6 +158,10 @@ def _fmus(
     found: dict[str, Fmu] = {}
     by_path: dict[Path, Fmu | str] = {}
     for c in components:
+        if not c.source:
+            if not any(p.line == c.line and "'source'" in p.text for p in problems):
+                problems.append(Problem(SSD_NAME, c.line, "source", f"component '{c.name}' has an empty source"))
+            continue
         path = sources.find(c.source)
         if path is None:
             text = f"'{c.source}' does not lie inside the scenario; --allow-outside DIR allows a folder beside it"
@@ -185,7 +191,7 @@ def _provide(path: Path, provision: _Provision) -> Fmu | str:
     try:
         place = store.ensure(path, provision.tell, provision.scratch) if provision.build else path
         if not place.is_file():
-            return "does not exist"
+            return "is a folder, not an FMU" if place.is_dir() else "does not exist"
         fmu = read_fmu(place)
         return lacking_binary(place, fmu.identifier) or fmu
     except ValueError as error:
@@ -217,6 +223,15 @@ def _step_problem(start: float, stop: float, step: float) -> str:
     if step < _RESOLUTION * max(abs(start), abs(stop)):
         return f"is lost beside times up to {max(abs(start), abs(stop)):g} s; begin nearer to 0"
     return ""
+
+
+def _short_end(start: float, stop: float, step: float) -> str:
+    """Return in words that the last whole step ends before the stop time, empty if it does not."""
+    end = start + step_count(start, stop, step) * step
+    if abs(stop - end) <= ROUNDING * step:
+        return ""
+    steps = f"no whole number of macro steps of {step:.12g} s"
+    return f"from the start to the stop time {stop:.12g} s it is {steps}: the run ends at {end:.12g} s"
 
 
 def _filter_problems(settings: RunSettings, step: float) -> Iterator[Problem]:

@@ -12,7 +12,7 @@ from master.ssp.ssv import Value
 from master.ssp.units import Conversion, Unit
 
 #: Share of a step by which the stop time may miss a whole number of steps for want of digits.
-_ROUNDING: Final = 1e-6
+ROUNDING: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,8 @@ class Fmu:
         Units that it defines, by name.
     tolerance : float, optional
         Of its default experiment.
+    is_single : bool
+        Whether a process can hold only one instance of it.
     """
 
     path: Path
@@ -74,6 +76,7 @@ class Fmu:
     can_serialise: bool = False
     units: dict[str, Unit] = field(default_factory=dict)
     tolerance: float | None = None
+    is_single: bool = False
 
 
 @dataclass(frozen=True)
@@ -150,4 +153,9 @@ class System:
     @property
     def step_count(self) -> int:
         """Number of macro steps: the last one ends at the stop time, or less than a step before it."""
-        return max(1, math.floor((self.stop - self.start) / self.step + _ROUNDING))
+        return step_count(self.start, self.stop, self.step)
+
+
+def step_count(start: float, stop: float, step: float) -> int:
+    """Return the number of macro steps from start to stop: the last one ends at the stop time, or before it."""
+    return max(1, math.floor((stop - start) / step + ROUNDING))

@@ -138,13 +138,17 @@ def description(
 """
 
 
-def compile_library(folder: Path) -> Path:
-    """Compile the FMUs' library; skips the test where there is no compiler."""
+def compile_library(folder: Path, *changes: tuple[str, str]) -> Path:
+    """Compile the FMUs' library, with other texts in places; skips the test where there is no compiler."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None or platform.system() != "Linux":
         pytest.skip("needs a C compiler on Linux")
     source, library = folder / "panel.c", folder / "panel.so"
-    source.write_text(SOURCE)
+    text = SOURCE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    source.write_text(text)
     subprocess.run([compiler, "-shared", "-fPIC", "-O0", "-o", library, source], check=True, capture_output=True)
     return library
 

@@ -112,8 +112,21 @@ class Checker:
     ) -> SystemComponent:
         outputs = dict.fromkeys(x.output for x in connections if x.source == c.name)
         inputs = dict.fromkeys(x.input for x in connections if x.target == c.name)
-        fmu = self._fmus[c.name]
-        return SystemComponent(c.name, fmu, values.of(c), tuple(inputs), tuple(outputs), fmu.tolerance)
+        fmu, given = self._fmus[c.name], values.of(c)
+        self._check_aliases(c, {n: repr(value) for n, value in given.items()}, "are given")
+        self._check_aliases(c, {x.input: _told(x) for x in connections if x.target == c.name}, "take")
+        return SystemComponent(c.name, fmu, given, tuple(inputs), tuple(outputs), fmu.tolerance)
+
+    def _check_aliases(self, c: Component, told: Mapping[str, str], verb: str) -> None:
+        """Report names of one variable of the FMU that are told different things: the last one would count."""
+        first: dict[tuple[str, int], str] = {}
+        for name, what in told.items():
+            variable = self._fmus[c.name].variables[name]
+            place = ("Integer" if variable.type == "Enumeration" else variable.type, variable.reference)
+            other = first.setdefault(place, name)
+            if what != told[other]:
+                text = f"'{other}' and '{name}' of component '{c.name}' are one variable in the FMU, but {verb}"
+                self._report(c.line, "alias", f"{text} {told[other]} and {what}; leave out one of them")
 
     def _report(self, line: int, rule: str, text: str, file: str = SSD_NAME) -> None:
         self._problems.append(Problem(file, line, rule, text))
@@ -356,6 +369,13 @@ class Checker:
 
     def _warn(self, line: int, text: str) -> None:
         self._warnings.append(Problem(SSD_NAME, line, "connection", text))
+
+
+def _told(c: SystemConnection) -> str:
+    """Return in words what an input is told."""
+    factor, offset = c.conversion.factor, c.conversion.offset
+    converted = "" if c.conversion.is_identity else f" x {factor:g} + {offset:g}"
+    return f"'{c.source}.{c.output}'{converted}"
 
 
 def _start(component: SystemComponent, connector: Connector) -> str:

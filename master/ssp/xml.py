@@ -34,6 +34,8 @@ _VERSIONED: Final = ("SystemStructureDescription", "ParameterSet", "ParameterMap
 _RENAMED: Final = {"Float64": "Real", "Int32": "Integer"}
 #: What 2.0 may say about a file or an element beside what is run.
 _REMARKS: Final = (f"{{{SSC}}}MetaData", f"{{{SSC}}}Signature")
+#: What XML Schema leaves out around a value.
+_BLANKS: Final = " \t\r\n"
 #: Types of which XML Schema says no more than that a value is none.
 _TYPE_ERROR: Final = re.compile(r"is not a valid value of the (?:local )?atomic type")
 
@@ -169,6 +171,7 @@ class Reader:
         raw = node.get(name)
         if raw is None:
             return default
+        raw = raw.strip(_BLANKS)
         if raw not in ("true", "false", "1", "0"):
             self.replace_problem(node, raw, "boolean", f"{name}='{raw}' is neither true nor false")
         return raw in ("true", "1")

@@ -4,9 +4,14 @@
 
 from __future__ import annotations
 
+import fmpy
 import pytest
 
+from master.errors import RunError
+from master.isolation import Isolation
+from master.run import Manner
 from tests.foreign_fmus import (
+    compile_library,
     component,
     connector,
     connectors,
@@ -18,9 +23,11 @@ from tests.foreign_fmus import (
     system,
     values,
     wire,
+    write_fmu,
 )  # fmt: skip
 
 U, K, Y = connector("u", "input"), connector("k", "parameter"), connector("y", "output")
+X = connector("x", "output")
 KELVIN, CELSIUS = '<Unit name="K"><BaseUnit K="1"/></Unit>', '<Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>'
 
 
@@ -179,3 +186,95 @@ def test_mistakes_at_connectors_of_systems(scenario, text, told):
 def test_a_chain_through_connectors_without_a_type(scenario):
     text = through("Real", "Real").replace('kind="input"><ssc:Real/>', 'kind="input">')
     assert [c.target for c in opened(scenario(text)).connections] == ["in.b"]
+
+
+# What FMUs say of themselves.
+
+SECOND_K = '<ScalarVariable name="k2" valueReference="1" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>'
+SECOND_U = '<ScalarVariable name="u2" valueReference="0" causality="input" variability="continuous"><Real start="0.5"/></ScalarVariable>'
+ALIASES = changed(('<ScalarVariable name="y"', f'{SECOND_K}{SECOND_U}<ScalarVariable name="y"'))
+DOUBLE = '<ssc:LinearTransformation factor="2"/>'
+
+
+@pytest.mark.parametrize("second", [3, 5])
+def test_two_names_of_one_variable_are_given_one_value(scenario, second):
+    bound = values(("k", 'Real value="3"'), ("k2", f'Real value="{second}"'))
+    folder = scenario(ssd(system(component("a", Y, bindings=bound))), panel=ALIASES)
+    if second == 3:
+        assert opened(folder).components[0].parameters == {"k": 3.0, "k2": 3.0}
+    else:
+        assert problems(folder) == ["SystemStructure.ssd:3: 'k' and 'k2' of component 'a' are one variable in the FMU, but are given 3.0 and 5.0; leave out one of them [alias]"]
+
+
+@pytest.mark.parametrize("inside", ["", DOUBLE])
+def test_and_take_one(scenario, inside):
+    elements = component("a", Y) + component("b", U, connector("u2", "input"))
+    folder = scenario(ssd(system(elements, wire("a.y", "b.u") + wire("a.y", "b.u2", inside))), panel=ALIASES)
+    if inside:
+        assert problems(folder) == ["SystemStructure.ssd:3: 'u' and 'u2' of component 'b' are one variable in the FMU, but take 'a.y' and 'a.y' x 2 + 0; leave out one of them [alias]"]
+    else:
+        assert len(opened(folder).connections) == 2
+
+
+def test_one_instance_in_a_process(scenario, tmp_path):
+    told = changed(("<CoSimulation ", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '))
+    folder = scenario(ssd(system(component("a", Y) + component("b", Y))), panel=told)
+    with pytest.raises(RunError, match=r"'a' and 'b': both are of panel.fmu, of which a process can hold only one; --isolate"):
+        ran(folder, tmp_path)
+    assert ran(folder, tmp_path, Manner(isolation=Isolation()))["b.y"][-1] == 0.5
+
+
+EARLY = ("    m->r[3] += h", "    if (t > 0.45) return 2;\n    m->r[3] += h")
+ENDS = ("GetBooleanStatus(void *c, int k, int *w) { return 2; }", "GetBooleanStatus(void *c, int k, int *w) { *w = k == 3; return 0; }")
+LAST = ("GetRealStatus(void *c, int k, double *w) { return 2; }", "GetRealStatus(void *c, int k, double *w) { if (k != 2) return 3; *w = 0.53; return 0; }")
+
+
+@pytest.mark.parametrize("isolation", [None, Isolation()])
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ((EARLY,), r"failed in a step at t = 0\.5 s, status discard: the FMU gave no reason"),
+        ((EARLY, ENDS), r"has ended the simulation at t = 0\.5 s, before the stop time"),
+        ((EARLY, ENDS, LAST), r"has ended the simulation at t = 0\.53 s, before the stop time"),
+    ],
+)  # fmt: skip
+def test_an_fmu_that_ends_early_says_so(scenario, tmp_path, changes, told, isolation):
+    """FMPy ends in silence; here the run has not reached its stop time, and is not called complete."""
+    folder = scenario(ssd(system(component("a", Y, X))))
+    write_fmu(folder / "resources/panel.fmu", compile_library(tmp_path, *changes), description())
+    with pytest.raises(RunError, match=rf"component 'a' \(panel\.fmu\) {told}\. What was computed up to t = 0\.5 s"):
+        ran(folder, tmp_path, None if isolation is None else Manner(isolation=isolation))
+
+
+# Times, sources, digits.
+
+
+def test_a_stop_time_between_steps_is_told(scenario, tmp_path):
+    folder = scenario(ssd(system(component("a", X))))
+    told = "SystemStructure.ssd: from the start to the stop time 1 s it is no whole number of macro steps of 0.3 s: the run ends at 0.9 s [stop]"
+    assert opened(folder, step=0.3).warnings == (told,)
+    assert opened(folder, step=1 / 3).warnings == ()
+    assert problems(folder, step=0.3, strict=True) == [told]
+    ours, path = ran(folder, tmp_path, step=0.3), str(folder / "resources/panel.fmu")
+    theirs = fmpy.simulate_fmu(path, stop_time=1.0, output_interval=0.3, output=["x"])  # which shortens its last step
+    assert ours["a.x"] == pytest.approx(theirs["x"][:-1], rel=1e-9)
+    assert len(theirs) == len(ours["a.x"]) + 1
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [("", "component 'a' has an empty source [source]"), ("resources", "component 'a': resources is a folder, not an FMU [fmu]")],
+)
+def test_sources_that_are_no_files(scenario, source, told):
+    assert problems(scenario(ssd(system(component("a", Y, source=source))))) == [f"SystemStructure.ssd:3: {told}"]
+
+
+def test_a_missing_source_is_told_once(scenario):
+    text = ssd(system(component("a", Y))).replace(' source="resources/panel.fmu"', "")
+    assert [p.endswith("[schema]") for p in problems(scenario(text))] == [True]
+
+
+def test_blanks_around_values_are_none(scenario):
+    bound = values(("b_in", 'Boolean value=" 1 "'), ("i_in", 'Integer value=" 5 "'), ("u", 'Real value=" 1e1 "'))
+    given = opened(scenario(ssd(system(component("a", Y, bindings=bound))))).components[0].parameters
+    assert given == {"b_in": True, "i_in": 5, "u": 10.0}

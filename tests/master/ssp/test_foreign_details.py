@@ -278,3 +278,10 @@ def test_blanks_around_values_are_none(scenario):
     bound = values(("b_in", 'Boolean value=" 1 "'), ("i_in", 'Integer value=" 5 "'), ("u", 'Real value=" 1e1 "'))
     given = opened(scenario(ssd(system(component("a", Y, bindings=bound))))).components[0].parameters
     assert given == {"b_in": True, "i_in": 5, "u": 10.0}
+
+
+def test_annotations_of_other_tools_are_noted(scenario):
+    steps = '<ssd:Annotations><ssc:Annotation type="org.openmodelica"><x:FixedStepMaster xmlns:x="urn:x" stepSize="0.5"/></ssc:Annotation></ssd:Annotations>'
+    text = ssd(system(component("a", Y)).replace("</ssd:System>", f"{steps}</ssd:System>"))
+    told = "SystemStructure.ssd:3: annotations of type 'org.openmodelica' are not read; what they tell of steps, solvers and events has no effect [note]"
+    assert opened(scenario(text), strict=True).warnings == (told,)  # a note is no mistake

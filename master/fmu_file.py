@@ -109,6 +109,8 @@ def _check_variables(root: Any) -> None:
         if not (node.get("name") and reference.isascii() and reference.isdigit() and int(reference[:11]) < 2**32):
             text = f"a variable name='{node.get('name', '')}' with valueReference='{reference}' cannot be addressed"
             raise XmlError(int(node.sourceline or 0), text)
+        if not node.get("name").isprintable():  # FMI has names in one line, and so have the tables of a run
+            raise XmlError(int(node.sourceline or 0), f"the variable name {node.get('name')!r} is not one line of text")
 
 
 def _variables(declared: Sequence[Any], differences: Mapping[str, bool]) -> dict[str, Variable]:

@@ -91,7 +91,10 @@ def _connections(systems: dict[str, SystemNode], reader: Reader) -> tuple[list[C
     """Return the connections between components as they are, and those that touch a system's connector."""
     direct, edges = [], []
     for path, system in systems.items():
+        inside = {*(x.name for x in system.components), *(x.name for x in system.systems)}
         for c in system.connections:
+            if _leads_out(c, inside, system.name, reader):
+                continue
             ends = [(c.start_element, c.start_connector), (c.end_element, c.end_connector)]
             touched = [_system_at(path, element, systems) for element, _ in ends]
             if touched == [None, None]:
@@ -100,6 +103,16 @@ def _connections(systems: dict[str, SystemNode], reader: Reader) -> tuple[list[C
             elif (edge := _edge(path, c, systems, reader)) is not None:
                 edges.append(edge)
     return direct, edges
+
+
+def _leads_out(c: Connection, inside: set[str], system: str, reader: Reader) -> bool:
+    """Report a connection with an element inside another system: from outside one connects that system."""
+    for element in (c.start_element, c.end_element):
+        if "." in element and element not in inside:
+            text = f"'{element}' is not a component or system in system '{system}'; connect the system that holds it"
+            reader.report(c.line, "connection", text)
+            return True
+    return False
 
 
 def _system_at(path: str, element: str, systems: dict[str, SystemNode]) -> str | None:

@@ -136,6 +136,8 @@ class Reader:
         first: dict[str, int] = {}
         for node in nodes:
             name = self.text(node, "name")
+            if not name.isprintable():
+                self.problem(node, "name", f"{what} {name!r}: a name is one line of text")
             if name in first:
                 where = f", first in line {first[name]}" if first[name] else ""
                 self.problem(node, "name", f"{what} '{name}' is there twice{where}; remove one")

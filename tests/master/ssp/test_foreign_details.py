@@ -285,3 +285,20 @@ def test_annotations_of_other_tools_are_noted(scenario):
     text = ssd(system(component("a", Y)).replace("</ssd:System>", f"{steps}</ssd:System>"))
     told = "SystemStructure.ssd:3: annotations of type 'org.openmodelica' are not read; what they tell of steps, solvers and events has no effect [note]"
     assert opened(scenario(text), strict=True).warnings == (told,)  # a note is no mistake
+
+
+def test_a_connection_leads_to_elements_of_its_system(scenario):
+    nested = system(component("b", U), name="in")
+    inward = wire("a.y", "b.u").replace('endElement="b"', 'endElement="in.b"')
+    assert problems(scenario(ssd(system(component("a", Y) + nested, "\n" + inward)))) == [
+        "SystemStructure.ssd:4: 'in.b' is not a component or system in system 'whole'; connect the system that holds it [connection]"
+    ]
+
+
+def test_names_are_one_line(scenario):
+    text = ssd(system(component("a", Y)))
+    assert problems(scenario(text.replace('Component name="a"', 'Component name="a&#10;b"'))) == [
+        "SystemStructure.ssd:3: element 'a\\nb': a name is one line of text [name]"
+    ]
+    told = description().replace('name="x"', 'name="x&#10;y"')
+    assert "the variable name 'x\\ny' is not one line of text" in problems(scenario(text, panel=told))[0]

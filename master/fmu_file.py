@@ -14,7 +14,7 @@ import fmpy
 
 from master.ssp.archive import read_member
 from master.ssp.units import BASE_UNITS, Unit
-from master.ssp.xml import XmlError, safe_root
+from master.ssp.xml import XmlError, is_one_line, safe_root
 from master.system import Fmu, Variable
 
 _DESCRIPTION: Final = "modelDescription.xml"
@@ -109,7 +109,7 @@ def _check_variables(root: Any) -> None:
         if not (node.get("name") and reference.isascii() and reference.isdigit() and int(reference[:11]) < 2**32):
             text = f"a variable name='{node.get('name', '')}' with valueReference='{reference}' cannot be addressed"
             raise XmlError(int(node.sourceline or 0), text)
-        if not node.get("name").isprintable():  # FMI has names in one line, and so have the tables of a run
+        if not is_one_line(node.get("name")):  # FMI has names in one line, and so have the tables of a run
             raise XmlError(int(node.sourceline or 0), f"the variable name {node.get('name')!r} is not one line of text")
 
 

@@ -136,7 +136,7 @@ class Reader:
         first: dict[str, int] = {}
         for node in nodes:
             name = self.text(node, "name")
-            if not name.isprintable():
+            if not is_one_line(name):
                 self.problem(node, "name", f"{what} {name!r}: a name is one line of text")
             if name in first:
                 where = f", first in line {first[name]}" if first[name] else ""
@@ -182,6 +182,11 @@ class Reader:
 @cache
 def _schema(kind: str) -> Any:
     return etree.XMLSchema(file=str(importlib.resources.files("fmpy") / "ssp" / "schema" / SCHEMAS[kind]))
+
+
+def is_one_line(name: str) -> bool:
+    """Whether a name has no line breaks nor other control characters."""
+    return len(name.splitlines()) < 2 and not any(ord(letter) < ord(" ") for letter in name)
 
 
 def tag(node: Any) -> str:

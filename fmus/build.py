@@ -226,21 +226,31 @@ def build(
     Raises
     ------
     BuildError
-        If the definition or the sources do not make an FMU.
+        If the definition or the sources do not make an FMU, or it cannot be written.
     """
     data = archive(wanted, loader, _origin(wanted, folder), runtime)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
-    handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{wanted.name}.", suffix=".tmp")
+    try:
+        _write_whole(path, data)
+    except OSError as error:
+        raise BuildError(f"{path} cannot be written ({error.strerror or error})") from error
+    return path
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Write the file beside its place, of any process's own name there, and put it in its place when it is whole."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".tmp")
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    return path
 
 
 def archive(

@@ -1,12 +1,12 @@
 """Coupling schemes: who is told what, and when, within a macro step.
 
-To add one, write a class with ``name`` and ``step`` and put it into `make_algorithm` (and its name into
-``master.ssp.annotation.Scheme``).
+To add one, write a class with ``name`` and ``step`` and put it into `ALGORITHMS`, its name into
+``master.ssp.annotation.Scheme`` and its options into ``OPTIONS`` there: `tests/test_registries.py` walks all three.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Protocol
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from master.arrays import FloatArray
 from master.errors import RunError
 from master.network import Network
-from master.ssp.annotation import Coupling
+from master.ssp.annotation import Coupling, Scheme
 
 #: Exchanges at the start before the values must be consistent, and their relative tolerance.
 MAX_INITIAL_EXCHANGES: Final = 50
@@ -174,13 +174,25 @@ class Iterative:
         return change
 
 
+#: What makes the schemes, out of their options.
+ALGORITHMS: Final[dict[Scheme, Callable[..., Algorithm]]] = {
+    "jacobi": Jacobi,
+    "gauss-seidel": GaussSeidel,
+    "iterative": Iterative,
+}
+
+
 def make_algorithm(coupling: Coupling) -> Algorithm:
-    """Return the scheme that the settings ask for."""
-    if coupling.scheme == "jacobi":
-        return Jacobi()
-    if coupling.scheme == "gauss-seidel":
-        return GaussSeidel(coupling.order)
-    return Iterative(coupling.tolerance, coupling.max_iterations, coupling.weight)
+    """Return the scheme that the settings ask for.
+
+    Raises
+    ------
+    RunError
+        If there is none of this name.
+    """
+    if coupling.scheme not in ALGORITHMS:
+        raise RunError(f"there is no coupling scheme '{coupling.scheme}' (known: {', '.join(ALGORITHMS)})")
+    return ALGORITHMS[coupling.scheme](**coupling.options)
 
 
 def initialise(network: Network, start: float, stop: float, starts: Mapping[str, float] | None = None) -> int:

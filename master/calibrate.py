@@ -219,4 +219,4 @@ def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     m = found[0]
     comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
     new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"
-    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode())
+    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode(), "a copy of the scenario elsewhere")

@@ -1,12 +1,18 @@
-"""What the FMUs of a run warn of: told once, when initialization and the first step are over."""
+"""What the FMUs of a run warn of, when initialization and the first step are over, and values that cannot be."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
 
 from master.instance import Cautious
 from master.network import Network
+
+#: Magnitude beyond which no length, velocity or force of a line and a pantograph lies [SI].
+LARGEST: Final = 1e15
 
 
 @dataclass(frozen=True)
@@ -32,8 +38,15 @@ class Caution:
         return f"warning: component '{self.component}' says: {self.text}"
 
 
+class Excess(Caution):
+    """What was seen in an FMU's values, which has not warned of it itself; the text begins with the variable."""
+
+    def __str__(self) -> str:
+        return f"warning: component '{self.component}': {self.text}"
+
+
 class CautionObserver:
-    """Observer that asks the FMUs after initialization, and once more after the first step.
+    """Observer that asks the FMUs after initialization, and once more after the first step, and looks at all values.
 
     Parameters
     ----------
@@ -49,14 +62,18 @@ class CautionObserver:
     def __init__(self, tell: Callable[[Caution], None] = lambda _: None) -> None:
         self._tell = tell
         self._has_stepped = False
+        self._seen: set[str] = set()
         self.warnings: list[Caution] = []
 
     def begin(self, start: float, network: Network) -> None:
         """Initialization is over."""
         self._look(network)
+        self._weigh(start, network)
 
     def observe(self, index: int, end: float, network: Network) -> None:
-        """Look once more after the first step."""
+        """Look at the values, and once more at the warnings after the first step."""
+        if max(map(abs, network.outputs.tolist()), default=0.0) > LARGEST:
+            self._weigh(end, network)
         if not self._has_stepped:
             self._has_stepped = True
             self._look(network)
@@ -74,3 +91,13 @@ class CautionObserver:
         for slave in network.slaves:
             for text in slave.warnings() if isinstance(slave, Cautious) else ():
                 self.add(Caution(slave.name, text))
+
+    def _weigh(self, time: float, network: Network) -> None:
+        """Tell once of every output that has become larger than anything can be."""
+        for index in np.flatnonzero(np.abs(network.outputs) > LARGEST):
+            name = network.output_names[index]
+            if name not in self._seen:
+                self._seen.add(name)
+                component, _, variable = name.partition(".")
+                text = f"{variable} became {network.outputs[index]:.3g} at t = {time:.6g} s, larger than anything here"
+                self.add(Excess(component, f"{text} can be ({LARGEST:g}); the results mean nothing"))

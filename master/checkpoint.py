@@ -21,8 +21,9 @@ import numpy as np
 from master.algorithm import Algorithm, initialise
 from master.arrays import FloatArray
 from master.durable import write_whole
-from master.errors import MasterError, RunError, UsageError, one_line
+from master.errors import MasterError, RequestError, RunError, one_line
 from master.network import Network
+from master.rounding import steps_in
 from master.simulation import TimeGrid
 from master.system import Component, System
 
@@ -72,6 +73,8 @@ class Checkpoint:
         Identity of the run that it comes from.
     observers : dict
         What observers remember, by their names.
+    options : dict
+        What the coupling scheme goes by (`scheme_options`).
     """
 
     start: float
@@ -85,6 +88,7 @@ class Checkpoint:
     scheme: str
     run: str = ""
     observers: dict[str, list[float | None]] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
 
     @property
     def time(self) -> float:
@@ -125,7 +129,7 @@ class Continuation:
 
         Raises
         ------
-        UsageError
+        RequestError
             Naming every difference.
         """
         unknown = [name for name in self.renewed if name not in {c.name for c in system.components}]
@@ -140,7 +144,7 @@ class Continuation:
         if grid.count < grid.first or (grid.count == grid.first and not self.is_same_run):
             found.append(f"it was saved at {self.checkpoint.time:g} s, the run would end at {system.stop:g} s")
         if found:
-            raise UsageError(f"{self.file} does not fit this run: " + "; ".join(found))
+            raise RequestError(f"{self.file} does not fit this run: " + "; ".join(found))
 
     def _changes(self, system: System) -> list[str]:
         c, scheme = self.checkpoint, system.settings.coupling.scheme
@@ -150,6 +154,13 @@ class Continuation:
             found.append(f"its step was {c.step:g} s from {c.start:g} s on, is {now}")
         if scheme != c.scheme:
             found.append(f"its scheme was {c.scheme}, is {scheme}")
+            return found
+        wanted = scheme_options(system)
+        found += [
+            f"the {name} of its scheme was {_told(c.options.get(name))}, is {_told(value)}"
+            for name, value in wanted.items()
+            if name in c.options and c.options[name] != value
+        ]
         return found
 
     def prepare(self, network: Network, algorithm: Algorithm, grid: TimeGrid) -> None:
@@ -246,13 +257,13 @@ def index_at(system: System, time: float) -> int:
 
     Raises
     ------
-    UsageError
+    RequestError
         If that is no communication point of the run, or a component cannot be saved.
     """
     steps = (time - system.start) / system.step
     index = round(steps)
     if not 0 < index <= system.step_count or abs(steps - index) > _ROUNDING:
-        raise UsageError(
+        raise RequestError(
             f"--checkpoint {time:g}: not a communication point of the run, which goes from {system.start:g} s to "
             f"{system.stop:g} s in steps of {system.step:g} s"
         )
@@ -265,20 +276,32 @@ def steps_between(system: System, period: float) -> int:
 
     Raises
     ------
-    UsageError
+    RequestError
         If a component cannot be saved.
     """
     _check_serialisable(system, "--checkpoint-every")
-    return max(1, round(period / system.step))
+    return steps_in(period, system.step)
 
 
 def _check_serialisable(system: System, option: str) -> None:
     cannot = [c.name for c in system.components if not c.fmu.can_serialise]
     if cannot:
-        raise UsageError(f"{option}: the FMU of {', '.join(cannot)} cannot serialise its state")
+        raise RequestError(f"{option}: the FMU of {', '.join(cannot)} cannot serialise its state")
     texts = [f"{c.name}.{name}" for c in system.components for name in c.texts]
     if texts:
-        raise UsageError(f"{option}: '{texts[0]}' is a text that is exchanged, which a checkpoint cannot hold")
+        raise RequestError(f"{option}: '{texts[0]}' is a text that is exchanged, which a checkpoint cannot hold")
+
+
+def scheme_options(system: System) -> dict[str, Any]:
+    """Return what the coupling scheme goes by, as JSON has it; an order left open is that of the file."""
+    options = dict(system.settings.coupling.options)
+    if "order" in options:
+        options["order"] = list(options["order"] or (c.name for c in system.components))
+    return options
+
+
+def _told(value: Any) -> str:
+    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def take(
@@ -302,6 +325,7 @@ def take(
         algorithm.name,
         run,
         {observer.name: observer.memory() for observer in observers},
+        scheme_options(system),
     )
 
 
@@ -340,6 +364,7 @@ def pack(checkpoint: Checkpoint) -> bytes:
         "states": {name: len(state) for name, state in c.states.items()},
         "run": c.run,
         "observers": c.observers,
+        "options": c.options,
     }
     text = json.dumps(header, allow_nan=False).encode()
     raw = numbers.astype("<f8").tobytes() + c.memory.astype("<f8").tobytes() + b"".join(c.states.values())
@@ -395,6 +420,7 @@ def _unpack_body(header: dict[str, Any], raw: bytes) -> Checkpoint:
         header["scheme"],
         header.get("run", ""),
         header.get("observers", {}),
+        header.get("options", {}),
     )
 
 

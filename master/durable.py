@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -11,11 +14,31 @@ from master.errors import MasterError
 
 #: What a file that is being written is called.
 PART: Final = ".part"
+#: Where else the user can have it, for most files of ours.
+_ELSEWHERE: Final = "another folder with --out"
+#: How a cell begins that a spreadsheet computes, behind what keeps it from doing so.
+_FORMULA: Final = re.compile(r"'*[=+\-@\t\r]")
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes, elsewhere: str = _ELSEWHERE) -> None:
     """Write a file in one go: readers see the old one or the new one, never half of it, whatever happens.
+
+    Raises
+    ------
+    MasterError
+        If it cannot be written; the old one is still there then.
+    """
+    with whole_file(path, elsewhere) as temporary, temporary.open("wb") as file:
+        file.write(data)
+
+
+@contextmanager
+def whole_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
+    """Give a file to write beside ``path``, which takes its place once it is complete and on the disk.
+
+    For those who write by name; what is at hand as bytes goes to `write_whole`. Where it cannot be written, the user
+    is told to choose ``elsewhere``.
 
     Raises
     ------
@@ -25,29 +48,47 @@ def write_whole(path: Path, data: bytes) -> None:
     # Hidden, so that no archive takes it along, and each process has its own: two writers do not mix.
     temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
+        yield temporary
+        _sync(temporary)
         temporary.replace(path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise cannot_write(path, error) from error
+        _sync(path.parent)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise cannot_write(path, error, elsewhere) from error
+        raise
 
 
-def cannot_write(path: Path, error: OSError) -> MasterError:
+def cannot_write(path: Path, error: OSError, elsewhere: str = _ELSEWHERE) -> MasterError:
     """Return the error that tells the user which file cannot be written, why, and what to do."""
     remedy = "make room there, or choose" if error.errno in _NO_ROOM else "choose"
-    return MasterError(f"{path} cannot be written ({error.strerror or error}); {remedy} another folder with --out")
+    return MasterError(f"{path} cannot be written ({error.strerror or error}); {remedy} {elsewhere}")
 
 
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
+def _sync(path: Path) -> None:
+    """Wait until a file or a folder's entries are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def safe_cell(text: str) -> str:
+    """Return text for a cell of a table that a spreadsheet does not take for a formula; `plain_cell` undoes it.
+
+    Examples
+    --------
+    >>> safe_cell("=cmd|'/C calc'!A0"), safe_cell("31 m"), plain_cell(safe_cell("'=1"))
+    ("'=cmd|'/C calc'!A0", '31 m', "'=1")
+    """
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
+def plain_cell(cell: str) -> str:
+    """Return the text of which `safe_cell` has made a cell."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 class LineFile:

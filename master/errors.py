@@ -24,7 +24,23 @@ def one_line(text: str) -> str:
     if len(text) > _LONGEST:
         half = _LONGEST // 2
         text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    return "".join(map(_shown, text))
+
+
+def printable(text: str) -> str:
+    r"""Return text whose characters all print, lines kept: for what others have written, on its way to a terminal.
+
+    Examples
+    --------
+    >>> print(printable("red\x1b[31m\nnext"))
+    red\x1b[31m
+    next
+    """
+    return text if text.isprintable() else "".join(c if c == "\n" else _shown(c) for c in text)
+
+
+def _shown(c: str) -> str:
+    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
 
 
 @dataclass(frozen=True)
@@ -85,5 +101,12 @@ class ForeignResultsError(MasterError):
     """A results folder that no longer holds what the run has written into it."""
 
 
+class RequestError(MasterError):
+    """A command line that asks for what cannot be had: a name that is nowhere, a value out of range.
+
+    The command has failed (exit code 1), as it has for a scenario or a file that cannot be used.
+    """
+
+
 class UsageError(MasterError):
-    """A wrong command line."""
+    """A command line that was not understood: options that lack or exclude one another (exit code 2)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from master.durable import whole_file
 from master.errors import MasterError
 from master.recorder import Recording, header, load
 from master.results import FORCES, TIMESERIES
@@ -32,5 +33,6 @@ def _write(recording: Recording, path: Path) -> Path:
         raise MasterError("Parquet needs pyarrow: pip install 'openpanto[parquet]'") from error
     titles = header(recording.names, recording.units)
     columns = [recording.time, *recording.values.T]
-    parquet.write_table(pyarrow.table(dict(zip(titles, columns, strict=True))), path)
+    with whole_file(path) as temporary:
+        parquet.write_table(pyarrow.table(dict(zip(titles, columns, strict=True))), temporary)
     return path

@@ -22,7 +22,8 @@ from master.errors import one_line
 _KEPT: Final = 20
 _LONGEST: Final = 1 << 16
 
-#: FMI status of a warning.
+#: FMI status of what is no more than information, and of a warning.
+_OK: Final = 0
 _WARNING: Final = 1
 
 #: Status and text, by instance.
@@ -30,7 +31,8 @@ _messages: defaultdict[str, deque[tuple[int, str]]] = defaultdict(lambda: deque(
 
 
 def _log(_environment: Any, instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-    if status > 0:
+    if status != _OK:
+        # The FMU's own words go to terminals, tables and pages: on one line, without control characters.
         text = one_line(" ".join(message[:_LONGEST].decode("utf-8", "replace").split()))
         _messages[(instance or b"").decode("utf-8", "replace")].append((status, text))
 
@@ -57,7 +59,7 @@ def clear(instance: str) -> None:
 def last_words(instance: str) -> str:
     """Return the last error message of an instance, its last warning if there is none, empty if it said nothing."""
     said = _messages.get(instance, ())
-    errors = [text for status, text in said if status > _WARNING]
+    errors = [text for status, text in said if status not in (_OK, _WARNING)]
     return [*(text for _, text in said), *errors][-1] if said else ""
 
 

@@ -24,14 +24,15 @@ from master.system import Component, Variable
 from master.unpacked import Unpacked
 
 _STATUS: Final = ("ok", "warning", "discard", "error", "fatal", "pending")
-#: Statuses after which a run may go on; whatever else comes, also what FMI does not know, has failed.
+#: What counts as success: ok and warning. A number that FMI does not know, a negative one too, is a failure.
 _GOOD: Final = (0, 1)
-_FATAL: Final = 4
+#: After these an instance must not be called any more; nor after a number that FMI does not know.
+_LIVING: Final = range(4)
 _DISCARD: Final = 2
 #: Kinds of fmi2StatusKind: the time of the last step that succeeded, and whether the FMU wants to end.
 _LAST_TIME: Final = 2
 _TERMINATED: Final = 3
-#: Longest serialised state that is taken from an FMU [bytes].
+#: Largest state that is taken from an FMU [bytes].
 LONGEST_STATE: Final = 1 << 30
 
 
@@ -222,14 +223,21 @@ class Instance:
         state, size = self.save(), c_size_t()
         try:
             self._call("serialising its state", "fmi2SerializedFMUstateSize", state, byref(size))
-            if size.value > LONGEST_STATE:
-                text = f"claims a state of {size.value} bytes, of which at most {LONGEST_STATE} are taken"
-                raise SlaveError(f"component '{self.name}' ({self.component.fmu.path.name}) {text}")
-            data = (c_char * size.value)()
+            data = self._room(size.value)
             self._call("serialising its state", "fmi2SerializeFMUstate", state, data, size.value)
             return data.raw
         finally:
             self.release(state)
+
+    def _room(self, size: int) -> Any:
+        """Return room for a state of the size that the FMU claims."""
+        claim = f"component '{self.name}' ({self.component.fmu.path.name}) claims a state of {size} bytes"
+        if size > LONGEST_STATE:
+            raise SlaveError(f"{claim}, more than the {LONGEST_STATE} that are read; it cannot be checkpointed")
+        try:
+            return (c_char * size)()
+        except MemoryError as error:
+            raise SlaveError(f"{claim}, for which there is no memory; it cannot be checkpointed") from error
 
     def deserialise(self, data: bytes) -> None:
         """Return to a state given as bytes."""
@@ -270,7 +278,7 @@ class Instance:
 
     def error(self, doing: str, status: int) -> SlaveError:
         """Return the error for a failed call, in the FMU's own words if it said any."""
-        self._dead = self._dead or status >= _FATAL
+        self._dead = self._dead or status not in _LIVING
         label = _STATUS[status] if 0 <= status < len(_STATUS) else f"{status}, which FMI does not know"
         said = fmi_log.last_words(self.name) or "the FMU gave no reason"
         at = f" at t = {self.time:.6g} s" if self.time == self.time else ""

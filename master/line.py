@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,6 +18,8 @@ from master.system import System
 
 #: Calculated parameter of a line that closes on itself: the length after which it repeats [m].
 PERIOD: Final = "period"
+#: Most laps on a line that closes on itself.
+_MOST_LAPS: Final = 10_000
 _INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
 
 #: Values of one component's calculated parameters by variable name.
@@ -113,9 +115,22 @@ def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:
     return np.array([found[i] for i in sorted(found)])
 
 
+def aligned(geometry: Mapping[str, float], kind: str, names: Sequence[str]) -> dict[str, FloatArray]:
+    """Return values of supports or droppers that are to be put side by side, of those whose ``x`` is known.
+
+    Examples
+    --------
+    >>> known = {"support[1].x": 0.0, "support[2].x": 50.0, "support[2].z": 5.0, "support[3].z": 6.0}
+    >>> {name: values.tolist() for name, values in aligned(known, "support", ("x", "z")).items()}
+    {'x': [0.0, 50.0], 'z': [nan, 5.0]}
+    """
+    numbers = sorted(int(m[2]) for k in geometry if (m := _INDEXED.fullmatch(k)) and (m[1], m[3]) == (kind, "x"))
+    return {name: np.array([geometry.get(f"{kind}[{i}].{name}", math.nan) for i in numbers]) for name in names}
+
+
 def period_of(geometry: Mapping[str, float]) -> float:
     """Return the length after which a line repeats because it closes on itself [m]; 0 if it does not."""
-    return geometry.get(PERIOD, 0.0)
+    return max(0.0, geometry.get(PERIOD, 0.0))
 
 
 def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArray:
@@ -139,8 +154,17 @@ def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArr
     period, x = period_of(geometry), indexed(geometry, "support", "x")
     if not period or not len(x):
         return np.zeros(1)
-    first, last = (math.floor((limit - x.min()) / period) for limit in limits)
-    return period * np.arange(first, last + 1)
+    return period * _whole(*((limit - x.min()) / period for limit in limits))
+
+
+def _whole(first: float, last: float) -> FloatArray:
+    """Return the whole numbers from the one at or below ``first`` to that at or below ``last``, shape (n,).
+
+    Where there are more than any run has laps, the positions mean nothing, and there are none.
+    """
+    if not last - first <= _MOST_LAPS:
+        return np.zeros(0)
+    return np.arange(math.floor(first), math.floor(last) + 1, dtype=np.float64)
 
 
 def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -> FloatArray:
@@ -155,6 +179,38 @@ def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -
     """
     x = (laps(geometry, limits)[:, None] + indexed(geometry, kind, "x")).ravel()
     return x[(x >= limits[0]) & (x <= limits[1])]
+
+
+def passages(
+    x: float, interval: tuple[float | None, float | None], travelled: tuple[float, float], period: float = 0.0
+) -> FloatArray:
+    """Return where a place is passed within an interval of the track, shape (n,) [m].
+
+    Parameters
+    ----------
+    x : float
+        The place [m].
+    interval : (float or None, float or None)
+        Ends of the interval [m]; None where it has none.
+    travelled : (float, float)
+        Between what positions the run goes [m]: on a line that repeats there is no lap beyond.
+    period : float
+        Length after which the line repeats [m]; 0 if it does not: then the place is passed once.
+
+    Examples
+    --------
+    >>> passages(20.0, (110.0, None), (0.0, 330.0), 100.0).tolist()
+    [120.0, 220.0, 320.0]
+    >>> passages(20.0, (110.0, None), (0.0, 330.0)).tolist()
+    []
+    """
+    start = -math.inf if interval[0] is None else interval[0]
+    end = math.inf if interval[1] is None else interval[1]
+    if not period:
+        return np.array([x] if start <= x <= end else [])
+    start, end = max(start, travelled[0]), min(end, travelled[1])
+    places: FloatArray = x + period * _whole((start - x) / period, (end - x) / period)
+    return places[(places >= start) & (places <= end)]
 
 
 def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:

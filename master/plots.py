@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
 from master.evaluation.contact_signals import Signals
-from master.line import Uplift, by_section, indexed, met
+from master.line import Uplift, aligned, by_section, indexed, met
 from master.results import Results
 
 _COLOURS: Final = ("#1f5fa8", "#c2571a", "#2e7d4f", "#7b3fa0")
@@ -103,8 +103,8 @@ def geometry(values: dict[str, float]) -> Figure | None:
         return None
     figure, (elevation, plan) = _figure(2, height=2.6)
     for section in by_section(values):
-        droppers = {n: indexed(section, "dropper", n) for n in ("x", "upper.z", "lower.z", "lower.y")}
-        supports = {n: indexed(section, "support", n) for n in ("x", "y", "z", "messenger_wire.z")}
+        droppers = aligned(section, "dropper", ("x", "upper.z", "lower.z", "lower.y"))
+        supports = aligned(section, "support", ("x", "y", "z", "messenger_wire.z"))
         _draw_elevation(elevation, droppers, supports)
         _draw_plan(plan, droppers, supports)
     _one_legend(elevation)
@@ -121,8 +121,7 @@ def _draw_elevation(axes: Any, droppers: dict[str, FloatArray], supports: dict[s
         ("messenger wire", high, supports["messenger_wire.z"], _COLOURS[1]),
     )
     for label, at_droppers, at_supports, colour in wires:
-        points = at_supports if len(at_supports) == len(supports["x"]) else np.full(len(supports["x"]), np.nan)
-        xs, zs = _merged(x, at_droppers, supports["x"], points)
+        xs, zs = _merged(x, at_droppers, supports["x"], at_supports)
         axes.plot(xs, zs, color=colour, linewidth=1.1, label=label)
     axes.plot(supports["x"], supports["z"], "v", color="black", markersize=4, label="support")
     axes.set_ylabel("height [m]")
@@ -137,7 +136,7 @@ def _one_legend(axes: Any) -> None:
 
 
 def _draw_plan(axes: Any, droppers: dict[str, FloatArray], supports: dict[str, FloatArray]) -> None:
-    if len(droppers["lower.y"]) and len(supports["y"]) == len(supports["x"]):
+    if not (np.isnan(droppers["lower.y"]).all() or np.isnan(supports["y"]).all()):
         xs, ys = _merged(droppers["x"], droppers["lower.y"], supports["x"], supports["y"])
         axes.plot(xs, ys, color=_COLOURS[0], linewidth=1.1)
         axes.plot(supports["x"], supports["y"], "v", color="black", markersize=4)
@@ -146,9 +145,8 @@ def _draw_plan(axes: Any, droppers: dict[str, FloatArray], supports: dict[str, F
 
 
 def _merged(x1: FloatArray, y1: FloatArray, x2: FloatArray, y2: FloatArray) -> tuple[FloatArray, FloatArray]:
-    known = np.isfinite(y2)
-    x = np.concatenate((x1, x2[known]))
-    y = np.concatenate((y1, y2[known]))
+    x, y = np.concatenate((x1, x2)), np.concatenate((y1, y2))
+    x, y = x[np.isfinite(y)], y[np.isfinite(y)]
     order = np.argsort(x, kind="stable")
     return x[order], y[order]
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.durable import LineFile
+from master.durable import LineFile, plain_cell, safe_cell
 from master.errors import MasterError
 from master.network import Network
 from master.pattern import matcher
@@ -200,7 +200,7 @@ class Recorder:
 
 def _title_line(names: Sequence[str], units: Sequence[str]) -> str:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(header(names, units))
+    csv.writer(text, lineterminator="\n").writerow(map(safe_cell, header(names, units)))
     return text.getvalue()
 
 
@@ -232,7 +232,7 @@ def load(path: Path) -> Recording:
     except (OSError, UnicodeDecodeError) as error:
         raise MasterError(f"{path} cannot be read ({error})") from error
     first, _, rest = text[: text.rfind("\n") + 1].partition("\n")
-    titles = next(csv.reader([first]), [])
+    titles = [plain_cell(cell) for cell in next(csv.reader([first]), [])]
     if titles[:1] != ["time [s]"]:
         raise MasterError(f"{path} is not a recording: its first column is not 'time [s]'")
     return _table(path, titles[1:], rest)

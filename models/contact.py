@@ -8,8 +8,10 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -82,9 +84,105 @@ def continuous_contact(
     return NormalForce(elastic * factor, n * elastic / penetration * factor, elastic * hysteresis)
 
 
+#: Penetration, its velocity, the velocity at impact, parameters -> normal force and its slopes.
+#:
+#: A law must be continuous in penetration and velocity, and give no force without penetration nor ever pull. A step
+#: looks for the force that the law gives at the penetration that this very force leaves; where a law jumps over it
+#: there is none, however short the step. So every law comes in through `register_contact_law`, which looks for jumps.
 ContactLaw = Callable[[float, float, float, ContactParameters], NormalForce]
+_laws: dict[str, ContactLaw] = {}
 #: Contact laws by name.
-CONTACT_LAWS: dict[str, ContactLaw] = {"continuous": continuous_contact}
+CONTACT_LAWS: Final[Mapping[str, ContactLaw]] = MappingProxyType(_laws)
+
+
+class ContactLawError(ValueError):
+    """A contact law that no step could be solved with."""
+
+
+class _Trial(NamedTuple):
+    """Parameters that a law is tried with."""
+
+    stiffness: float
+    exponent: float
+    restitution: float
+
+
+#: What a law is tried with: parameters, penetrations [m] and velocities [m/s] of the order of a pantograph's.
+_TRIALS: Final = (_Trial(5e4, 1.0, 1.0), _Trial(2e5, 1.5, 0.7))
+_DEEPEST: Final = 0.02
+_FASTEST: Final = 1.0
+_IMPACT: Final = 0.3
+_PIECES: Final = 32
+#: Largest change of a force over a vanishing change of its arguments [N].
+_JUMP: Final = 1e-3
+_HALVINGS: Final = 48
+
+
+def register_contact_law(name: str, law: ContactLaw) -> None:
+    """Make a contact law known under a name.
+
+    Raises
+    ------
+    ContactLawError
+        If the name is taken, or if the law jumps, pulls, is not finite or acts without penetration, with the place.
+    """
+    if name in _laws:
+        raise ContactLawError(f"there is a contact law '{name}' already")
+    for trial in _TRIALS:
+        for velocity in (-0.4, 0.0, 0.4):
+            _check_sweep(name, _over_penetration(law, trial, velocity), -_DEEPEST, _DEEPEST, "penetration")
+        for penetration in (0.001, 0.01):
+            _check_sweep(name, _over_velocity(law, trial, penetration), -_FASTEST, _FASTEST, "velocity")
+    _laws[name] = law
+
+
+def _over_penetration(law: ContactLaw, trial: _Trial, velocity: float) -> Callable[[float], float]:
+    return lambda penetration: law(penetration, velocity, _IMPACT, trial).force
+
+
+def _over_velocity(law: ContactLaw, trial: _Trial, penetration: float) -> Callable[[float], float]:
+    return lambda velocity: law(penetration, velocity, _IMPACT, trial).force
+
+
+def _check_sweep(name: str, force: Callable[[float], float], low: float, high: float, what: str) -> None:
+    """Refuse a law that has no sound force somewhere between two values of an argument."""
+    at = [low + (high - low) * i / _PIECES for i in range(_PIECES + 1)]
+    values = [force(x) for x in at]
+    for x, value in zip(at, values, strict=True):
+        if not 0.0 <= value < math.inf:
+            raise ContactLawError(f"contact law '{name}' gives {value:g} N at a {what} of {x:g}: not a push")
+        if what == "penetration" and x <= 0.0 and value > 0.0:
+            raise ContactLawError(f"contact law '{name}' gives {value:g} N at a {what} of {x:g} m: without contact")
+    for (a, b), (low_force, high_force) in zip(pairwise(at), pairwise(values), strict=True):
+        jump, place = _jump(force, (a, low_force), (b, high_force))
+        if jump > _JUMP:
+            text = f"jumps by {jump:g} N at a {what} of {place:g}: a step beside it would have no solution"
+            raise ContactLawError(f"contact law '{name}' {text}")
+
+
+def _jump(
+    force: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
+) -> tuple[float, float]:
+    """Return by how much a force changes over the shortest piece of an interval that it changes most over, and where.
+
+    Examples
+    --------
+    >>> _jump(lambda x: 3.0 * x + 2.0 * (x > 0.3), (0.0, 0.0), (1.0, 5.0))
+    (2.0, 0.3)
+    """
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (first[0] + last[0])
+        if abs(last[1] - first[1]) <= _JUMP or not first[0] < middle < last[0]:
+            break
+        between = (middle, force(middle))
+        if abs(between[1] - first[1]) >= abs(last[1] - between[1]):
+            last = between
+        else:
+            first = between
+    return round(abs(last[1] - first[1]), 9), round(last[0], 9)
+
+
+register_contact_law("continuous", continuous_contact)
 
 
 def crossing(

@@ -54,12 +54,26 @@ def beyond_all(value: float) -> str:
     return ""
 
 
+def in_its_unit(unit: str) -> str:
+    """Return what to do about a value out of range: most such values are in another unit."""
+    return "" if unit == "1" else ": check its size and its unit"
+
+
 def one_line(text: str) -> str:
     """Return text on one line, without control characters, its middle left out if it is very long."""
     if len(text) > _LONGEST:
         half = _LONGEST // 2
         text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    return "".join(map(_printed, text))
+
+
+def printable(text: str) -> str:
+    """Return text whose characters all print, lines kept: for what others have written, on its way to a terminal."""
+    return "".join(c if c == "\n" else _printed(c) for c in text)
+
+
+def _printed(c: str) -> str:
+    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
 
 
 @dataclass(frozen=True)
@@ -385,7 +399,8 @@ class Table:
             if positive and value < SMALLEST:
                 self.problem(name, f"{value:g} {unit} must be greater than 0")
             elif not minimum <= value <= maximum:
-                self.problem(name, f"{value:g} {unit} is outside {minimum:g} ... {maximum:g} {unit}")
+                text = f"{value:g} {unit} is outside {minimum:g} ... {maximum:g} {unit}"
+                self.problem(name, text + in_its_unit(unit))
 
     def _report_unknown(self) -> None:
         for name in self._data:

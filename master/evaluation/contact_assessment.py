@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -15,7 +15,7 @@ from master.evaluation.contact_quality import Quality, figures_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals
 from master.evaluation.en50367_limits import Criterion, judge
 from master.evaluation.filters import evaluated, stands_in
-from master.line import Geometry, Uplift, indexed, met, period_of, support_uplifts
+from master.line import Geometry, Uplift, indexed, met, passages, period_of, support_uplifts
 from master.recorder import Recording
 
 #: A pantograph's effect on a dropper begins this long before it passes, and is followed this long after [s].
@@ -72,6 +72,8 @@ class Assessment:
         Share of the interval's droppers that carry nothing for a moment as this pantograph passes.
     spans : tuple of SpanFigures
         Every whole span after the contact has settled.
+    withheld : str
+        Why there is no verdict; there are no criteria then. Empty if there is one.
     """
 
     contact: Contact
@@ -81,11 +83,16 @@ class Assessment:
     supports: int = 0
     slack: float | None = None
     spans: tuple[SpanFigures, ...] = ()
+    withheld: str = ""
 
     @property
     def passed(self) -> bool:
-        """Whether every limit is kept."""
-        return all(c.passed for c in self.criteria)
+        """Whether every limit is kept, and nothing speaks against saying so."""
+        return not self.withheld and all(c.passed for c in self.criteria)
+
+    def without_verdict(self, reason: str) -> Assessment:
+        """Return the figures without a verdict, and why."""
+        return replace(self, criteria=(), withheld=reason)
 
     @property
     def drift(self) -> str:
@@ -204,10 +211,7 @@ def _droppers_met(
     x = geometry.get(f"{name.removeprefix(f'{contact.catenary}.').removesuffix('.force')}.x")
     if x is None:
         return np.zeros(0)
-    period = period_of(geometry)
-    laps = np.arange(np.ceil((limits[0] - x) / period), np.floor((limits[1] - x) / period) + 1.0) if period else 0.0
-    places = x + period * np.atleast_1d(laps)
-    return places[(places >= limits[0]) & (places <= limits[1])]
+    return passages(x, limits, limits, period_of(geometry))
 
 
 def _count_slack(recording: Recording, name: str, begin: FloatArray, end: FloatArray) -> int:

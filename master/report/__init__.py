@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from master import plots, results
+from master.durable import whole_file, write_whole
 from master.report.measured import Comparison, comparison_rows
 from master.report.output_charts import has_contacts, output_plots, outputs_table
 from master.report.page import page
@@ -42,9 +43,11 @@ __all__ = [
 def write(done: Results, measured: Comparison | None = None) -> Path:
     """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
     path = done.folder / results.REPORT
-    path.write_text(page(done, measured), encoding="utf-8")
+    write_whole(path, page(done, measured).encode())
     figures = plots.all_plots(done) if has_contacts(done) else output_plots(done)
     for name, figure in figures.items():
-        figure.savefig(done.folder / f"{name}.svg", metadata={"Date": None})
-        figure.savefig(done.folder / f"{name}.png", dpi=130)
+        with whole_file(done.folder / f"{name}.svg") as temporary:
+            figure.savefig(temporary, format="svg", metadata={"Date": None})
+        with whole_file(done.folder / f"{name}.png") as temporary:
+            figure.savefig(temporary, format="png", dpi=130)
     return path

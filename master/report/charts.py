@@ -16,7 +16,7 @@ from master.arrays import FloatArray
 from master.evaluation.contact_signals import Signals, power_spectrum
 from master.evaluation.en50367_limits import limits_at
 from master.evaluation.filters import FILTER_REACH, stands_in
-from master.line import Uplift, by_section, indexed, met, period_of
+from master.line import Uplift, aligned, by_section, indexed, met, period_of
 from master.recorder import Recording
 from master.report.encode import kept_samples, packed
 from master.results import Results
@@ -433,15 +433,15 @@ def geometry_charts(name: str, values: dict[str, float]) -> list[Chart]:
         return []
     title = f"Static geometry of the {name}"
     elevation = Chart(f"elevation_{name}", f"{title}: elevation", _together([_elevation(*s) for s in sections]))
-    if any(len(d["lower.y"]) != len(d["x"]) or len(s["y"]) != len(s["x"]) for d, s in sections):
+    if any(np.isnan(d["lower.y"]).all() or np.isnan(s["y"]).all() for d, s in sections):
         return [elevation]
     return [elevation, Chart(f"plan_{name}", f"{title}: plan", _together([_plan(*s) for s in sections]))]
 
 
 def _static_line(values: dict[str, float]) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return positions of droppers and of supports by the name of the coordinate."""
-    droppers = {n: indexed(values, "dropper", n) for n in ("x", "upper.z", "lower.z", "lower.y")}
-    return droppers, {n: indexed(values, "support", n) for n in ("x", "y", "z", "messenger_wire.z")}
+    droppers = aligned(values, "dropper", ("x", "upper.z", "lower.z", "lower.y"))
+    return droppers, aligned(values, "support", ("x", "y", "z", "messenger_wire.z"))
 
 
 def _together(figures: Sequence[Figure]) -> Figure:
@@ -469,7 +469,7 @@ def _elevation(droppers: dict[str, FloatArray], supports: dict[str, FloatArray])
     for i, (label, low, high) in enumerate(wires):
         xs, zs = _merged(x, droppers[low], supports["x"], supports[high])
         traces.append(_line(xs, zs, {**Curve(i, label).line, "dash": "solid"}, label))
-    if len(supports["z"]) == len(supports["x"]):
+    if not np.isnan(supports["z"]).all():
         marker = {"color": MARK, "size": 8, "symbol": "triangle-up"}
         traces.append(_points(supports["x"], supports["z"], "support", marker))
     return _figure(traces, Axes("track position [m]", "height above rail [m]"))
@@ -485,9 +485,8 @@ def _plan(droppers: dict[str, FloatArray], supports: dict[str, FloatArray]) -> F
 
 
 def _merged(x1: FloatArray, y1: FloatArray, x2: FloatArray, y2: FloatArray) -> tuple[FloatArray, FloatArray]:
-    points = y2 if len(y2) == len(x2) else np.full(len(x2), np.nan)
-    known = np.isfinite(points)
-    x, y = np.concatenate((x1, x2[known])), np.concatenate((y1, points[known]))
+    x, y = np.concatenate((x1, x2)), np.concatenate((y1, y2))
+    x, y = x[np.isfinite(y)], y[np.isfinite(y)]
     order = np.argsort(x, kind="stable")
     return x[order], y[order]
 

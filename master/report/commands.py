@@ -10,15 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from rich.console import Console
-
 from master import compare, export, folder_lock, report, results
+from master.durable import write_whole
 from master.errors import MasterError
 from master.report import tables
 from master.report.comparison import columns, comparison_page
 from master.report.film import FilmOptions, write_film
 from master.report.measured import Comparison, compare_measured, read_measured
 from master.report.movie import MOST_LAPS, make_movie
+from master.report.terminal import Terminal
 from master.results import Results
 
 REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
@@ -72,7 +72,7 @@ def _warn_of_open_runs(runs: Sequence[Results]) -> None:
     for done in runs:
         if done.summary.get("status") == "running":
             text = f"warning: the run in {done.folder} was ended before it had finished; figures are of what it left"
-            Console(stderr=True).print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
+            Terminal(stderr=True).print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
 
 
 def report_what_there_is(folder: Path) -> None:
@@ -96,7 +96,7 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
 
 def _say_measured(measured: Comparison) -> None:
     rows = tables.plain_table(("low-passed", "simulated", "measured", "difference"), report.comparison_rows(measured))
-    Console(width=_WIDTH, highlight=False).print(rows)
+    Terminal(width=_WIDTH, highlight=False).print(rows)
 
 
 def _film(done: Results, options: argparse.Namespace) -> Path:
@@ -121,7 +121,7 @@ def run_compare(options: argparse.Namespace) -> int:
     runs = [results.read(folder) for folder in (options.first, *options.others)]
     _warn_of_open_runs(runs)
     if options.report:
-        results.write_text(options.report, comparison_page(runs))
+        write_whole(options.report, comparison_page(runs).encode(), "another file with --report")
     pairs = [compare.compare(runs[0], other) for other in runs[1:]]
     if options.json:
         others = [(other, c) for other, found in zip(runs[1:], pairs, strict=True) for c in found]
@@ -132,7 +132,7 @@ def run_compare(options: argparse.Namespace) -> int:
 
 
 def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]], options: argparse.Namespace) -> None:
-    console = Console(width=_WIDTH, highlight=False)
+    console = Terminal(width=_WIDTH, highlight=False)
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
     console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))

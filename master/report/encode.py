@@ -57,7 +57,8 @@ def packed(values: FloatArray) -> dict[str, str]:
     >>> packed(np.array([1.0]))
     {'dtype': 'f4', 'bdata': 'AACAPw=='}
     """
-    return {"dtype": "f4", "bdata": _base64(np.asarray(values, dtype="<f4"))}
+    most = np.finfo("<f4").max  # what is beyond is drawn at the edge
+    return {"dtype": "f4", "bdata": _base64(np.clip(values, -most, most).astype("<f4"))}
 
 
 def packed_integers(values: FloatArray, unit: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -11,10 +12,12 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
+from master.durable import whole_file
 from master.errors import MasterError
 from master.report.charts import COLOURS, GREY, MARK
 from master.report.movie import Movie, Rider
 
+_ELSEWHERE: Final = "another file with --film"
 _RATE: Final = 20
 #: Half the width of the view [m].
 _HALF: Final = 75.0
@@ -51,14 +54,18 @@ def write_film(movie: Movie, path: Path, options: FilmOptions) -> Path:
     writer = _writer(path)
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     line_axes, force_axes = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    try:
-        with writer.saving(figure, str(path), dpi=100):
+    # The writers tell the format by the ending, so what is written beside the film keeps it.
+    with (
+        whole_file(path, _ELSEWHERE) as whole,
+        tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}.") as folder,
+    ):
+        temporary = Path(folder) / path.name
+        with writer.saving(figure, str(temporary), dpi=100):
             for frame in _frames(movie, options):
                 _draw_line(line_axes, movie, int(frame), options.magnification)
                 _draw_force(force_axes, movie, int(frame))
                 writer.grab_frame()
-    except OSError as error:
-        raise MasterError(f"the film {path} cannot be written ({error})") from error
+        temporary.replace(whole)
     return path
 
 

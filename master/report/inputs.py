@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from master.ssp.annotation import OPTIONS
+
 _SOURCE: Final = re.compile(r"\s*\[(?P<source>[^\[\]]*)\]\s*$")
 
 
@@ -89,14 +91,32 @@ def differing_inputs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]
 
 def _table(summary: Mapping[str, Any]) -> dict[str, str]:
     settings = summary.get("settings", {})
-    found = {"scheme": str(settings.get("coupling", {}).get("scheme", "-")), "step [s]": number(settings.get("step"))}
+    coupling = settings.get("coupling", {})
+    found = {"scheme": str(coupling.get("scheme", "-")), "step [s]": number(settings.get("step"))}
+    found |= {f"scheme, {name}": text for name, text in scheme_options(coupling)}
     for section in ("interval", "filter", "limits"):
         found |= {f"{section}, {k}": str(v) for k, v in (settings.get(section) or {}).items() if v is not None}
     for component in summary.get("components", []):
-        found[f"FMU of {component['name']}"] = f"{component['fmu']} ({component['sha256'][:8]})"
+        found[f"FMU of {component['name']}"] = f"{component.get('fmu', '-')} ({component.get('sha256', '-')[:8]})"
         for i in inputs_of(component):
             found[f"{component['name']}.{i.name}" + (f" [{i.unit}]" if i.unit else "")] = i.value
     return found
+
+
+def scheme_options(coupling: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the options that a run's coupling scheme went by, as name and text.
+
+    Examples
+    --------
+    >>> scheme_options({"scheme": "gauss-seidel", "order": ["pantograph", "catenary"], "tolerance": 1e-8})
+    [('order', 'pantograph catenary')]
+    """
+    names = OPTIONS.get(coupling.get("scheme", ""), ())
+    return [(name.replace("_", " "), _option(coupling[name])) for name in names if name in coupling]
+
+
+def _option(value: Any) -> str:
+    return (" ".join(map(str, value)) or "as in the scenario") if isinstance(value, list | tuple) else number(value)
 
 
 def quality_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -105,15 +125,17 @@ def quality_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     coupling = settings.get("coupling", {})
     rows = [
         ("coupling scheme", str(coupling.get("scheme", "-"))),
-        ("macro step", f"{1e3 * settings.get('step', 0):g} ms"),
+        ("macro step", f"{1e3 * (settings.get('step') or 0.0):g} ms"),
     ]
     told = {c["name"]: c["tolerance"] for c in summary.get("components", []) if c.get("tolerance") is not None}
     rows += [(f"tolerance told to the FMU of {name}", f"{value:g}") for name, value in told.items()]
-    if coupling.get("scheme") == "iterative":
-        rows.append(("tolerance of the iteration", f"{coupling.get('tolerance'):g}"))
+    rows += [(f"{name} of the scheme", text) for name, text in scheme_options(coupling)]
+    rows += [("not as asked for", text) for text in summary.get("adjustments", [])]
     for p in summary.get("interface_power", []):
-        share = 100.0 * p["energy"] / p["transferred"] if p["transferred"] else 0.0
-        text = f"{p['energy']:.3g} J of {p['transferred']:.4g} J exchanged ({share:.2f} %), rms {p['rms']:.3g} W"
+        text = "not finite: the values exchanged were too large"
+        if None not in (p["energy"], p["transferred"], p["rms"]):
+            share = 100.0 * p["energy"] / p["transferred"] if p["transferred"] else 0.0
+            text = f"{p['energy']:.3g} J of {p['transferred']:.4g} J exchanged ({share:.2f} %), rms {p['rms']:.3g} W"
         rows.append((f"interface residual, contact {p['contact']}", text))
     rows += [(f"energy, {b['what']}", b["text"]) for b in summary.get("energy", [])]
     if performance:
@@ -142,11 +164,15 @@ def _performance_rows(performance: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
+def _identity(component: Mapping[str, Any]) -> tuple[str, str]:
+    return f"sha256 {component.get('sha256', '-')}", f"GUID {component.get('guid', '-')}"
+
+
 def provenance_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return where and with what the run was computed."""
     rows = [("scenario", str(summary.get("scenario", ""))), ("date", str(summary.get("date", "")))]
     rows += [
-        (f"FMU of {c['name']}", f"{c['fmu']}, {c.get('tool', '')}, sha256 {c['sha256']}, GUID {c['guid']}")
+        (f"FMU of {c['name']}", ", ".join([c.get("fmu", "-"), c.get("tool", ""), *_identity(c)]))
         for c in summary.get("components", [])
     ]
     rows += [(f"version of {k}", str(v)) for k, v in summary.get("versions", {}).items()]

@@ -82,7 +82,9 @@ def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool 
     parts = [f"<section id='{key}'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
     parts.append(_cautions(summary))
     parts += [markup.verdict(a, a.contact.pantograph, limits, complete) for a in assessments]
-    if not assessments and is_coupling:
+    if reason := summary.get("not_judged", ""):
+        parts.append(f"<p class='warning'><b>Not judged.</b> There are no figures: {markup.text(reason)}.</p>")
+    elif not assessments and is_coupling:
         parts.append("<p class='warning'>No contact-quality figures: no contact force in the interval of interest.</p>")
     return "".join([*parts, "</section>"])
 
@@ -189,7 +191,7 @@ def _inputs(summary: dict[str, Any]) -> str:
     for component in summary.get("components", []):
         rows = "".join(_input_row(i) for i in inputs_of(component))
         heads = "<tr><th>parameter</th><th class='n'>value</th><th>unit</th><th>what</th><th>source</th></tr>"
-        head = f"<summary>{markup.text(component['name'])}: {markup.text(component['fmu'])}</summary>"
+        head = f"<summary>{markup.text(component['name'])}: {markup.text(component.get('fmu', '-'))}</summary>"
         parts.append(f"<details>{head}<div class='scroll'><table>{heads}{rows}</table></div></details>")
     return "".join([*parts, "</section>"])
 

@@ -5,7 +5,7 @@ The annotation stands in the ``ssd:Annotations`` of the system structure descrip
     <ssc:Annotation type="urn:openpanto:ssp">
       <panto:Run xmlns:panto="urn:openpanto:ssp">
         <panto:Coupling scheme="jacobi"/>
-        <panto:Interval start="551" end="798"/>
+        <panto:Interval start="551" end="798" until="end"/>
         <panto:Filter kind="butterworth" order="6" cutoff="20" phase="zero"/>
         <panto:Limits supply="AC" maximum="300"/>
         <panto:Calibration parameter="pantograph.static_force" meanForce="157.5" tolerance="0.1"/>
@@ -19,7 +19,7 @@ Everything is optional. The macro step is read from ``osp:FixedStepAlgorithm``, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 from lxml import etree
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -31,7 +31,14 @@ NAMESPACE: Final = "urn:openpanto:ssp"
 OSP_TYPE: Final = "com.opensimulationplatform"
 
 Scheme = Literal["jacobi", "gauss-seidel", "iterative"]
-SCHEMES: Final = ("jacobi", "gauss-seidel", "iterative")
+SCHEMES: Final[tuple[Scheme, ...]] = get_args(Scheme)
+#: Options of each scheme: those settings of `Coupling` that it goes by. `master.algorithm` makes it with just these,
+#: the summary, comparisons and checkpoints show just these.
+OPTIONS: Final[dict[Scheme, tuple[str, ...]]] = {
+    "jacobi": (),
+    "gauss-seidel": ("order",),
+    "iterative": ("tolerance", "max_iterations", "weight"),
+}
 
 
 class _Settings(BaseModel):
@@ -61,12 +68,22 @@ class Coupling(_Settings):
     max_iterations: int = Field(50, ge=2, alias="maxIterations")
     weight: float = Field(1.0, gt=0, le=1)
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """Return the options of the scheme, by name."""
+        return {name: getattr(self, name) for name in OPTIONS[self.scheme]}
+
 
 class Interval(_Settings):
-    """Interval of interest along the track [m]; from where the contact has settled and to the end, if not told."""
+    """Interval of interest along the track [m]; from where the contact has settled and to the end, if not told.
+
+    ``until="end"`` lets the run go on until the last pantograph has left the interval, whatever stop time the scenario
+    has for other tools; ``until="stop"`` until the stop time. Not given, it is the stop time if there is one.
+    """
 
     start: float | None = None
     end: float | None = None
+    until: Literal["stop", "end"] | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> Interval:
@@ -171,7 +188,7 @@ _SECTIONS: Final[dict[str, type[_Settings]]] = {
     "Record": Record,
 }
 _LISTS: Final = ("order", "variables")
-_TEXTS: Final = (*_LISTS, "scheme", "parameter", "kind", "phase", "supply")
+_TEXTS: Final = (*_LISTS, "scheme", "parameter", "kind", "phase", "supply", "until")
 #: What an ``osp:Algorithm`` may hold.
 _ALGORITHMS: Final = ("FixedStepAlgorithm", "VariableStepAlgorithm")
 

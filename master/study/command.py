@@ -13,6 +13,7 @@ from rich.console import Console
 from master.calibrate import unchanged
 from master.errors import UsageError
 from master.progress import ProgressObserver
+from master.report.terminal import Terminal, printable_json
 from master.simulation import Observer
 from master.study.family import Family, Variant, family_names, load_family, store_values
 from master.study.outcome import Done
@@ -46,13 +47,13 @@ def run(options: argparse.Namespace) -> int:
     """Run a study; returns 0 if every variant was run, 1 if not."""
     if options.list:
         names = [options.name] if options.name else family_names()
-        Console(width=_WIDTH).print(list_table([load_family(n) for n in names]))
+        Terminal(width=_WIDTH).print(list_table([load_family(n) for n in names]))
         return 0
     if not options.name:
         raise UsageError(f"which study? known: {', '.join(family_names()) or 'none'}")
     family = load_family(options.name)
     chosen = family.chosen(options.only)
-    error = Console(stderr=True)
+    error = Terminal(stderr=True)
     runner = _runner(options, error)
     if options.calibrate:
         family, chosen = _calibrated(family, chosen, options, runner)
@@ -64,9 +65,9 @@ def run(options: argparse.Namespace) -> int:
 
 def _print(options: argparse.Namespace, folder: Path, tables: Callable[[Console], None]) -> None:
     if options.json:
-        print((folder / JSON).read_text(encoding="utf-8"), end="")
+        print(printable_json((folder / JSON).read_text(encoding="utf-8")), end="")
     elif not options.quiet:
-        console = Console(width=_WIDTH, highlight=False)
+        console = Terminal(width=_WIDTH, highlight=False)
         tables(console)
         console.print(f"page: {folder / PAGE}, table: {folder / CSV}", markup=False, soft_wrap=True)
 

@@ -11,6 +11,7 @@ from typing import Final
 from rich.console import Console
 
 from master.progress import ProgressObserver
+from master.report.terminal import Terminal, printable_json
 from master.simulation import Observer
 from master.system import System
 from master.verify.case import find_cases, load_cases
@@ -38,10 +39,10 @@ def run(options: argparse.Namespace) -> int:
     """Verify; returns 0 if every row that is meant to hold does, 1 if not."""
     cases = load_cases(find_cases(options.cases))
     if options.list:
-        Console(width=_width()).print(list_table(cases))
+        Terminal(width=_width()).print(list_table(cases))
         return 0
     is_shown = not (options.quiet or options.json)
-    out, error = Console(width=_width(), highlight=False), Console(stderr=True)
+    out, error = Terminal(width=_width(), highlight=False), Terminal(stderr=True)
     runs = Runs(
         options.out / RUNS,
         _nobody if options.quiet else _progress(error),
@@ -50,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     )
     done = verify(cases, options.out, runs, _shower(out) if is_shown else _silent)
     if options.json:
-        print((options.out / JSON).read_text(encoding="utf-8"), end="")
+        print(printable_json((options.out / JSON).read_text(encoding="utf-8")), end="")
     elif is_shown:
         out.print(done.sentence, style="green" if done.passed else "bold red", markup=False, soft_wrap=True)
         for line in _failing(done.cases):
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _width() -> int | None:
     """Return 80 where nobody looks, the terminal's own width otherwise."""
-    return None if Console().is_terminal else _WIDTH
+    return None if Terminal().is_terminal else _WIDTH
 
 
 def _failing(cases: Sequence[CaseOutcome]) -> Iterator[str]:

@@ -12,10 +12,10 @@ import numpy as np
 from master.arrays import BoolArray, FloatArray
 from master.contacts import track_position
 from master.errors import MasterError
-from master.evaluation.contact_assessment import Assessment, interval_of
+from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_quality import Filtered, Quality
 from master.evaluation.filters import interval_mask
-from master.line import Uplift, indexed
+from master.line import Uplift, indexed, passages, period_of
 from master.recorder import Recording
 from master.results import Results
 
@@ -184,12 +184,13 @@ def _slack_share(results: Results, choice: Choice) -> Measured:
     recording, names = _dropper_recording(results, f"{contact.catenary}.dropper[*].force")
     whole = results.recordings[0]
     position = np.interp(recording.time, whole.time, track_position(whole, contact))
-    x = np.array([geometry.get(f"{n.removeprefix(contact.catenary + '.').removesuffix('.force')}.x") for n in names])
-    inside = interval_mask(x.astype(np.float64), *interval_of(found.quality, results.interval))
+    travelled, period = (float(position.min()), float(position.max())), period_of(geometry)
+    x = {n: geometry.get(f"{n.removeprefix(contact.catenary + '.').removesuffix('.force')}.x") for n in names}
     slack = [
-        _goes_slack(recording[n], np.abs(position - place) <= choice.within)
-        for n, place, chosen in zip(names, x, inside, strict=True)
-        if chosen
+        _goes_slack(recording[n], np.abs(position - at) <= choice.within)
+        for n, place in x.items()
+        if place is not None
+        for at in passages(place, results.interval, travelled, period)
     ]
     if not slack:
         raise MissingQuantityError("there is no dropper in the interval of interest")

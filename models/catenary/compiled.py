@@ -6,13 +6,7 @@ numba is installed.
 
 from __future__ import annotations
 
-import atexit
-import hashlib
-import importlib.util
 import os
-import shutil
-import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
@@ -27,6 +21,7 @@ from models.catenary.interval_modes import IntervalModes
 from models.catenary.motion import LineMotion
 from models.catenary.reaction import Meeting, Point, Reaction
 from models.catenary.stepping import Known, ReactionOf, Stepper
+from models.numerics.kernel_cache import load_kernels
 from models.part import FloatArray, IntArray
 from models.time_integration import Newmark
 
@@ -66,54 +61,12 @@ def make_stepper(modes: IntervalModes, newmark: Newmark) -> Stepper:
 def kernels() -> ModuleType:
     """Return the compiled kernels.
 
-    What numba compiles it keeps beside the source, and knows it again by its path. FMUs are unpacked somewhere new
-    every time, so the source is taken from a copy in the user's cache, named by its content.
-
     Raises
     ------
     ImportError
-        If numba is not installed.
+        If numba is not installed, or no folder takes their source.
     """
-    if importlib.util.find_spec("numba") is None:
-        raise ImportError("numba is not installed; pip install numba")
-    key = hashlib.sha256(_SOURCE + sys.version.encode()).hexdigest()[:16]
-    name = f"openpanto_kernels_{key}"
-    found = sys.modules.get(name)
-    return _load(name, _cached(_SOURCE, key)) if found is None else found
-
-
-def _load(name: str, path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    sys.modules[name] = module
-    return module
-
-
-def _cached(source: bytes, key: str) -> Path:
-    """Return a copy of the kernels' source in the user's cache, or in a folder of this process alone."""
-    copy = _cache_folder() / "openpanto" / f"kernels-{key}" / "kernels.py"
-    try:
-        if not copy.is_file() or copy.read_bytes() != source:
-            copy.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            part = copy.with_name(f"kernels.{os.getpid()}.part")
-            part.write_bytes(source)
-            part.replace(copy)
-    except OSError:
-        folder = tempfile.mkdtemp(prefix="openpanto-")
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
-        copy = Path(folder) / "kernels.py"
-        copy.write_bytes(source)
-    return copy
-
-
-def _cache_folder() -> Path:
-    """Return where this user's programs keep what they can make again."""
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
-    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+    return load_kernels("kernels", _SOURCE)
 
 
 class _UnsuitedError(Exception):

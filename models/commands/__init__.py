@@ -10,7 +10,7 @@ from models.catenary.compiled import KernelError
 from models.catenary.equilibrium import EquilibriumError
 from models.catenary.local_response import LocalSolutionError
 from models.commands import couple, identify, pantograph, statics
-from models.definition import DefinitionError
+from models.definition import DefinitionError, printable
 from models.library import UnknownNameError
 from models.pantograph.multibody.mechanism import MechanismError
 from models.part import ParameterError
@@ -25,22 +25,27 @@ _USER_ERRORS = (
     MechanismError,
     ParameterError,
     UnknownNameError,
-    OSError,
 )
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run ``python -m models``; return 0, 1 (the run failed) or 2 (wrong command line or input)."""
+    """Run ``python -m models``; return 0, 1 (failed or invalid) or 2 (a command line that was not understood)."""
     parser = argparse.ArgumentParser(prog="python -m models", description="Physics of lines and pantographs.")
     subparsers = parser.add_subparsers(dest="verb", required=True)
     for verb in _VERBS:
         verb.add(subparsers)
     arguments = parser.parse_args(argv)
     try:
-        return int(arguments.run(arguments))
+        code = int(arguments.run(arguments))
+        sys.stdout.flush()  # here, where an error can still be told
+    except OSError as error:
+        text = f"{error.filename or 'standard output'}: {error.strerror or error}"
+        print(f"error: {printable(text)}", file=sys.stderr)
+        return 1
     except _USER_ERRORS as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2 if isinstance(error, (DefinitionError, UnknownNameError, ParameterError)) else 1
+        print(f"error: {printable(str(error))}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 1
+    return code

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from models.commands.options import add_settings, finite, new_folder, print_table, settings
+from models.commands.options import add_settings, finite, new_folder, print_table, settings, warn
+from models.commands.output_files import write_csv, write_figure
 from models.library import load_pantograph
 from models.pantograph import lumped_characteristics as lumped
-from models.pantograph.multibody.characteristics import Rig
+from models.pantograph.multibody.characteristics import Dynamics, Rig
 from models.pantograph.multibody.definition import MechanismDefinition
 from models.pantograph.parameters import LumpedDefinition
 from models.part import FloatArray, ParameterError
+
+#: Significant digits of the tables: all that a double has.
+_DIGITS: Final = 17
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,8 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
-    definition = load_pantograph(arguments.pantograph).with_values(settings(arguments.set, "pantograph"))
+    definition = load_pantograph(arguments.pantograph)
+    definition = definition.with_values(settings(arguments.set, "pantograph", definition))
     result = (
         _multibody(definition, arguments)
         if isinstance(definition, MechanismDefinition)
@@ -82,14 +89,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def write(folder: Path, result: Characteristics) -> None:
     """Write statics and response as CSV and the plots as PNG."""
-    np.savetxt(
-        folder / "statics.csv", result.statics, delimiter=",", header=",".join(result.static_columns), comments=""
-    )
-    response = np.column_stack([result.frequency, result.apparent_mass.real, result.apparent_mass.imag])
-    header = "frequency [Hz],apparent mass real [kg],apparent mass imaginary [kg]"
-    np.savetxt(folder / "apparent_mass.csv", response, delimiter=",", header=header, comments="")
-    _plot_response(result).savefig(folder / "apparent_mass.png", dpi=120)
-    _plot_statics(result).savefig(folder / "statics.png", dpi=120)
+    write_csv(folder / "statics.csv", result.static_columns, list(result.statics.T), _DIGITS)
+    response = (result.frequency, result.apparent_mass.real, result.apparent_mass.imag)
+    names = ("frequency [Hz]", "apparent mass real [kg]", "apparent mass imaginary [kg]")
+    write_csv(folder / "apparent_mass.csv", names, response, _DIGITS)
+    write_figure(folder / "apparent_mass.png", _plot_response(result), 120)
+    write_figure(folder / "statics.png", _plot_statics(result), 120)
 
 
 def _heights(arguments: argparse.Namespace, reference: float) -> FloatArray:
@@ -122,6 +127,7 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
     statics = rig.statics(_heights(arguments, reference), arguments.force)
     height = arguments.height if arguments.height is not None else reference
     dynamics = rig.dynamics(height, _frequencies(), arguments.force)
+    warn([friction_warning(definition, dynamics, lambda d: Rig(d).dynamics(height, _frequencies(), arguments.force))])
     unit = rig.lift_unit
     columns = (
         "strip height [m]",
@@ -137,6 +143,39 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         dynamics.frequency,
         dynamics.apparent_mass,
     )
+
+
+def friction_warning(
+    definition: MechanismDefinition, found: Dynamics, analysed: Callable[[MechanismDefinition], Dynamics]
+) -> str:
+    """Return what dry friction does to the modes, empty if there is none.
+
+    About rest its force changes with the speed as a damper's of friction over transition speed does: a strong one,
+    under which a mode creeps back instead of oscillating.
+
+    Parameters
+    ----------
+    definition : MechanismDefinition
+    found : Dynamics
+        With the friction.
+    analysed : callable
+        Gives the dynamics of the definition without it.
+    """
+    rubbing = [f for f in definition.forces if f.kind == "joint_friction" and f.friction > 0.0]
+    if not rubbing:
+        return ""
+    names = {f"force.{f.name}.{key}" for f in rubbing for key in ("force", "moment")}
+    without = {p.name: 0.0 for p in definition.parameters() if p.name in names}
+    free = _frequencies_of(analysed(definition.with_values(without)))
+    return (
+        f"dry friction in {', '.join(f.name for f in rubbing)}: the modes are those of small motions about rest, where "
+        f"it damps like a fluid; {len(_frequencies_of(found))} of them oscillate, without the friction {len(free)}: "
+        f"{', '.join(f'{f:.3f}' for f in free)} Hz"
+    )
+
+
+def _frequencies_of(dynamics: Dynamics) -> list[float]:
+    return [m.frequency for m in dynamics.modes if m.frequency > 0.0]
 
 
 def _mode_rows(result: Characteristics) -> list[tuple[str, str]]:

@@ -15,8 +15,9 @@ from models.catenary.parameters import Span
 from models.catenary.part import CatenaryPart
 from models.commands import statics_plots
 from models.commands.options import add_settings, new_folder, positive, print_table, settings, warn
+from models.commands.output_files import write_csv, write_figure, write_text
 from models.library import load_line
-from models.part import FloatArray, ParameterError
+from models.part import ParameterError
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     ParameterError
         If the line has no such section or span.
     """
-    definition = load_line(arguments.line).with_values(settings(arguments.set, "line"))
+    definition = load_line(arguments.line)
+    definition = definition.with_values(settings(arguments.set, "line", definition))
     section = arguments.section - 1
     if not 0 <= section < len(definition.sections):
         raise ParameterError(f"--section {arguments.section}: the line has sections 1 to {len(definition.sections)}")
@@ -125,18 +127,18 @@ def write(folder: Path, result: LineStatics) -> None:
     _write_profiles(folder, result.profiles)
     d, e, a = result.droppers, result.elasticity, result.arms
     columns = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
-    _write_csv(folder / "droppers.csv", columns, (d.x, d.length, d.force, d.is_hanger.astype(float)))
-    _write_csv(folder / "elasticity.csv", ("x [m]", "elasticity [m/N]"), (e.x, e.value))
-    _write_csv(folder / "steady_arms.csv", ("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift))
+    write_csv(folder / "droppers.csv", columns, (d.x, d.length, d.force, d.is_hanger.astype(float)))
+    write_csv(folder / "elasticity.csv", ("x [m]", "elasticity [m/N]"), (e.x, e.value))
+    write_csv(folder / "steady_arms.csv", ("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift))
     lines = [f'"{name}","{value}"' for name, value in summary(result)]
-    (folder / "summary.csv").write_text("\n".join(["quantity,value", *lines]) + "\n", encoding="utf-8")
+    write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
     plots = {
         "profile": statics_plots.profile(result.profiles, result.droppers, result.span),
         "elasticity": statics_plots.elasticity(result.elasticity, result.span),
         "droppers": statics_plots.droppers(result.span_droppers, result.span),
     }
     for name, figure in plots.items():
-        figure.savefig(folder / f"{name}.png", dpi=150)
+        write_figure(folder / f"{name}.png", figure, 150)
 
 
 _DROPPER_COLUMNS = ("from the support [m]", "length [m]", "tension [N]")
@@ -174,8 +176,4 @@ def _write_profiles(folder: Path, profiles: Sequence[statics.Profile]) -> None:
     for component in dict.fromkeys(p.component for p in profiles):
         same = [p for p in profiles if p.component == component]
         columns = [np.concatenate(c) for c in zip(*((p.x, p.y, p.z) for p in same), strict=True)]
-        _write_csv(folder / f"{component}.csv", ("x [m]", "y [m]", "z [m]"), columns)
-
-
-def _write_csv(path: Path, names: Sequence[str], columns: Sequence[FloatArray]) -> None:
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+        write_csv(folder / f"{component}.csv", ("x [m]", "y [m]", "z [m]"), columns)

@@ -240,7 +240,7 @@ def _penetration(model, state, z, speed):
 def test_uplift_and_point_of_contact_move_with_the_wire(model):
     """A force at a support for a while: the rise there by the nodes' own displacement, and a strip that finds it."""
     state = model.initial_state()
-    for _ in range(30):
+    for _ in range(40):
         model.push(state, 1e-3, [(0, 100.0, 200.0)])
     nodal = model.displacement(state)[model.mesh.support_nodes]
     lifted = model.uplift(state)

@@ -146,14 +146,20 @@ class Rig:
             lateral=lateral,
             start=self._start,
         )
-        model = linearise(self.mechanism, found.y, found.inputs)
-        return Dynamics(
-            height,
-            contact_force,
-            found.lift,
-            modes(self.mechanism, model),
-            np.asarray(frequencies, dtype=np.float64),
-            receptance(model, frequencies),
-            apparent_mass(model, frequencies),
-            base_transmission(self.mechanism, model, frequencies),
-        )
+        try:
+            model = linearise(self.mechanism, found.y, found.inputs)
+            return Dynamics(
+                height,
+                contact_force,
+                found.lift,
+                modes(self.mechanism, model),
+                np.asarray(frequencies, dtype=np.float64),
+                receptance(model, frequencies),
+                apparent_mass(model, frequencies),
+                base_transmission(self.mechanism, model, frequencies),
+            )
+        except np.linalg.LinAlgError as error:
+            raise MechanismError(
+                f"{self.definition.name}: its small motions about a strip height of {height:g} m have no solution "
+                f"({error}); look for a part that nothing holds, or joints that say the same twice"
+            ) from error

@@ -17,6 +17,8 @@ from models.pantograph.multibody.vectors import Handle, Kinematics, MovingVector
 from models.part import FloatArray
 
 _LINES: Final = ("spring_damper", "actuator_force", "bump_stop")
+#: Every kind that `ForceElements` makes something of; `tests/test_registries.py` sees that each one pushes.
+KNOWN_KINDS: Final = frozenset((*_LINES, "actuator_moment", "joint_friction", "bushing"))
 
 
 class ForceElements:
@@ -31,11 +33,18 @@ class ForceElements:
         Orientations as written: where a bushing is untwisted.
     pool : VectorPool
         Takes the vectors of the elements; to be closed before ``compile``.
+
+    Raises
+    ------
+    ValueError
+        If there is a kind of force that nothing here computes: it would silently do nothing.
     """
 
     def __init__(
         self, forces: Sequence[Force], numbers: dict[str, int], orientations: FloatArray, pool: VectorPool
     ) -> None:
+        if strange := [f for f in forces if f.kind not in KNOWN_KINDS]:
+            raise ValueError(f"force '{strange[0].name}': nothing is known of its kind '{strange[0].kind}'")
         self.lines = LineElements([f for f in forces if f.kind in _LINES], numbers, pool)
         self._moments = _Moments([f for f in forces if f.kind == "actuator_moment"], numbers, pool)
         self._slides = LineElements([f for f in forces if f.joint_kind == "prismatic"], numbers, pool)

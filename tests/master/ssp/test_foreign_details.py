@@ -74,7 +74,7 @@ def test_so_it_does_from_a_value_of_the_scenario(scenario):
 def test_limits_of_a_type_hold(scenario):
     told = changed(('<Real start="1"/>', '<Real start="1" declaredType="T"/>'), typed('min="0" max="2" unit="m"'))
     text = ssd(system(component("a", Y, bindings=values(("k", 'Real value="3"')))))
-    assert problems(scenario(text, panel=told)) == ["SystemStructure.ssd:3: parameter 'a.k' = 3 m is above its maximum 2 [range]"]
+    assert problems(scenario(text, panel=told)) == ["SystemStructure.ssd:3: parameter 'a.k' = 3 m is above its maximum 2; a value without a unit is in m: check its size, or write its unit [range]"]
 
 
 # Units of FMUs: one name, one meaning.

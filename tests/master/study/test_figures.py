@@ -1,13 +1,20 @@
 """What a study reports of a pantograph."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
+from master.contacts import Contact
+from master.evaluation.contact_assessment import slack_share
+from master.recorder import Recording
+from master.results import Results
 from master.study import charts
 from master.study.family import Family, Interval, Settings, Variant
 from master.study.figures import entries
 from master.study.outcome import Done, Outcome, as_csv, differences
 from master.study.page import page
+from master.verify.quantities import QUANTITIES, Choice
 
 WHOLE = Interval(name="whole", start=60.0, end=120.0)
 
@@ -104,3 +111,28 @@ def test_statistics_are_drawn_by_place_in_the_train_with_the_single_one(outcome)
     assert [c.title for c in made[2:]] == ["Contact force, 30 m", "Histogram, 30 m"]
     shares = [np.sum(t["y"]) for t in made[3].figure["data"]]
     assert shares == pytest.approx([100.0, 100.0])
+
+
+def _lap(slack_at):
+    """A pantograph twice round a ring of 100 m at 50 m/s; the dropper at 30 m is slack around one time."""
+    time = np.arange(4001) * 1e-3
+    x = 50.0 * time
+    contact = Contact(1, "catenary", "train", "catenary.pantograph[1].contact")
+    force = np.full(4001, 150.0)
+    dropper = np.where(np.abs(time - slack_at) < 0.05, 0.0, 80.0)
+    names = ("catenary.pantograph[1].contact.force", "catenary.pantograph[1].contact.x", "catenary.dropper[1].force")
+    recording = Recording(time, names, ("N", "m", "N"), np.column_stack([force, x, dropper]))
+    geometry = {"catenary": {"dropper[1].x": 30.0, "period": 100.0, "support[1].x": 0.0}}
+    interval = {"start": 100.0, "end": 200.0}
+    summary = {"contacts": [asdict(contact)], "settings": {"interval": interval}}
+    return Results(None, summary, (recording,), geometry), contact
+
+
+@pytest.mark.parametrize(("slack_at", "share"), [(2.6, 1.0), (0.6, 0.0), (1.6, 0.0)])
+def test_droppers_of_a_later_lap_are_found(slack_at, share):
+    """The dropper at 30 m is passed at 130 m, after 2.6 s, in the interval of the second lap."""
+    done, contact = _lap(slack_at)
+    geometry = done.geometry["catenary"]
+    assert slack_share(done.recordings, geometry, contact, None, (100.0, 200.0)) == share
+    measured = QUANTITIES["slack_share"].measure(done, Choice(within=5.0))
+    assert measured.values == (100.0 * share,)

@@ -245,8 +245,8 @@ def test_every_line_of_the_library_steps_with_few_modes(name):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (-1.0, "-1 Hz is outside 0 ... 1e+09 Hz"),
-        (1e10, "1e+10 Hz is outside 0 ... 1e+09 Hz"),
+        (-1.0, "-1 Hz is outside 0 ... 1e+09 Hz: check its size and its unit"),
+        (1e10, "1e+10 Hz is outside 0 ... 1e+09 Hz: check its size and its unit"),
         (float("nan"), "nan is not finite, or larger than anything here can be (1e+15)"),
     ],
 )

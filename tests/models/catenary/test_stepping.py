@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from models.catenary.band import CUT, Banded, Sparse, factorised
-from models.catenary.compiled import CompiledStepper, KernelError, _cached, kernels, make_stepper
+from models.catenary.compiled import CompiledStepper, KernelError, kernels, make_stepper
 from models.catenary.compliance import Compliance
 from models.catenary.interval_modes import slower_than
 from models.catenary.model import CatenaryModel, StripMotion
@@ -261,29 +261,12 @@ def test_kernels_can_be_left_out_or_insisted_on(model, monkeypatch):
     monkeypatch.setenv("OPENPANTO_KERNEL", "cuda")
     with pytest.raises(KernelError, match="'cuda'; use auto, numpy or numba"):
         make_stepper(model.modes, newmark)
-    monkeypatch.setattr("models.catenary.compiled.importlib.util.find_spec", lambda _: None)
+    monkeypatch.setattr("models.numerics.kernel_cache.importlib.util.find_spec", lambda _: None)
     monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
     with pytest.raises(KernelError, match="numba is not installed"):
         make_stepper(model.modes, newmark)
     monkeypatch.setenv("OPENPANTO_KERNEL", "auto")
     assert type(make_stepper(model.modes, newmark)) is Stepper
-
-
-def test_kernels_are_kept_in_the_cache_and_a_changed_copy_is_not_used(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    source = b"VALUE = 1\n"
-    copy = _cached(source, "key")
-    assert copy.read_bytes() == source
-    copy.write_bytes(b"VALUE = 2\n")
-    assert _cached(source, "key").read_bytes() == source
-
-
-def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
-    (tmp_path / "openpanto").write_text("in the way")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    copy = _cached(b"x = 1\n", "key")
-    assert copy.read_bytes() == b"x = 1\n"
-    assert not copy.is_relative_to(tmp_path)
 
 
 def test_a_whole_run_is_the_same_with_and_without_kernels(short_line, cx, compiled_kernels, monkeypatch):

@@ -33,6 +33,14 @@ class _Interval(_Loose):
     end: float | None = None
 
 
+class _Coupling(_Loose):
+    scheme: str = ""
+    order: list[str] = []
+    tolerance: float | None = None
+    max_iterations: int | None = None
+    weight: float | None = None
+
+
 class _Filter(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -58,19 +66,69 @@ class _Limits(BaseModel):
 
 class _Settings(_Loose):
     start: float | None = None
+    stop: float | None = None
+    step: float | None = None
     interval: _Interval = _Interval()
     filter: _Filter | None = None
     limits: _Limits = _Limits()
+    coupling: _Coupling = _Coupling()
+
+
+class _Input(_Loose):
+    name: str
+    unit: str = ""
+    description: str = ""
+    changed: bool = False
 
 
 class _Component(_Loose):
     name: str
+    fmu: str = ""
+    sha256: str = ""
+    guid: str = ""
+    tool: str = ""
+    tolerance: float | None = None
     parameters: dict[str, Any] = {}
+    inputs: list[_Input] = []
 
 
 class _Caution(_Loose):
     component: str
     text: str
+
+
+class _Power(_Loose):
+    # Numbers that were not finite stand there as null.
+    contact: int
+    energy: float | None
+    transferred: float | None
+    rms: float | None
+
+
+class _Energy(_Loose):
+    what: str
+    text: str
+
+
+class _Lateness(_Loose):
+    maximum: float
+
+
+class _Paced(_Loose):
+    factor: float
+    steps: int
+    missed: int
+    lateness: _Lateness
+
+
+class _Performance(_Loose):
+    wall_time: float = 0.0
+    initialisation_time: float = 0.0
+    real_time_factor: float = 0.0
+    peak_memory: float = 0.0
+    component_time: dict[str, float] = {}
+    isolated: bool = False
+    real_time: _Paced | None = None
 
 
 class _Summary(_Loose):
@@ -79,8 +137,18 @@ class _Summary(_Loose):
     settings: _Settings = _Settings()
     components: list[_Component] = []
     warnings: list[_Caution] = []
+    adjustments: list[str] = []
+    scenario_warnings: list[str] = []
+    interface_power: list[_Power] = []
+    energy: list[_Energy] = []
+    performance: _Performance = _Performance()
+    versions: dict[str, str] = {}
     scenario: str = ""
     status: str = ""
+    reason: str = ""
+    date: str = ""
+    run: str = ""
+    time_reached: float | None = None
 
 
 _SUMMARY: Final[TypeAdapter[Any]] = TypeAdapter(_Summary)

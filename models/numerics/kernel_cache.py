@@ -1,0 +1,274 @@
+"""Compiled kernels, and the folder in which their machine code is kept between runs.
+
+numba keeps what it compiles in files that are pickles, beside the source. Loading a pickle runs it, and a damaged one
+ends a run, so the cache must neither be trusted blindly nor decide whether a run works:
+
+- a folder that does not belong to this user, or that others may write to, is not read;
+- every file carries a checksum, and one that does not fit is compiled afresh and replaced;
+- where nothing can be kept (no home, no space, no permission) the kernels are compiled into a temporary folder of this
+  process, or kept in memory alone.
+
+Each time one warning names the folder, through `logging`; figures and results are the same with and without a cache.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import hashlib
+import importlib.util
+import logging
+import os
+import pickle
+import shutil
+import stat
+import sys
+import tempfile
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+_LOG: Final = logging.getLogger("openpanto")
+#: Length of the checksum before the content of a file [bytes].
+_DIGEST: Final = hashlib.sha256().digest_size
+#: Folders that a warning has named in this process.
+_named: set[str] = set()
+
+
+def load_kernels(name: str, source: bytes) -> ModuleType:
+    """Return a module of numba kernels, made from ``source`` the first time in a process.
+
+    FMUs are unpacked somewhere new every time, and numba knows its files again by the path of the source, so the
+    module is loaded from a copy in the user's cache, named by its content.
+
+    Parameters
+    ----------
+    name : str
+        What the kernels are called, letters and underscores.
+    source : bytes
+        A Python module that imports nothing of the project.
+
+    Raises
+    ------
+    ImportError
+        If numba is not installed, or there is no folder at all that takes the source.
+    """
+    if importlib.util.find_spec("numba") is None:
+        raise ImportError("numba is not installed; pip install numba")
+    key = hashlib.sha256(source + sys.version.encode()).hexdigest()[:16]
+    module_name = f"openpanto_{name}_{key}"
+    found = sys.modules.get(module_name)
+    return _load(module_name, _kept_source(source, f"{name}-{key}")) if found is None else found
+
+
+def _load(name: str, path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    _guard(module, path.parent)
+    sys.modules[name] = module
+    return module
+
+
+def _kept_source(source: bytes, folder: str) -> Path:
+    """Return a copy of the source in the user's cache, or in a folder that goes with this process.
+
+    Raises
+    ------
+    ImportError
+        If neither takes it.
+    """
+    try:
+        home = _cache_folder()
+        copy = home / "openpanto" / folder / "kernels.py"
+        copy.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        for place in (home / "openpanto", copy.parent, copy.parent / "__pycache__"):
+            _check_owner(place)
+        _write(copy, source)
+    except (OSError, RuntimeError) as error:  # RuntimeError: a user without a home
+        _warn(f"compiled kernels are not kept, and have to be compiled in every run: {error}")
+    else:
+        return copy
+    try:
+        temporary = tempfile.mkdtemp(prefix="openpanto-")
+        atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+        copy = Path(temporary) / "kernels.py"
+        _write(copy, source)
+    except OSError as error:
+        raise ImportError(f"no folder takes what the kernels are compiled from: {error}") from error
+    return copy
+
+
+def _write(copy: Path, source: bytes) -> None:
+    """Put the source where it is compiled from, unless it is there already."""
+    if copy.is_file() and copy.read_bytes() == source:
+        return
+    part = copy.with_name(f"{copy.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(source)
+        part.replace(copy)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _cache_folder() -> Path:
+    """Return where this user's programs keep what they can make again.
+
+    A relative XDG_CACHE_HOME is to be ignored (XDG Base Directory Specification).
+    """
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
+    chosen = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return chosen if chosen.is_absolute() else Path("~/.cache").expanduser()
+
+
+def _check_owner(folder: Path) -> None:
+    """Refuse a folder that somebody else can put files into; one that is not there yet is fine.
+
+    Raises
+    ------
+    PermissionError
+        If it belongs to another user, or its mode lets others write. Windows keeps a user's folders to the user.
+    """
+    if sys.platform == "win32":
+        return
+    try:
+        found = folder.stat()
+    except FileNotFoundError:
+        return
+    if found.st_uid != os.geteuid():
+        raise PermissionError(f"{folder} belongs to another user")
+    if stat.S_IMODE(found.st_mode) & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(f"{folder} can be written by others; chmod go-w it")
+
+
+def _warn(text: str) -> None:
+    """Say something once in a process."""
+    if text not in _named:
+        _named.add(text)
+        _LOG.warning("warning: %s", text)
+
+
+def _guard(module: ModuleType, folder: Path) -> None:
+    """Let every kernel of a module keep its machine code in checked files."""
+    for kernel in vars(module).values():
+        cache = getattr(kernel, "_cache", None)
+        if hasattr(kernel, "py_func") and hasattr(cache, "_cache_file"):
+            kernel._cache = _GuardedCache(cache, folder)
+            _leave_out_if_foreign(cache)
+
+
+def _leave_out_if_foreign(cache: Any) -> None:
+    """Keep nothing where others may write; numba has places of its own, and an environment variable for more."""
+    try:
+        _check_owner(Path(cache.cache_path))
+    except OSError as error:
+        _warn(f"compiled kernels are not kept, and have to be compiled in every run: {error}")
+        cache.disable()
+
+
+class _GuardedCache:
+    """The cache of one numba kernel, whose failures cost time and never a run.
+
+    Parameters
+    ----------
+    cache : numba cache
+        What it asks.
+    folder : Path
+        Named in warnings.
+    """
+
+    def __init__(self, cache: Any, folder: Path) -> None:
+        self._cache = cache
+        self._folder = folder
+        cache._cache_file = _checked_files(cache._cache_file)
+
+    @property
+    def cache_path(self) -> Any:
+        """Where the files are."""
+        return self._cache.cache_path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is kept for a signature, None if there is nothing that can be used."""
+        try:
+            return self._cache.load_overload(sig, target_context)
+        except Exception as error:  # whatever a damaged file may raise
+            _warn(f"compiled kernels in {self._folder} are damaged and are compiled afresh ({error})")
+            with contextlib.suppress(Exception):
+                self._cache.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled, if that is possible."""
+        try:
+            self._cache.save_overload(sig, data)
+        except Exception as error:  # a full disk, say
+            _warn(f"compiled kernels cannot be kept in {self._folder}: {error}")
+
+    def enable(self) -> None:
+        """Use the cache."""
+        self._cache.enable()
+
+    def disable(self) -> None:
+        """Do without it."""
+        self._cache.disable()
+
+    def flush(self) -> None:
+        """Forget what is kept."""
+        self._cache.flush()
+
+
+def _checked_files(files: Any) -> Any:
+    """Return numba's files of a kernel, each behind the checksum of its content.
+
+    Files of numba's own form stay what they are: they have other names, and are not read.
+    """
+    base: Any = type(files)
+
+    class CheckedFiles(base):  # type: ignore[misc]
+        def _load_index(self) -> Any:
+            try:
+                version, stamp, overloads = pickle.loads(_checked(Path(self._index_path)))
+            except FileNotFoundError:
+                return {}
+            return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
+
+        def _save_index(self, overloads: Any) -> None:
+            content = self._dump((self._version, self._source_stamp, overloads))
+            with self._open_for_write(self._index_path) as file:
+                file.write(_with_checksum(content))
+
+        def _load_data(self, name: str) -> Any:
+            return pickle.loads(_checked(Path(self._data_path(name))))
+
+        def _save_data(self, name: str, data: Any) -> None:
+            with self._open_for_write(self._data_path(name)) as file:
+                file.write(_with_checksum(self._dump(data)))
+
+    checked = CheckedFiles.__new__(CheckedFiles)
+    checked.__dict__.update(vars(files))
+    checked._index_path = f"{files._index_path}.sum"
+    checked._data_name_pattern = f"{files._data_name_pattern}.sum"
+    return checked
+
+
+def _with_checksum(content: bytes) -> bytes:
+    return hashlib.sha256(content).digest() + content
+
+
+def _checked(path: Path) -> bytes:
+    """Return the content of a file behind its checksum.
+
+    Raises
+    ------
+    ValueError
+        If it does not fit.
+    """
+    raw = path.read_bytes()
+    content = raw[_DIGEST:]
+    if hashlib.sha256(content).digest() != raw[:_DIGEST]:
+        raise ValueError(f"{path.name} does not fit its checksum")
+    return content

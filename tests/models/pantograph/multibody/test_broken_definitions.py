@@ -1,0 +1,114 @@
+"""Mechanisms with something left out or named empty: one sentence each; friction is not passed over in silence."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.commands import main
+from models.commands.pantograph import friction_warning
+from models.definition import DefinitionError
+from models.library import pantograph_path
+from models.pantograph.multibody import definition
+from models.pantograph.multibody.characteristics import Rig
+from models.pantograph.multibody.mechanism import MechanismError
+from tests.models.pantograph.multibody.mechanisms import library_data, q
+
+NAMES = ("CX_multibody", "generic_multibody")
+PLACES = [
+    (name, section, part, key)
+    for name in NAMES
+    for section in ("joint", "force")
+    for part, table in library_data(name)[section].items()
+    for key in table
+    if key in ("body_i", "body_j")
+]
+
+
+@pytest.mark.parametrize(("name", "section", "part", "key"), PLACES)
+def test_an_empty_name_of_a_body_is_told_where_it_stands(name, section, part, key):
+    data = library_data(name)
+    data[section][part][key] = ""
+    with pytest.raises(DefinitionError, match=rf"{section}\.{part}\.{key}: names no body: it is empty"):
+        definition.from_dict(data)
+
+
+@pytest.mark.parametrize("section", ["strip", "assembly"])
+def test_so_it_is_of_strip_and_assembly(section):
+    data = library_data("generic_multibody")
+    data[section]["body"] = ""
+    with pytest.raises(DefinitionError, match=rf"{section}\.body: names no body: it is empty"):
+        definition.from_dict(data)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_strip_that_nothing_can_move_is_told(name):
+    """Its apparent mass would be no number."""
+    data = library_data(name)
+    data["strip"]["body"] = "base"
+    with pytest.raises(DefinitionError, match=r"strip\.body: body 'base' has a prescribed motion; put the strip"):
+        definition.from_dict(data)
+
+
+def test_a_spring_that_carries_the_weights_needs_a_stiffness(capsys, tmp_path):
+    text = pantograph_path("CX_multibody").read_text(encoding="utf-8")
+    head, tail = text.split("carries_weights = true", 1)
+    begin = head.rindex("[force.")
+    block = re.sub(r"(?m)^stiffness = .*\n", "", head[begin:])
+    broken = head[:begin] + block + "carries_weights = true" + re.sub(r"(?m)^stiffness = .*\n", "", tail, count=1)
+    (tmp_path / "broken.toml").write_text(broken, encoding="utf-8")
+    assert main(["pantograph", str(tmp_path / "broken.toml")]) == 1
+    said = capsys.readouterr().err
+    assert "stiffness: must be greater than 0: a spring set to carry the weights has to give way" in said
+
+
+def test_a_spring_damper_of_neither_is_told():
+    data = library_data("generic_multibody")
+    for key in ("stiffness", "damping"):
+        del data["force"]["suspension_left"][key]
+    with pytest.raises(DefinitionError, match=r"force\.suspension_left: needs a stiffness or a damping"):
+        definition.from_dict(data)
+
+
+def test_motions_without_a_solution_are_worded(monkeypatch):
+    from models.pantograph.multibody import characteristics
+
+    def singular(*_):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(characteristics, "receptance", singular)
+    rig = Rig(definition.from_dict(library_data("generic_multibody")))
+    with pytest.raises(MechanismError, match=r"its small motions about a strip height of 5\.02 m have no solution"):
+        rig.dynamics(5.02, np.array([1.0]))
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    data = library_data("generic_multibody")
+    data["force"]["rub"] = {
+        "kind": "joint_friction", "joint": "joint_1", "moment": q(20.0, "N.m"), "transition": q(0.001, "rad/s"),
+    }  # fmt: skip
+    return definition.from_dict(data)
+
+
+def analysed(d):
+    return Rig(d).dynamics(5.02, np.array([1.0]))
+
+
+def test_modes_that_dry_friction_takes_are_told(rubbing):
+    found, free = analysed(rubbing), analysed(definition.from_dict(library_data("generic_multibody")))
+    oscillating = [m for m in found.modes if m.frequency > 0.0]
+    assert len(oscillating) < sum(m.frequency > 0.0 for m in free.modes)
+    said = friction_warning(rubbing, found, analysed)
+    assert said.startswith("dry friction in rub: the modes are those of small motions about rest")
+    without = sum(m.frequency > 0.0 for m in free.modes)
+    assert f"{len(oscillating)} of them oscillate, without the friction {without}: " in said
+    assert said.endswith(", ".join(f"{m.frequency:.3f}" for m in free.modes if m.frequency > 0.0) + " Hz")
+
+
+def test_without_friction_there_is_nothing_to_tell(rubbing):
+    frictionless = replace(rubbing, forces=tuple(f for f in rubbing.forces if f.kind != "joint_friction"))
+    assert friction_warning(frictionless, None, analysed) == ""

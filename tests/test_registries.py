@@ -1,0 +1,281 @@
+"""Every registry is walked: whatever is listed does something, and no list knows what another has not heard of."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import typing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmus.__main__ import _parser as fmus_parser
+from fmus.description import _DERIVED
+from master import algorithm, cli
+from master.algorithm import ALGORITHMS, make_algorithm
+from master.errors import RunError
+from master.network import Network
+from master.report import charts
+from master.report.inputs import scheme_options
+from master.ssp.annotation import OPTIONS, SCHEMES, Coupling
+from master.ssp.units import COMMON
+from master.verify.quantities import QUANTITIES
+from models import commands, contact
+from models.catenary.parameters import Contact
+from models.contact import CONTACT_LAWS, ContactLawError, NormalForce, continuous_contact, register_contact_law
+from models.pantograph.multibody import definition, joints
+from models.pantograph.multibody.assembly import assemble
+from models.pantograph.multibody.definition import FORCE_KINDS, JOINT_KINDS
+from models.pantograph.multibody.forces import KNOWN_KINDS, ForceElements
+from models.pantograph.multibody.mechanism import Inputs, Mechanism
+from models.units import SI, to_si
+from tests.master.conftest import FakeSlave
+from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism_data, q
+
+ROOT = Path(__file__).parents[1]
+
+
+# Coupling schemes
+
+
+def test_every_scheme_is_made_as_itself_and_told_its_options():
+    assert set(SCHEMES) == set(ALGORITHMS) == set(OPTIONS)
+    for name in SCHEMES:
+        made = make_algorithm(Coupling.model_validate({"scheme": name}))
+        assert made.name == name
+        taken = [p for p in inspect.signature(ALGORITHMS[name]).parameters if p not in ("args", "kwargs")]
+        assert tuple(taken) == OPTIONS[name]
+
+
+def test_every_setting_of_a_coupling_is_the_option_of_a_scheme():
+    assert set(Coupling.model_fields) == {"scheme", *(o for options in OPTIONS.values() for o in options)}
+
+
+def test_a_scheme_that_nobody_makes_is_no_other():
+    with pytest.raises(RunError, match=r"no coupling scheme 'magic' \(known: jacobi, gauss-seidel, iterative\)"):
+        make_algorithm(Coupling.model_construct(scheme="magic"))
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_every_scheme_steps(name):
+    slaves = [FakeSlave(n, (), ("y",), np.zeros(1), lambda s, u, t, h: np.array([t + h])) for n in "ab"]
+    network = Network(slaves, [])
+    algorithm.initialise(network, 0.0, 1.0)
+    make_algorithm(Coupling.model_validate({"scheme": name})).step(network, 0.0, 0.1)
+    assert network.outputs.tolist() == pytest.approx([0.1, 0.1])
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_options_of_every_scheme_are_shown(name):
+    coupling = Coupling.model_validate({"scheme": name, "order": ("a", "b")})
+    shown = dict(scheme_options(coupling.model_dump(mode="json")))
+    assert list(shown) == [o.replace("_", " ") for o in OPTIONS[name]]
+    assert name != "gauss-seidel" or shown == {"order": "a b"}
+
+
+# Contact laws
+
+
+@pytest.mark.parametrize("name", CONTACT_LAWS)
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_every_contact_law_pushes_and_has_the_slopes_it_says(name, exponent):
+    law, parameters, h = CONTACT_LAWS[name], Contact(stiffness=5e4, exponent=exponent, restitution=0.8), 1e-7
+    value = law(0.004, 0.1, 0.3, parameters)
+    assert value.force > 0.0
+    deeper, faster = law(0.004 + h, 0.1, 0.3, parameters), law(0.004, 0.1 + h, 0.3, parameters)
+    assert value.by_penetration == pytest.approx((deeper.force - value.force) / h, rel=1e-3)
+    assert value.by_velocity == pytest.approx((faster.force - value.force) / h, rel=1e-3)
+
+
+def _jumping(d, v, impact, p):
+    found = continuous_contact(d, v, impact, p)
+    return found._replace(force=found.force + 10.0) if d > 0.0 else found
+
+
+def _sticking(d, v, impact, p):
+    return NormalForce(p.stiffness * d, p.stiffness, 0.0)
+
+
+def _stepping(d, v, impact, p):
+    return continuous_contact(d, v, impact, p).scaled(1.0 if v > 0.123 else 0.99)
+
+
+def _early(d, v, impact, p):
+    return continuous_contact(d + 0.001, v, impact, p)
+
+
+def _boundless(d, v, impact, p):
+    return NormalForce(1.0 / d if d > 0.0 else 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (_jumping, "jumps by 10 N at a penetration of 0: a step beside it would have no solution"),
+        (_stepping, r"jumps by [\d.]+ N at a velocity of 0.123: a step beside it"),
+        (_sticking, "gives -1000 N at a penetration of -0.02: not a push"),
+        (_early, "at a penetration of 0 m: without contact"),
+        (_boundless, "jumps by"),
+    ],
+)
+def test_a_law_that_no_step_can_be_solved_with_is_not_registered(law, said):
+    with pytest.raises(ContactLawError, match=rf"contact law 'new' .*{said}"):
+        register_contact_law("new", law)
+    assert "new" not in CONTACT_LAWS
+
+
+def test_a_sound_law_is_registered_once(monkeypatch):
+    monkeypatch.setattr(contact, "_laws", {})
+    register_contact_law("mine", continuous_contact)
+    assert contact._laws == {"mine": continuous_contact}
+    with pytest.raises(ContactLawError, match="there is a contact law 'mine' already"):
+        register_contact_law("mine", continuous_contact)
+
+
+# Joints and forces of mechanisms
+
+POINTS = {"point_i": (0.5, 0.0, 0.0), "point_j": (-0.5, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize("kind", sorted(set(JOINT_KINDS) - {"prescribed_motion"}))
+def test_every_kind_of_joint_holds_something(kind):
+    across = {"axis_i": (0.0, 1.0, 0.0), "axis_j": (0.0, 0.0, 1.0)}
+    along = {"axis_i": (0.0, 1.0, 0.0), "axis_j": (0.0, 1.0, 0.0)}
+    axes = across if kind in ("universal", "perpendicular", "revolute_prismatic") else along
+    rod = body(2.0, (0.1, 0.2, 0.2), (1.0, 0.0, 0.0))
+    data = mechanism_data({"rod": rod}, {"it": joint(kind, "base", "rod", **POINTS, **axes)})
+    data["joint"]["it"] = {k: v for k, v in data["joint"]["it"].items() if _wanted(kind, k)}
+    assert len(Mechanism(definition.from_dict(data)).rows) >= 1
+
+
+def _wanted(kind, key):
+    if key.startswith("point"):
+        return kind in definition._WITH_POINTS
+    if key.startswith("axis"):
+        return kind in (definition._WITH_AXIS_I if key == "axis_i" else definition._WITH_AXIS_J)
+    return True
+
+
+def test_kinds_of_joints_are_those_that_have_rows():
+    assert set(joints.JOINT_ROWS) | {"prescribed_motion"} == set(JOINT_KINDS)
+
+
+def test_a_kind_of_joint_without_rows_is_no_free_joint():
+    with pytest.raises(definition.DefinitionError, match="is none of"):
+        definition.from_dict(mechanism_data({}, {"it": joint("glued", "base", "base")}))
+
+
+#: Values with which each kind of force pushes on a rod that moves.
+GIVEN = {
+    "spring_damper": {"stiffness": q(100.0, "N/m"), "free_length": q(0.1, "m")},
+    "actuator_force": {"force": q(50.0, "N")},
+    "actuator_moment": {"moment": q(50.0, "N.m"), "axis_i": q([0.0, 1.0, 0.0], "1")},
+    "bump_stop": {"stiffness": q(1e4, "N/m"), "longest": q(0.01, "m")},
+    "bushing": {"translation_stiffness": q([1e3, 1e3, 1e3], "N/m"), "rotation_damping": q([1, 1, 1], "N.m.s/rad")},
+    "joint_friction": {"moment": q(5.0, "N.m"), "transition": q(0.1, "rad/s"), "joint": "hinge"},
+}
+
+
+def pushed(kind):
+    """Return a rod on a hinge with one force, and the loads while it turns."""
+    given = dict(GIVEN[kind])
+    if kind != "joint_friction":
+        given |= {"body_i": "base", "body_j": "rod"}
+        if kind != "actuator_moment":
+            given |= {"point_i": q([0.0, 0.0, 0.5], "m"), "point_j": q([0.2, 0.0, 0.0], "m")}
+    axes = {"axis_i": (0, 1, 0), "axis_j": (0, 1, 0)}
+    hinge = joint("revolute", "base", "rod", point_i=(0, 0, 0), point_j=(-0.5, 0, 0), **axes)
+    rod = body(2.0, (0.01, 0.2, 0.2), (0.5, 0.0, 0.0))
+    data = mechanism_data({"rod": rod}, {"hinge": hinge}, {"it": {"kind": kind, **given}})
+    mechanism = Mechanism(definition.from_dict({**data, "gravity": q(0.0, "m/s2")}))
+    y = assemble(mechanism)
+    r, p, v, w = mechanism.split(y)
+    w = w.copy()
+    w[1, 1] = 0.5
+    moving = mechanism.join(r, p, v, w)
+    return mechanism.loads(moving, mechanism.kinematics(moving), Inputs())
+
+
+@pytest.mark.parametrize("kind", FORCE_KINDS)
+def test_every_kind_of_force_pushes(kind):
+    loads = pushed(kind)
+    assert np.abs(loads[1]).max() > 0.1
+    np.testing.assert_allclose(loads[0, :3], -loads[1, :3], atol=1e-12)  # action and reaction
+
+
+def test_kinds_of_forces_are_the_same_in_every_list():
+    assert set(FORCE_KINDS) == KNOWN_KINDS == set(GIVEN)
+    reader = definition._Reader(definition.Table.from_dict({}))
+    assert set(reader._force_readers) == set(FORCE_KINDS) - {"joint_friction"}
+
+
+def test_a_kind_of_force_that_nobody_computes_is_refused():
+    with pytest.raises(ValueError, match="force 'it': nothing is known of its kind 'magnet'"):
+        ForceElements([definition.Force("it", "magnet")], {}, np.zeros((0, 3, 3)), None)
+
+
+# Quantities, charts, verbs, units
+
+
+def test_every_quantity_measures_something_else_and_has_a_unit_that_is_known():
+    titles = [quantity.title for quantity in QUANTITIES.values()]
+    assert len(set(titles)) == len(titles)
+    for key, quantity in QUANTITIES.items():
+        assert callable(quantity.measure), key
+        assert all(part in {*COMMON, ""} for part in quantity.unit.split("/")) or quantity.unit in COMMON, key
+
+
+def test_every_chart_is_in_a_report():
+    """A function of the module that makes a chart is asked by one that makes all, itself or through another."""
+    tree = ast.parse(Path(charts.__file__).read_text(encoding="utf-8"))
+    functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
+    makers = {n for n, f in functions.items() if f.returns is not None and "Chart" in ast.unparse(f.returns)}
+    asked, left = set(), ["run_charts"]
+    while left:
+        asked.add(name := left.pop())
+        used = {n.id for n in ast.walk(functions[name]) if isinstance(n, ast.Name)}
+        left += sorted((used & set(functions)) - asked - set(left))
+    assert len(makers) > 8
+    assert makers <= asked
+
+
+def verbs(parser):
+    (action,) = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+    return action.choices
+
+
+def test_every_verb_of_the_master_is_one_and_does_something():
+    """One that is missing from `VERBS` would be taken for a scenario's name."""
+    known = verbs(cli._parser())
+    assert tuple(sorted(known)) == tuple(sorted(cli.VERBS))
+    assert all(callable(parser.get_default("verb")) for parser in known.values())
+
+
+def test_every_verb_of_the_others_does_something():
+    assert all(callable(parser.get_default("run")) for parser in verbs(fmus_parser()).values())
+    parser = argparse.ArgumentParser()
+    subparsers = parser.add_subparsers()
+    for verb in commands._VERBS:
+        verb.add(subparsers)
+    assert all(callable(p.get_default("run")) for p in subparsers.choices.values())
+    modules = {p.stem for p in (ROOT / "models/commands").glob("*.py") if "\ndef add(" in p.read_text(encoding="utf-8")}
+    assert modules == {verb.__name__.rpartition(".")[2] for verb in commands._VERBS}
+
+
+@pytest.mark.parametrize("name", sorted(SI))
+def test_every_unit_of_a_definition_is_one_of_the_master_and_of_fmi(name):
+    """The same factor on both sides of an FMU, and dimensions that its description can spell."""
+    si, factor = SI[name]
+    assert SI[si] == (si, 1.0)
+    assert to_si(3.0, name, si) == pytest.approx(3.0 * factor)
+    for part in si.replace("/", ".").split("."):
+        assert part.rstrip("0123456789") in _DERIVED or part == "1"
+    if name in COMMON:
+        assert COMMON[name].factor == pytest.approx(factor)
+        assert si not in COMMON or COMMON[name].dimension == COMMON[si].dimension
+
+
+def test_schemes_have_their_types():
+    assert typing.get_args(Coupling.model_fields["scheme"].annotation) == SCHEMES

@@ -234,8 +234,8 @@ LAST = ("GetRealStatus(void *c, int k, double *w) { return 2; }", "GetRealStatus
     ("changes", "told"),
     [
         ((EARLY,), r"failed in a step at t = 0\.5 s, status discard: the FMU gave no reason"),
-        ((EARLY, ENDS), r"has ended the simulation at t = 0\.5 s, before the stop time"),
-        ((EARLY, ENDS, LAST), r"has ended the simulation at t = 0\.53 s, before the stop time"),
+        ((EARLY, ENDS), r"failed in a step at t = 0\.5 s, status discard: the FMU has ended the simulation at t = 0\.5 s, before the stop time"),
+        ((EARLY, ENDS, LAST), r"failed in a step at t = 0\.5 s, status discard: the FMU has ended the simulation at t = 0\.53 s, before the stop time"),
     ],
 )  # fmt: skip
 def test_an_fmu_that_ends_early_says_so(scenario, tmp_path, changes, told, isolation):

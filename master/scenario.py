@@ -129,7 +129,7 @@ def load_system(
 ) -> System:
     """Read and check the files of ``package``; FMUs are built into ``scratch`` if there is one."""
     reader = Reader(SSD_NAME)
-    sources = Sources(package.root, overrides.outside)
+    sources = Sources(package.root, overrides.outside, None if package.writable else package.origin)
     structure = read_structure(sources, reader)
     if structure is EMPTY:  # without it everything would be missing
         raise ScenarioError(reader.problems)
@@ -139,7 +139,7 @@ def load_system(
     connections = checker.connections()
     components = checker.components(connections)
     times = _times(structure, overrides, reader.problems)
-    if (text := _short_end(*times)) and not reader.problems:
+    if not reader.problems and (text := _short_end(*times)):
         reader.warn(0, "stop", text)
     settings = _settings(structure, overrides, components, reader.problems)
     reader.problems.extend(_filter_problems(settings, times[2]))

@@ -10,6 +10,7 @@ import pytest
 from master.errors import RunError
 from master.isolation import Isolation
 from master.run import Manner
+from master.ssp.pack import pack
 from tests.foreign_fmus import (
     compile_library,
     component,
@@ -302,3 +303,19 @@ def test_names_are_one_line(scenario):
     ]
     told = description().replace('name="x"', 'name="x&#10;y"')
     assert "the variable name 'x\\ny' is not one line of text" in problems(scenario(text, panel=told))[0]
+
+
+def test_an_archive_names_what_lies_beside_it_as_a_folder_would(scenario, tmp_path):
+    folder = scenario(ssd(system(component("a", Y, source="../shared/panel.fmu"))))
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    (folder / "resources/panel.fmu").rename(shared / "panel.fmu")
+    archive = pack(folder, tmp_path / "packed.ssp")
+    assert opened(archive, outside=(shared,)).components[0].fmu.path == shared / "panel.fmu"
+    assert "does not lie inside the scenario" in problems(archive)[0]
+    assert "does not lie inside the scenario" in problems(archive, outside=(folder,))[0]
+
+
+def test_times_without_bounds_are_refused(scenario):
+    text = ssd(system(component("a", Y))).replace('startTime="0"', 'startTime="-1e308"')
+    assert "it is no whole number" not in problems(scenario(text), stop=1e308)[0]

@@ -23,7 +23,7 @@ from master.ssp.start_values import out_of_range, settable
 from master.ssp.units import COMMON, conversion, split_quantity
 from master.ssp.validation import Checker
 from master.ssp.xml import Reader
-from master.system import ROUNDING, Component, Fmu, System, Variable, step_count, without
+from master.system import Component, Fmu, System, Variable, without
 
 DEFAULT_STEP = 1e-3
 #: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
@@ -139,8 +139,6 @@ def load_system(
     connections = checker.connections()
     components = checker.components(connections)
     times = _times(structure, overrides, reader.problems)
-    if not reader.problems and (text := _short_end(*times)):
-        reader.warn(0, "stop", text)
     settings = _settings(structure, overrides, components, reader.problems)
     reader.problems.extend(_filter_problems(settings, times[2]))
     problems = reader.problems or ([w for w in reader.warnings if w.rule != NOTE] if overrides.strict else [])
@@ -261,15 +259,6 @@ def _step_problem(start: float, stop: float, step: float) -> str:
     if step < _RESOLUTION * max(abs(start), abs(stop)):
         return f"is lost beside times up to {max(abs(start), abs(stop)):g} s; begin nearer to 0"
     return ""
-
-
-def _short_end(start: float, stop: float, step: float) -> str:
-    """Return in words that the last whole step ends before the stop time, empty if it does not."""
-    end = start + step_count(start, stop, step) * step
-    if abs(stop - end) <= ROUNDING * step:
-        return ""
-    steps = f"no whole number of macro steps of {step:.12g} s"
-    return f"from the start to the stop time {stop:.12g} s it is {steps}: the run ends at {end:.12g} s"
 
 
 def _filter_problems(settings: RunSettings, step: float) -> Iterator[Problem]:

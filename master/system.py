@@ -14,7 +14,7 @@ from master.ssp.ssv import Value
 from master.ssp.units import Conversion, Unit
 
 #: Share of a step by which the stop time may miss a whole number of steps for want of digits.
-ROUNDING: Final = 1e-6
+_ROUNDING: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -158,12 +158,7 @@ class System:
     @property
     def step_count(self) -> int:
         """Number of macro steps: the last one ends at the stop time, or less than a step before it."""
-        return step_count(self.start, self.stop, self.step)
-
-
-def step_count(start: float, stop: float, step: float) -> int:
-    """Return the number of macro steps from start to stop: the last one ends at the stop time, or before it."""
-    return max(1, math.floor((stop - start) / step + ROUNDING))
+        return max(1, math.floor((self.stop - self.start) / self.step + _ROUNDING))
 
 
 def without(system: System, names: Sequence[str]) -> System:

@@ -23,8 +23,8 @@ char *platform_self(void);
 
 int platform_is_file(const char *path);
 int platform_is_folder(const char *path);
-int platform_is_absolute(const char *path);
 FILE *platform_read(const char *path);
+char *platform_absolute(const char *path);
 
 /* Turn the path of a file URI ("/tmp/x") into one of this system. */
 void platform_fit_uri_path(char *path);

@@ -62,7 +62,14 @@ int platform_is_folder(const char *path) { /* without stat, which would need gli
     return handle >= 0;
 }
 
-int platform_is_absolute(const char *path) { return *path == '/'; }
+char *platform_absolute(const char *path) { /* without realpath: a link is to stay one, it may be moved */
+    char *here = *path == '/' ? strdup("") : getcwd(NULL, 0);
+    size_t size = here ? strlen(here) + strlen(path) + 2 : 0;
+    char *made = here ? malloc(size) : NULL;
+    if (made) snprintf(made, size, "%s%s%s", here, *here ? "/" : "", path);
+    free(here);
+    return made;
+}
 
 FILE *platform_read(const char *path) { return fopen(path, "rbe"); }
 

@@ -95,7 +95,14 @@ static int is_drive(const char *path) {
     return ((*path >= 'A' && *path <= 'Z') || (*path >= 'a' && *path <= 'z')) && path[1] == ':';
 }
 
-int platform_is_absolute(const char *path) { return is_drive(path) || *path == '/' || *path == '\\'; }
+char *platform_absolute(const char *path) {
+    wchar_t *wide = platform_wide(path), *whole = wide ? _wfullpath(NULL, wide, 0) : NULL;
+    char *made = whole ? narrow(whole) : NULL;
+    free(wide), free(whole);
+    for (char *c = made; c && *c; c++)
+        if (*c == '\\') *c = '/';
+    return made;
+}
 
 FILE *platform_read(const char *path) {
     wchar_t *wide = wide_path(path);

@@ -12,7 +12,7 @@ import tempfile
 import tomllib
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -156,7 +156,7 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     BuildError
         If the file is not there, or is no definition.
     """
-    if name.endswith(".toml"):
+    if name.lower().endswith(".toml"):
         return _own_recipe(Path(name), pantographs or 1)
     kind, _, rest = name.partition("_")
     stem, ports = _split_ports(rest, pantographs)
@@ -485,9 +485,12 @@ def _describe(
 def _instance(wanted: Recipe, script: str, folder: str) -> Any:
     try:
         slave_class = getattr(importlib.import_module(script), wanted.name)
-        return slave_class(instance_name=wanted.name, resources=folder)
+        with redirect_stderr(io.StringIO()):  # an adapter tells hosts there what is raised here as well
+            return slave_class(instance_name=wanted.name, resources=folder)
     except Exception as error:
-        raise BuildError(f"{wanted.name} cannot be built: {error}") from error
+        # The user's file, not the copy of it that is gone by now.
+        text = str(error).replace(str(Path(folder) / "definition.toml"), str(wanted.definition))
+        raise BuildError(f"{wanted.name} cannot be built: {text}") from error
 
 
 def _description(root: Element) -> bytes:

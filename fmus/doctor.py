@@ -164,7 +164,8 @@ def ask(name: str | None = None) -> Interpreter | None:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return None
-    lines = [*done.stdout.splitlines(), "", "", "", ""]
+    _, _, answers = done.stdout.partition("openpanto_probe:\n")  # what a site's own code prints comes before
+    lines = [*answers.splitlines(), "", "", "", ""]
     # Without PATH it does not know its own place.
     return Interpreter(lines[0] or name, *lines[1:4]) if done.returncode == 0 and lines[1] else None
 

@@ -51,6 +51,7 @@ INCLUDE_TEXT(openpanto_opening, "fmu_opening.py");
 
 #define TEXT 2048 /* longest sentence */
 #define LINES 64  /* most lines of a list of settings */
+#define MARK "openpanto_probe:" /* the line before the answers of python_probe.py */
 
 typedef void *Component;
 typedef void *State;
@@ -390,14 +391,17 @@ static char *next_line(char **rest) {
 
 static int ask(Interpreter *python, Problem *problem) {
     char *rest = python->text = platform_ask(interpreter_name(), openpanto_probe);
-    if (rest) {
+    char *start = rest ? strstr(rest, MARK) : NULL; /* what a site's own code prints comes before */
+    rest = start ? start + strlen(MARK) : rest;
+    if (start) next_line(&rest);
+    if (start) {
         python->executable = next_line(&rest);
         python->version = next_line(&rest);
         python->library = next_line(&rest);
         python->lack = next_line(&rest);
         if (!*python->executable) python->executable = interpreter_name(); /* without PATH it does not know its place */
     }
-    if (!rest || !*python->version)
+    if (!start || !*python->version)
         return fail(problem, "no Python 3 found: '%s' cannot be run; install Python 3 with numpy and scipy, put it "
                              "first on PATH or name it in OPENPANTO_PYTHON", interpreter_name());
     if (*python->lack)
@@ -564,18 +568,26 @@ static int bring_python(const char *resources, Problem *problem) {
     return done;
 }
 
-static int open_inner(Problem *problem) {
-    char *path = platform_self(), why[TEXT / 2] = "";
-    char *suffix = path ? strrchr(path, '.') : NULL;
+/* The name of pythonfmu's library beside this one; NULL if this one's name has no suffix. */
+static char *inner_name(int is_resolved) {
+    char *path = platform_self(is_resolved), *suffix = path ? strrchr(path, '.') : NULL;
     if (suffix) *suffix = 0;
-    char *name = suffix ? join(path, "", INNER) : NULL;
-    void *opened = name ? platform_open(name, 0, why, sizeof why) : NULL;
-    if (!opened)
+    char *name = suffix && !strchr(suffix + 1, '/') ? join(path, "", INNER) : NULL;
+    free(path);
+    return name;
+}
+
+static int open_inner(Problem *problem) {
+    char why[TEXT / 2] = "it is not there";
+    /* Where this library is a link, the other one lies beside the link or beside the file. */
+    char *name = inner_name(0);
+    if (!name || !platform_is_file(name)) free(name), name = inner_name(1);
+    inner = name ? platform_open(name, 0, why, sizeof why) : NULL;
+    if (!inner)
         fail(problem, "pythonfmu's library beside the FMU's own cannot be loaded: %s%s", why,
              strstr(why, "version `G") ? "; this system is older than the FMU needs" : "");
-    inner = opened;
-    free(path), free(name);
-    return opened != NULL;
+    free(name);
+    return inner != NULL;
 }
 
 static int ready(const char *resources, Problem *problem) {

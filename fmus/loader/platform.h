@@ -18,8 +18,8 @@ void *platform_open(const char *path, int is_global, char *why, size_t size);
 /* Find a symbol in a library, or in the whole process for NULL. */
 void *platform_find(void *library, const char *name);
 
-/* The path of this library, absolute. */
-char *platform_self(void);
+/* The path of this library, absolute: by the name that the host loaded it by, or where links lead. */
+char *platform_self(int is_resolved);
 
 int platform_is_file(const char *path);
 int platform_is_folder(const char *path);

@@ -29,12 +29,14 @@ __asm__(".symver dladdr, dladdr@GLIBC_2.2.5");
 extern char **environ;
 
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
-static char *self;
+static char *self, *resolved_self;
 
 /* Asked when the library is loaded: later the working folder, to which its path may be relative, can be another. */
 __attribute__((constructor)) static void find_self(void) {
     Dl_info info;
-    if (dladdr(&mutex, &info) && info.dli_fname) self = realpath(info.dli_fname, NULL);
+    if (!dladdr(&mutex, &info) || !info.dli_fname) return;
+    self = platform_absolute(info.dli_fname);
+    resolved_self = realpath(info.dli_fname, NULL);
 }
 
 void platform_lock(void) { pthread_mutex_lock(&mutex); }
@@ -52,7 +54,10 @@ void *platform_open(const char *path, int is_global, char *why, size_t size) {
 
 void *platform_find(void *library, const char *name) { return dlsym(library ? library : RTLD_DEFAULT, name); }
 
-char *platform_self(void) { return self ? strdup(self) : NULL; }
+char *platform_self(int is_resolved) {
+    const char *path = is_resolved ? resolved_self : self;
+    return path ? strdup(path) : NULL;
+}
 
 int platform_is_file(const char *path) { return !platform_is_folder(path) && access(path, R_OK) == 0; }
 

@@ -62,7 +62,8 @@ void *platform_find(void *library, const char *name) {
     return NULL;
 }
 
-char *platform_self(void) {
+char *platform_self(int is_resolved) {
+    (void)is_resolved;
     enum { LONGEST = 32768 };
     HMODULE self;
     wchar_t *path = malloc(LONGEST * sizeof *path);

@@ -94,7 +94,29 @@ def test_a_call_that_cannot_be_served_is_a_sentence(obedient, part, call, text):
 def test_a_python_that_does_not_know_its_own_place_is_named_by_the_command(obedient, part, tmp_path):
     """sys.executable is empty where PATH is not set."""
     python = tmp_path / "python"
-    python.write_text("#!/bin/sh\nprintf '\\n3.11\\n\\nlacks the packages numpy and scipy\\n'\n")
+    python.write_text("#!/bin/sh\nprintf 'openpanto_probe:\\n\\n3.11\\n\\nlacks the packages numpy and scipy\\n'\n")
     python.chmod(0o755)
     lines, _ = _ask(obedient, _load(part), OPENPANTO_PYTHON=str(python))
     assert lines[0].startswith(f"{python} lacks the packages numpy and scipy;")
+
+
+def test_what_a_sites_own_code_prints_is_no_answer(obedient, part, tmp_path):
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text("print('welcome to the cluster')\n")
+    lines, _ = _ask(obedient, _load(part), "start", PYTHONPATH=str(tmp_path / "site"))
+    assert lines[-2:] == ["load 0", "start 0"]
+
+
+@pytest.mark.parametrize("where", ["both are links", "one is a link"])
+def test_links_to_the_libraries_are_followed(obedient, part, tmp_path, where):
+    """A store of files by their hashes, as package managers have it: the files' names say nothing."""
+    links = tmp_path / "links"
+    links.mkdir()
+    for n, library in enumerate(sorted(part.library.parent.iterdir())):
+        if where == "both are links":
+            library = library.rename(tmp_path / f"stored{n}")
+            (links / [part.library.with_suffix(".pythonfmu.so").name, part.library.name][n]).symlink_to(library)
+        elif library == part.library:
+            (links / library.name).symlink_to(library)
+    orders = ["load " + order(links / part.library.name, part.guid, part.folder / "resources"), "start"]
+    assert _ask(obedient, *orders)[0] == ["load 0", "start 0"]

@@ -51,6 +51,7 @@ MAX_PORTS = 16
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
 #: In every FMU of ours: what it is, for the loader and for whoever wants to know whether it may be replaced.
 MARK = "resources/openpanto.txt"
+DESCRIPTION_XML = "modelDescription.xml"
 #: Where a standalone FMU holds its own Python.
 RUNTIME = "resources/runtime"
 
@@ -292,7 +293,10 @@ def _with_runtime(files: Mapping[str, bytes], name: str, runtime: Mapping[str, b
         files = with_windows_loader(files, name) if is_for_windows else with_loader(files, name)
     except LoaderError as error:
         raise BuildError(f"{name} cannot be standalone: {error}") from error
-    return {**files, **{f"{RUNTIME}/{inner}": data for inner, data in runtime.items()}}
+    brought = {f"{RUNTIME}/{inner}": data for inner, data in runtime.items()}
+    # pythonfmu's description asks for a tool, Python, on the machine.
+    description = files[DESCRIPTION_XML].replace(b'needsExecutionTool="true"', b'needsExecutionTool="false"')
+    return {**files, **brought, DESCRIPTION_XML: description}
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:
@@ -477,7 +481,7 @@ def _describe(
         with _importable(folder, (sources.package, script)):
             slave = _instance(wanted, script, folder)
             return {
-                "modelDescription.xml": _description(slave.to_xml()),
+                DESCRIPTION_XML: _description(slave.to_xml()),
                 "documentation/index.html": _page(wanted, sources, slave),
             }
 

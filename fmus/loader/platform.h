@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/* Locks out other threads while Python is brought into the process. */
+/* Locks out other threads, other FMUs' among them, while Python is brought into the process. */
 void platform_lock(void);
 void platform_unlock(void);
 

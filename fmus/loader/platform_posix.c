@@ -28,13 +28,23 @@ __asm__(".symver dladdr, dladdr@GLIBC_2.2.5");
 
 extern char **environ;
 
+/* One for the process, not for each FMU's loader: they all start the same Python. Of a unique symbol the dynamic linker
+ * takes the first for all, however the libraries are opened. All zeros is PTHREAD_MUTEX_INITIALIZER. */
+#if defined(__linux__) && defined(__GLIBC__)
+__asm__(".pushsection .bss\n.balign 64\n.globl openpanto_loader_mutex\n.type openpanto_loader_mutex, @gnu_unique_object\n"
+        ".size openpanto_loader_mutex, 64\nopenpanto_loader_mutex: .zero 64\n.popsection");
+extern __attribute__((visibility("default"))) pthread_mutex_t openpanto_loader_mutex;
+_Static_assert(sizeof(pthread_mutex_t) <= 64, "room for the mutex");
+#define mutex openpanto_loader_mutex
+#else
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+#endif
 static char *self, *resolved_self;
 
 /* Asked when the library is loaded: later the working folder, to which its path may be relative, can be another. */
 __attribute__((constructor)) static void find_self(void) {
     Dl_info info;
-    if (!dladdr(&mutex, &info) || !info.dli_fname) return;
+    if (!dladdr(&self, &info) || !info.dli_fname) return;
     self = platform_absolute(info.dli_fname);
     resolved_self = realpath(info.dli_fname, NULL);
 }

@@ -11,11 +11,19 @@
 #define ANSWER 65536 /* most bytes of an answer */
 #define SECONDS 120  /* longest wait for one */
 
-static SRWLOCK lock = SRWLOCK_INIT;
+static HANDLE lock;
 
-void platform_lock(void) { AcquireSRWLockExclusive(&lock); }
+/* One for the process, not for each FMU's loader: they all start the same Python. */
+void platform_lock(void) {
+    wchar_t name[64];
+    wsprintfW(name, L"Local\\openpanto-loader-%lu", (unsigned long)GetCurrentProcessId());
+    if (!lock) lock = CreateMutexW(NULL, FALSE, name); /* by whichever thread: the name makes it the same one */
+    if (lock) WaitForSingleObject(lock, INFINITE);
+}
 
-void platform_unlock(void) { ReleaseSRWLockExclusive(&lock); }
+void platform_unlock(void) {
+    if (lock) ReleaseMutex(lock);
+}
 
 wchar_t *platform_wide(const char *text) {
     int size = MultiByteToWideChar(CP_UTF8, 0, text, -1, NULL, 0);

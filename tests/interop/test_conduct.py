@@ -17,15 +17,18 @@ from tests.interop.test_host import linux, order, run_host, unpack
 pytestmark = linux
 
 
+def _compiled(name, folder):
+    headers = Path(fmpy.__file__).parent / "c-code"
+    source = Path(__file__).parent / "host" / f"{name}.c"
+    command = [os.environ.get("CC", "cc"), "-std=gnu11", "-O1", "-Wall", "-Werror", f"-I{headers}", str(source)]
+    subprocess.run([*command, "-o", str(folder / name), "-ldl", "-lpthread"], check=True)
+    return folder / name
+
+
 @pytest.fixture(scope="module")
 def obedient(tmp_path_factory):
     """A host that takes orders one by one."""
-    headers = Path(fmpy.__file__).parent / "c-code"
-    program = tmp_path_factory.mktemp("host") / "orders"
-    source = Path(__file__).parent / "host" / "orders.c"
-    command = [os.environ.get("CC", "cc"), "-std=gnu11", "-O1", "-Wall", "-Werror", f"-I{headers}", str(source)]
-    subprocess.run([*command, "-o", str(program), "-ldl"], check=True)
-    return program
+    return _compiled("orders", tmp_path_factory.mktemp("host"))
 
 
 @pytest.fixture
@@ -120,3 +123,13 @@ def test_links_to_the_libraries_are_followed(obedient, part, tmp_path, where):
             (links / library.name).symlink_to(library)
     orders = ["load " + order(links / part.library.name, part.guid, part.folder / "resources"), "start"]
     assert _ask(obedient, *orders)[0] == ["load 0", "start 0"]
+
+
+def test_several_fmus_start_python_once_in_threads_at_the_same_time(tmp_path):
+    """Each brings a loader of its own: what locks out the others has to be one for the process."""
+    host = _compiled("together", tmp_path)
+    parts = [unpack(build(toy_recipe(name=f"Toy{n}"), tmp_path), tmp_path / "unpacked") for n in range(4)]
+    words = [str(word) for p in parts for word in (p.library, p.guid, p.folder / "resources")]
+    for _ in range(3):
+        done = run_host([host, *words], "", OPENPANTO_PYTHON=sys.executable)
+        assert done.returncode == 0, done.stderr[-2000:]

@@ -174,7 +174,7 @@ def test_a_constant_force_at_a_dropper_lifts_the_line_as_far(line_maker, kernel)
         for _ in range(1500):
             model.push(state, 0.01, [(0, at, 60.0)])
         node = np.abs(model.mesh.points[:, 0] - at).argmin()
-        rise.append((model.dropper_force(state), model.displacement(state)[node, 2]))
+        rise.append((model.spring_force(state), model.displacement(state)[node, 2]))
     (forces, whole), (found, lifted) = rise
     assert whole > 5e-3
     assert lifted == pytest.approx(whole, rel=1e-9)
@@ -229,7 +229,8 @@ def test_is_the_same_with_and_without_kernels(short_line, cx, highest, monkeypat
 @pytest.mark.parametrize("name", line_names())
 def test_every_line_of_the_library_steps_with_few_modes(name):
     model = reduced(load_line(name), 15.0, **{"mesh.elements_between_droppers": 2})
-    assert model.modes.followers or name == "EN50318_2002"  # whose intervals are long
+    long_or_slow = ("EN50318_2002", "CA160", "CA220")  # every interval has a mode below 15 Hz
+    assert model.modes.followers or name in long_or_slow
     x = 0.5 * sum(model.wires[0].ends)
     wire = model.static.positions[model.mesh.contact_chains()[0].nodes]
     z = np.interp(x, wire[:, 0], wire[:, 2]) + 0.03

@@ -151,7 +151,8 @@ def load_system(
         components, settings = _with_energy(components, settings)
     warnings = tuple(str(w) for w in _sorted(reader.warnings))
     system = System(package.name, components, connections, *times, settings, warnings, overrides.may_stop_early)
-    if text := scenario_checks.empty_cells(system, overrides.empty):
+    text = scenario_checks.empty_cells(system, overrides.empty)
+    if text := text or scenario_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)
     system = without(system, overrides.absent)
     if overrides.stop is None and _goes_on_until_end(structure):

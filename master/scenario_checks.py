@@ -72,6 +72,21 @@ def empty_cells(system: System, names: Sequence[str]) -> str:
     return f"the table has no value for {', '.join(found)}: write one into every row" if found else ""
 
 
+def half_empty_rows(system: System, empty: Sequence[str], absent: Sequence[str]) -> str:
+    """Return what is wrong with a table's row that fills some cells of a pantograph, or none of any pantograph.
+
+    A pantograph without values takes no part; one with some would run with the scenario's values for the others, and
+    without any pantograph there is nothing to tell of a run.
+    """
+    trains = [p.name for p in pantographs(system)]
+    half = [name for name in empty if name.partition(".")[0] in trains and name.partition(".")[0] not in absent]
+    if half:
+        return f"the table has no value for {', '.join(half)}: write one, or leave all cells of that pantograph empty"
+    if trains and all(name in absent for name in trains):
+        return f"the table leaves out every pantograph ({', '.join(trains)}): write the values of one of them"
+    return ""
+
+
 def stop_after_interval(system: System) -> float | str:
     """Return the stop time at which the last pantograph has left the interval of interest [s], or why there is none.
 

@@ -4,7 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from master.scenario_checks import empty_cells, final_position, parameter_value, problems, stop_after_interval
+from master.scenario_checks import (
+    empty_cells,
+    final_position,
+    half_empty_rows,
+    parameter_value,
+    problems,
+    stop_after_interval,
+)
 from master.ssp.annotation import Interval, RunSettings
 from master.system import Component, Connection, Fmu, System, Variable
 
@@ -153,3 +160,11 @@ def test_an_empty_cell_of_the_line_is_told_and_one_of_a_pantograph_is_not():
     assert empty_cells(system(), ["train.static_force"]) == ""
     found = empty_cells(system(), ["train.static_force", "line.tension", "liner.x"])
     assert found == "the table has no value for line.tension: write one into every row"
+
+
+def test_a_row_that_fills_some_cells_of_a_pantograph_or_none_of_any_is_told():
+    assert half_empty_rows(system(), [], []) == ""
+    found = half_empty_rows(system(), ["train.static_force"], [])
+    assert found.startswith("the table has no value for train.static_force: write one, or leave all cells")
+    found = half_empty_rows(system(), ["train.static_force", "train.start_position"], ["train"])
+    assert found == "the table leaves out every pantograph (train): write the values of one of them"

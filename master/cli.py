@@ -382,7 +382,7 @@ def _show_verdict(console: Console, assessment: Assessment, settings: Evaluation
         console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
         console.print(report.plain_table(report.FILTER_HEADS, rows))
     for warning in assessment.warnings:
-        console.print(f"warning: {assessment.contact.pantograph}: {warning}", markup=False, soft_wrap=True)
+        console.print(f"warning: {assessment.contact.pantograph}: {warning}", markup=False)
 
 
 def _closing_lines(done: Results) -> list[str]:

@@ -144,7 +144,7 @@ def _show(runs: Sequence[Results], pairs: Sequence[Sequence[compare.Comparison]]
     console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
     warnings = [f"{c.name}: {warning}" for c in found for warning in c.assessment.warnings]
     for note in (*compare.setting_notes(runs), *warnings):
-        console.print(f"warning: {note}", markup=False, soft_wrap=True)
+        console.print(f"warning: {note}", markup=False)
     for folder, differences in zip(options.others, pairs, strict=True):
         for c in differences:
             console.print(f"{folder}, {c.first.contact.pantograph}: {c.sentence}", markup=False, soft_wrap=True)

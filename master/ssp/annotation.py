@@ -132,7 +132,7 @@ class Limits(_Settings):
     mean_upper: float | None = Field(None, alias="meanUpper", gt=0)
     mean_lower: float | None = Field(None, alias="meanLower", ge=0)
     maximum: float | None = Field(None, gt=0)
-    sigma_share: float | None = Field(None, alias="sigmaShare", gt=0)
+    sigma_share: float | None = Field(None, alias="sigmaShare", gt=0, le=1)
     statistical_minimum: float | None = Field(None, alias="statisticalMinimum")
     nq: float | None = Field(None, ge=0, le=100)
     uplift: float | None = Field(None, gt=0, lt=1)
@@ -309,5 +309,6 @@ def parse_section(node: Any, reader: Reader) -> _Settings | None:
     except ValidationError as error:
         for item in error.errors():
             where = ".".join(str(part) for part in item["loc"][:1])
-            reader.problem(node, "annotation", f"{tag(node)} {where}: {item['msg']}")
+            named = f"{tag(node)} {where}".rstrip()
+            reader.problem(node, "annotation", f"{named}: {item['msg'].removeprefix('Value error, ')}")
         return None

@@ -83,6 +83,7 @@ def test_the_filter_is_in_the_summary_and_changes_the_figures(toy, toy_text, tmp
         ('<panto:Limits supply="3kV"/>', "Limits supply"),
         ('<panto:Limits maximum="0"/>', "Limits maximum"),
         ('<panto:Limits meanUpper="100" meanLower="120"/>', "must lie below"),
+        ('<panto:Limits sigmaShare="30"/>', "Limits sigmaShare: Input should be less than or equal to 1"),
         ('<panto:Limits uplift="120"/>', "Limits uplift"),  # m, not mm
     ],
 )

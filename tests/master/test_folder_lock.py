@@ -209,6 +209,36 @@ def test_rows_are_counted_before_a_run_is_complete(toy, tmp_path, capsys, monkey
     assert "quality" not in summary
 
 
+def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsys, monkeypatch):
+    """As if somebody had copied the table of another run, as long as this one, over it meanwhile."""
+    folder = tmp_path / "out"
+    assert go(toy, tmp_path / "other", "--stop", "0.1", "--set", "pantograph.static_force=200") == 0
+    other = (tmp_path / "other" / "timeseries.csv").read_text()
+
+    def replaced(path):
+        if path == folder / "timeseries.csv":
+            path.write_text(other)
+        return load(path)
+
+    monkeypatch.setattr("master.recorder.load", replaced)
+    assert go(toy, folder, "--stop", "0.1") == 1
+    assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == "failed"
+    assert "quality" not in summary
+
+
+def test_a_folder_made_anew_keeps_its_lock_when_the_first_owner_ends(tmp_path, holder):
+    folder = tmp_path / "held"
+    folder.mkdir()
+    with claimed(folder):
+        folder.rename(tmp_path / "moved")
+        process = holder(folder)
+    assert json.loads((folder / OWNER).read_text())["process"] == process.pid
+    with pytest.raises(FolderInUseError, match=f"process {process.pid} on"), claimed(folder):
+        pass
+
+
 def test_study_and_verification_are_alone_in_their_folders(toy, tmp_path, capsys, holder):
     (toy / "study.toml").write_text('title = "a"\n[[interval]]\nname = "whole"\nstart = 10.0\nend = 45.0\n')
     (toy / "variants.csv").write_text("variant,catenary.stiffness\nsoft,4000\n")

@@ -31,13 +31,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         code: int | None = options.run(options)
-        sys.stdout.flush()  # here, where an error can still be told
+        if sys.stdout is not None:  # closed by the caller
+            sys.stdout.flush()  # here, where an error can still be told
     except UnknownFmuError as error:
         return _fail(str(error), 2)
     except BuildError as error:
         return _fail(str(error), 1)
     except OSError as error:
         return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}", 1)
+    except MemoryError:
+        return _fail("there is not enough memory; end other programs, or raise the limit (ulimit -v)", 1)
     except KeyboardInterrupt:
         return _fail("interrupted", 1)
     return code or 0

@@ -48,6 +48,9 @@ def whole_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
     MasterError
         If it cannot be written; the old one is still there then.
     """
+    # A device, such as /dev/null, would be replaced by a file for all users of the computer.
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise MasterError(f"{path} is no file, and is left alone; choose {elsewhere}")
     # Hidden, so that no archive takes it along, and each process has its own: two writers do not mix.
     temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     try:

@@ -27,28 +27,26 @@ DEFAULT_FOLDER = Path("build/fmus")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 for success, 1 for a failure, 2 for a wrong command line."""
+    """Run a command; 0 for success, 1 for a failure, 2 for a command line that was not understood."""
     options = _parser().parse_args(arguments)
     try:
         code: int | None = options.run(options)
         if sys.stdout is not None:  # closed by the caller
             sys.stdout.flush()  # here, where an error can still be told
-    except UnknownFmuError as error:
-        return _fail(str(error), 2)
-    except BuildError as error:
-        return _fail(str(error), 1)
+    except (UnknownFmuError, BuildError) as error:
+        return _fail(str(error))
     except OSError as error:
-        return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}", 1)
+        return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
     except MemoryError:
-        return _fail("there is not enough memory; end other programs, or raise the limit (ulimit -v)", 1)
+        return _fail("there is not enough memory; end other programs, or raise the limit (ulimit -v)")
     except KeyboardInterrupt:
-        return _fail("interrupted", 1)
+        return _fail("interrupted")
     return code or 0
 
 
-def _fail(text: str, code: int) -> int:
+def _fail(text: str) -> int:
     print(f"error: {printable(text)}", file=sys.stderr)
-    return code
+    return 1
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -76,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
     verb.add_argument("name", metavar="NAME", help="as for build")
+    verb.add_argument("--if-known", action="store_true", help="print nothing for a name that no FMU has")
     verb.set_defaults(run=_fingerprint)
     verb = verbs.add_parser("list", help="list the FMUs that can be built")
     verb.set_defaults(run=_list)
@@ -134,7 +133,13 @@ def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:
 
 
 def _fingerprint(options: argparse.Namespace) -> None:
-    print(fingerprint(recipe(options.name, options.pantographs)))
+    try:
+        wanted = recipe(options.name, options.pantographs)
+    except UnknownFmuError:
+        if options.if_known:
+            return
+        raise
+    print(fingerprint(wanted))
 
 
 def _list(options: argparse.Namespace) -> None:

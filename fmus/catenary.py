@@ -64,7 +64,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
             calculated=(
                 *_geometry_ports(part),
                 *_section_ports(part),
-                *_period_ports(part),
+                *_extent_ports(part),
                 _wave_port(),
                 _elasticity_port(),
             ),
@@ -77,7 +77,10 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         part.step(inputs.reshape(self.pantographs, 2, 2, 3), step)
 
     def _doubts(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
-        along_track = inputs.reshape(self.pantographs, 2, 2, 3)[:, :, 1, 0]
+        strips = inputs.reshape(self.pantographs, 2, 2, 3)
+        along_track = strips[:, :, 1, 0]
+        part.check_strips(strips)
+        yield part.start_warning(strips)
         yield slack_warning(part.droppers, part.model.static.dropper_force)
         yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
@@ -169,10 +172,12 @@ def _section_ports(part: CatenaryPart) -> tuple[Port, ...]:
     )
 
 
-def _period_ports(part: CatenaryPart) -> tuple[Port, ...]:
-    """Say after which length a line repeats that closes on itself."""
+def _extent_ports(part: CatenaryPart) -> tuple[Port, ...]:
+    """Say where the wire begins and ends, or after which length a line repeats that closes on itself."""
     if not part.period.any():
-        return ()
+        ends = ("begin", "end")
+        signals = tuple(Signal(f"contact_wire.{e}", "m", f"{e} of the contact wire along the track") for e in ends)
+        return (Port(signals, attrgetter("contact_wire_ends")),)
     text = "length after which the line repeats: its last span ends where its first one begins"
     return (Port((Signal("period", "m", text),), attrgetter("period")),)
 

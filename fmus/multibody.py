@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
 
@@ -36,6 +37,9 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
 
     def _make_ports(self, part: MultibodyPantographPart) -> Ports:
         return pantograph_ports(part)
+
+    def _doubts(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
+        yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
 
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:
         part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from operator import attrgetter, methodcaller
 from pathlib import Path
 from typing import Any, ClassVar
@@ -9,6 +10,7 @@ from typing import Any, ClassVar
 from fmus.adapter import Adapter
 from fmus.ports import Port, Ports, Signal, energy_ports, vector
 from models.pantograph.lumped import LumpedPantographPart
+from models.pantograph.lumped_advice import working_height_warning
 from models.pantograph.parameters import LumpedDefinition, load_lumped
 from models.part import FloatArray
 
@@ -38,6 +40,9 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
 
     def _make_ports(self, part: LumpedPantographPart) -> Ports:
         return pantograph_ports(part)
+
+    def _doubts(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
+        yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
 
     def _initialise(self, part: LumpedPantographPart, time: float, inputs: FloatArray) -> None:
         part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6])

@@ -21,7 +21,7 @@ import numpy as np
 from master.algorithm import Algorithm, initialise
 from master.arrays import FloatArray
 from master.durable import write_whole
-from master.errors import MasterError, RunError, UsageError, one_line
+from master.errors import MasterError, RequestError, RunError, one_line
 from master.network import Network
 from master.rounding import steps_in
 from master.simulation import TimeGrid
@@ -129,7 +129,7 @@ class Continuation:
 
         Raises
         ------
-        UsageError
+        RequestError
             Naming every difference.
         """
         unknown = [name for name in self.renewed if name not in {c.name for c in system.components}]
@@ -144,7 +144,7 @@ class Continuation:
         if grid.count < grid.first or (grid.count == grid.first and not self.is_same_run):
             found.append(f"it was saved at {self.checkpoint.time:g} s, the run would end at {system.stop:g} s")
         if found:
-            raise UsageError(f"{self.file} does not fit this run: " + "; ".join(found))
+            raise RequestError(f"{self.file} does not fit this run: " + "; ".join(found))
 
     def _changes(self, system: System) -> list[str]:
         c, scheme = self.checkpoint, system.settings.coupling.scheme
@@ -257,13 +257,13 @@ def index_at(system: System, time: float) -> int:
 
     Raises
     ------
-    UsageError
+    RequestError
         If that is no communication point of the run, or a component cannot be saved.
     """
     steps = (time - system.start) / system.step
     index = round(steps)
     if not 0 < index <= system.step_count or abs(steps - index) > _ROUNDING:
-        raise UsageError(
+        raise RequestError(
             f"--checkpoint {time:g}: not a communication point of the run, which goes from {system.start:g} s to "
             f"{system.stop:g} s in steps of {system.step:g} s"
         )
@@ -276,7 +276,7 @@ def steps_between(system: System, period: float) -> int:
 
     Raises
     ------
-    UsageError
+    RequestError
         If a component cannot be saved.
     """
     _check_serialisable(system, "--checkpoint-every")
@@ -286,10 +286,10 @@ def steps_between(system: System, period: float) -> int:
 def _check_serialisable(system: System, option: str) -> None:
     cannot = [c.name for c in system.components if not c.fmu.can_serialise]
     if cannot:
-        raise UsageError(f"{option}: the FMU of {', '.join(cannot)} cannot serialise its state")
+        raise RequestError(f"{option}: the FMU of {', '.join(cannot)} cannot serialise its state")
     texts = [f"{c.name}.{name}" for c in system.components for name in c.texts]
     if texts:
-        raise UsageError(f"{option}: '{texts[0]}' is a text that is exchanged, which a checkpoint cannot hold")
+        raise RequestError(f"{option}: '{texts[0]}' is a text that is exchanged, which a checkpoint cannot hold")
 
 
 def scheme_options(system: System) -> dict[str, Any]:

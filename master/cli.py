@@ -1,6 +1,7 @@
 """The command line: ``python -m master [VERB] ...``.
 
-Exit codes: docs/reliability.md.
+Exit codes: 0 done; 1 failed, invalid or incomplete (scenario, definition, FMU, results, limits that must hold in
+``verify``); 2 only a command line that was not understood; docs/reliability.md says more.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from rich.console import Console
 from master import calibrate, checkpoint, export, limits, report, results
 from master.caution import CautionObserver
 from master.checkpoint import Continuation
-from master.errors import MasterError, Problem, RunError, ScenarioError, UsageError
+from master.errors import MasterError, Problem, RequestError, RunError, ScenarioError, UsageError
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import EvaluationSettings
 from master.isolation import INIT_TIMEOUT, Isolation
@@ -33,7 +34,7 @@ from master.run import Manner, run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.ssp.annotation import SCHEMES, Calibration
 from master.ssp.archive import SSD_NAME, Package, Sources
-from master.ssp.pack import pack
+from master.ssp.pack import left_out, pack
 from master.ssp.ssd import read_structure
 from master.ssp.xml import Reader
 from master.store import write_runtime
@@ -236,6 +237,11 @@ def _overrides(options: argparse.Namespace) -> Overrides:
     )
 
 
+def _run_overrides(options: argparse.Namespace) -> Overrides:
+    """Return the changes of a run: one that is told when to stop may stop before it can be judged."""
+    return replace(_overrides(options), energy=options.energy, may_stop_early=options.stop is not None)
+
+
 def _tell(text: str, console: Console | None = None) -> None:
     (console or Terminal(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
 
@@ -243,8 +249,7 @@ def _tell(text: str, console: Console | None = None) -> None:
 def _run(options: argparse.Namespace) -> int:
     tell = (lambda _: None) if options.quiet else _tell
     manner = _manner(options)
-    overrides = replace(_overrides(options), energy=options.energy)
-    with open_scenario(options.scenario, overrides, tell, not options.no_build) as scenario:
+    with open_scenario(options.scenario, _run_overrides(options), tell, not options.no_build) as scenario:
         folder = _folder(options, scenario.system)
         _protect(folder, scenario.package)
         _tell_warnings(scenario.system, tell)
@@ -292,7 +297,7 @@ def _folder(options: argparse.Namespace, system: System) -> Path:
 
 def _protect(folder: Path, package: Package) -> None:
     if folder.resolve().is_relative_to(package.root) or package.root.is_relative_to(folder.resolve()):
-        raise UsageError(
+        raise RequestError(
             f"the results folder {folder} and the scenario lie inside each other; choose another with --out"
         )
 
@@ -320,7 +325,7 @@ def _continuation(options: argparse.Namespace) -> Continuation | None:
     is_same_run = options.resume.is_dir()
     file = options.resume / checkpoint.NAME if is_same_run else options.resume
     if is_same_run and not file.is_file():
-        raise UsageError(
+        raise RequestError(
             f"{options.resume} holds no {checkpoint.NAME} to go on from: the run was started without "
             "--checkpoint-every, or ended before the first one; run it again"
         )
@@ -354,6 +359,8 @@ def _show(done: Results) -> None:
         _show_verdict(console, assessment, done.evaluation)
     if not report.has_contacts(done):
         console.print(report.outputs_table(done))
+    elif done.not_judged:
+        console.print(f"not judged: {done.not_judged}", style="yellow", markup=False, soft_wrap=True)
     elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
     for line in filter(None, (report.calibration_line(done), report.uplift_line(done))):
@@ -366,7 +373,11 @@ def _show(done: Results) -> None:
 
 def _show_verdict(console: Console, assessment: Assessment, settings: EvaluationSettings) -> None:
     """Print the verdict of a contact, and what makes it less than certain."""
-    console.print(report.verdict_table(assessment, settings.limits))
+    if assessment.withheld:
+        text = f"{assessment.contact.pantograph}: not judged: {assessment.withheld}"
+        console.print(text, style="yellow", markup=False, soft_wrap=True)
+    else:
+        console.print(report.verdict_table(assessment, settings.limits))
     if rows := report.filter_rows(assessment.quality, settings.filter):
         console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
         console.print(report.plain_table(report.FILTER_HEADS, rows))
@@ -448,10 +459,13 @@ def _pack(options: argparse.Namespace) -> int:
         _tell_warnings(scenario.system, _tell)
         archive = options.out or Path("dist") / f"{scenario.system.name}.ssp"
         if archive.is_dir():
-            raise UsageError(f"{archive} is a folder; choose another name with --out")
+            raise RequestError(f"{archive} is a folder; choose another name with --out")
+        root = scenario.package.root
         with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
             added = {RUNTIME: _runtime(Path(folder))} if options.standalone else {}
-            print(pack(scenario.package.root, archive, added))
+            print(pack(root, archive, added))
+        if names := left_out(root):
+            _tell(f"left out, for {SSD_NAME} does not name it: {', '.join(names)}")
     return 0
 
 
@@ -508,7 +522,7 @@ def _task(options: argparse.Namespace, system: System) -> Calibration:
     parameter = options.parameter or (known.parameter if known else None)
     mean = options.mean or (known.mean_force if known else None)
     if parameter is None or mean is None:
-        raise UsageError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
+        raise RequestError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
     tolerance = options.tolerance or (known.tolerance if known else 0.1)
     return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
 
@@ -517,7 +531,7 @@ def _start_value(system: System, parameter: str) -> float:
     index, variable = find_parameter(system.components, parameter)
     component = system.components[index]
     if variable.type != "Real":
-        raise UsageError(f"parameter '{parameter}' is not Real and cannot be calibrated")
+        raise RequestError(f"parameter '{parameter}' is not Real and cannot be calibrated")
     return float(component.parameters.get(variable.name, variable.start or 0.0))
 
 
@@ -538,7 +552,7 @@ def _trial(system: System, task: Calibration, value: float) -> float:
 def _place(package: Package, parameter: str) -> tuple[Path, str]:
     """Return the ``.ssv`` file that holds a parameter, and its name there."""
     if not package.writable:
-        raise UsageError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
+        raise RequestError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
     structure = read_structure(Sources(package.root), Reader(SSD_NAME))
     for c in structure.components:
         for binding in c.bindings:

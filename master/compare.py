@@ -44,7 +44,8 @@ def compare(a: Results, b: Results) -> tuple[Comparison, ...]:
     seconds = {s.quality.contact: s for s in b.assessments()}
     pairs = [(f, seconds[f.quality.contact]) for f in a.assessments() if f.quality.contact in seconds]
     if not pairs:
-        raise MasterError(f"{a.folder} and {b.folder} have no contact in common that has figures")
+        reasons = "".join(f"; {run.folder} is not judged: {run.not_judged}" for run in (a, b) if run.not_judged)
+        raise MasterError(f"{a.folder} and {b.folder} have no contact in common that has figures{reasons}")
     return tuple(Comparison(f, s, *_difference(a, b, f, s)) for f, s in pairs)
 
 

@@ -101,5 +101,12 @@ class ForeignResultsError(MasterError):
     """A results folder that no longer holds what the run has written into it."""
 
 
+class RequestError(MasterError):
+    """A command line that asks for what cannot be had: a name that is nowhere, a value out of range.
+
+    The command has failed (exit code 1), as it has for a scenario or a file that cannot be used.
+    """
+
+
 class UsageError(MasterError):
-    """A wrong command line."""
+    """A command line that was not understood: options that lack or exclude one another (exit code 2)."""

@@ -24,7 +24,7 @@ from master.checkpoint import NAME as CHECKPOINT
 from master.contacts import Contact
 from master.durable import PART, safe_cell, write_whole
 from master.energy import Balance, drift_events, find_balances
-from master.errors import MasterError, UsageError
+from master.errors import MasterError, RequestError
 from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, force_table
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits
@@ -112,21 +112,34 @@ class Results:
         """Largest uplift of every support in the whole run."""
         return support_uplifts(self.recordings, self.geometry)
 
+    @property
+    def not_judged(self) -> str:
+        """Why a run that is complete has no figures, empty if it has."""
+        return str(self.summary.get("not_judged", ""))
+
     def assessments(self) -> tuple[Assessment, ...]:
-        """Return figures and verdict of every contact that has samples in the interval."""
-        return self.assessments_in(self.interval)
+        """Return figures and verdict of every contact that has samples in the interval; none if it was not passed."""
+        return () if self.not_judged else self.assessments_in(self.interval)
 
     def assessments_in(self, interval: tuple[float | None, float | None]) -> tuple[Assessment, ...]:
         """Return figures and verdict of every contact that has samples in another interval [m]."""
         if interval not in self._assessed:
             chosen = replace(self.evaluation, interval=interval)
-            self._assessed[interval] = assess_contacts(self.recordings, self.contacts, self.geometry, chosen)
+            found = assess_contacts(self.recordings, self.contacts, self.geometry, chosen)
+            reason = self.verdict_withheld
+            self._assessed[interval] = tuple(a.without_verdict(reason) for a in found) if reason else found
         return self._assessed[interval]
 
     @cached_property
     def _assessed(self) -> dict[tuple[float | None, float | None], tuple[Assessment, ...]]:
         """What was assessed once, by interval: pages and tables ask again and again."""
         return {}
+
+    @property
+    def verdict_withheld(self) -> str:
+        """Why figures are given without a verdict, empty if they are given with one."""
+        beyond = [b.what for b in self.balances if b.exceeded is not None]
+        return f"the energy of {', '.join(beyond)} does not balance; try a smaller --step" if beyond else ""
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -199,7 +212,7 @@ def _alone_in(folder: Path, kind: str) -> Iterator[None]:
     try:
         with claim:
             yield
-    except UsageError:
+    except RequestError:
         if is_new:
             with suppress(OSError):  # there is something in it
                 folder.rmdir()
@@ -341,7 +354,8 @@ def _assessed(a: Assessment) -> dict[str, Any]:
         "spans": [asdict(s) for s in a.spans],
         "drift": a.drift,
         "criteria": [{**asdict(c), "verdict": c.word} for c in a.criteria],
-        "passed": a.passed,
+        "passed": None if a.withheld else a.passed,
+        "withheld": a.withheld,
     }
 
 

@@ -26,7 +26,8 @@ from master.checkpoint import (
     take,
 )
 from master.contacts import find_contacts
-from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RunError, UsageError
+from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
+from master.evaluation.interval_coverage import never_touched, shortfall
 from master.instance import Instance, Recordable
 from master.interface import PowerObserver
 from master.interruption import heeded_at_once, interruptible
@@ -40,6 +41,7 @@ from master.rounding import adjustments, is_recordable, record_of, steps_in
 from master.simulation import Observer, Outcome, TimeGrid, simulate
 from master.supervision import phase, unfinished
 from master.system import Component, System, Variable
+from master.track_watch import TrackWatch
 from master.watch import ContactWatch
 
 
@@ -116,7 +118,7 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
         If another process works in the folder.
     MasterError
         If the folder is not ours, or was removed or taken over meanwhile.
-    UsageError
+    RequestError
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
@@ -150,7 +152,9 @@ def _run(
 
 def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
     try:
-        done = session.conclude(outcome)
+        recordings = session.recordings(outcome)
+        outcome = session.checked(outcome, recordings[0])
+        done = session.conclude(outcome, recordings)
     except ForeignResultsError as error:
         session.disown(error)
         raise ForeignResultsError(f"{outcome.error}. {error}" if outcome.error else str(error)) from error
@@ -178,7 +182,7 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
         if continuation.is_same_run:
             known = results.identity(folder)
             if not known or known != continuation.checkpoint.run:
-                raise UsageError(f"{continuation.file} comes from another run than the results beside it")
+                raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
     results.prepare(folder, None if continuation is None else Path(continuation.file))
     return uuid.uuid4().hex
@@ -325,6 +329,7 @@ class _Session:
         self._geometry = GeometryObserver(system, lambda g: results.write_json(folder / results.GEOMETRY, g))
         self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
+        self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
         self._cautions = CautionObserver()
         self._remembering: tuple[Remembering, ...] = (self._power, self._contact_watch)
         self._stopwatch = Stopwatch()
@@ -352,6 +357,7 @@ class _Session:
             self._power,
             self._stopwatch,
             self._contact_watch,
+            self._track_watch,
             self._cautions,
         ]
 
@@ -366,16 +372,9 @@ class _Session:
             recorder.sync()  # no checkpoint is ahead of the rows that it goes on from
         return take(self._system, network, self.algorithm, index, self._remembering, self._identity)
 
-    def conclude(self, outcome: Outcome) -> Results:
-        """Write the summary and return the results, of what is in the files.
-
-        Raises
-        ------
-        ForeignResultsError
-            If the files are no longer those that this run wrote.
-        """
-        recordings = self._recordings(outcome)
-        description = _description(self._system, self._identity)
+    def conclude(self, outcome: Outcome, recordings: tuple[Recording, ...]) -> Results:
+        """Write the summary and return the results, of what is in the files."""
+        description = {**_description(self._system, self._identity), **self._not_judged(outcome, recordings[0])}
         done = Results(self._folder, description, recordings, self._geometry.geometry)
         summary = {
             **description,
@@ -399,8 +398,14 @@ class _Session:
             data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
             results.write_json(self._folder / results.SUMMARY, data)
 
-    def _recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
-        """Read what was recorded; refuses files that are not those that this run has written."""
+    def recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
+        """Read what was recorded.
+
+        Raises
+        ------
+        ForeignResultsError
+            If the files are no longer those that this run wrote.
+        """
         advice = "while the run went on; run it again, in a folder of its own (--out)"
         if not _is_still(self._folder, self._identity):
             raise ForeignResultsError(f"the results in {self._folder} were removed or taken by another run {advice}")
@@ -415,6 +420,32 @@ class _Session:
             if outcome.status == "complete" and not recorder.is_as_written:
                 raise ForeignResultsError(f"{recorder.path} is not what was written: it was changed {advice}")
         return recordings
+
+    def checked(self, outcome: Outcome, recording: Recording) -> Outcome:
+        """Return how the run ended once it is seen whether it has covered what it was to cover."""
+        reason = self._lacking(recording) if outcome.status == "complete" else ""
+        if not reason or self._may_lack:
+            return outcome
+        error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")
+        return replace(outcome, status="incomplete", error=error)
+
+    @property
+    def _may_lack(self) -> bool:
+        """Whether the user has asked for less than the interval of interest."""
+        continuation = self._manner.continuation
+        begins_anew = continuation is not None and not continuation.is_same_run
+        return self._system.may_stop_early or begins_anew
+
+    def _lacking(self, recording: Recording) -> str:
+        interval = self._system.settings.interval
+        if reason := shortfall(recording, self._contacts, (interval.start, interval.end)):
+            return reason
+        silent = never_touched(recording, self._contacts)
+        return f"'{silent}' never touches the wire" if silent else ""
+
+    def _not_judged(self, outcome: Outcome, recording: Recording) -> dict[str, str]:
+        reason = self._lacking(recording) if outcome.status == "complete" else ""
+        return {"not_judged": reason} if reason else {}
 
     def _performance(self, outcome: Outcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from master import energy, store
-from master.errors import Problem, ScenarioError, UsageError
+from master import energy, scenario_checks, store
+from master.errors import Problem, RequestError, ScenarioError
 from master.fmu_file import lacking_binary, read_fmu
 from master.pattern import matcher
 from master.ssp.annotation import DEFAULT_RECORDS, Record, RunSettings, Scheme
@@ -20,9 +20,10 @@ from master.ssp.elements import Component as SsdComponent
 from master.ssp.ssd import EMPTY, Structure, read_structure
 from master.ssp.ssm import NOTE
 from master.ssp.start_values import out_of_range, settable
+from master.ssp.units import COMMON, conversion, split_quantity
 from master.ssp.validation import Checker
 from master.ssp.xml import Reader
-from master.system import Component, Fmu, System, Variable
+from master.system import Component, Fmu, System, Variable, without
 
 DEFAULT_STEP = 1e-3
 #: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
@@ -44,7 +45,7 @@ class Overrides:
     scheme : str, optional
         Coupling scheme.
     parameters : dict
-        Values as text by ``component.parameter``, in the FMU's own units.
+        Values as text by ``component.parameter``, with a unit (``12 kN``) or in the FMU's own.
     energy : bool
         Whether every FMU that can is to keep its energy balance, and that is to be recorded.
     tolerance : float, optional
@@ -53,6 +54,12 @@ class Overrides:
         Whether a warning is a problem.
     outside : tuple of Path
         Folders outside the scenario whose files it may name.
+    absent : tuple of str
+        Components that take no part.
+    empty : tuple of str
+        Parameters, ``component.parameter``, of a table that has no value for them; a line's must have one.
+    may_stop_early : bool
+        Whether the stop time may lie before the end of the interval of interest.
     """
 
     stop: float | None = None
@@ -63,6 +70,9 @@ class Overrides:
     tolerance: float | None = None
     strict: bool = False
     outside: tuple[Path, ...] = ()
+    absent: tuple[str, ...] = ()
+    empty: tuple[str, ...] = ()
+    may_stop_early: bool = False
 
 
 @dataclass(frozen=True)
@@ -134,13 +144,38 @@ def load_system(
     problems = reader.problems or ([w for w in reader.warnings if w.rule != NOTE] if overrides.strict else [])
     if problems:
         raise ScenarioError(_sorted(problems))
-    components = _override(components, overrides.parameters)
+    components = with_values(components, overrides.parameters)
     if overrides.tolerance is not None:
         components = tuple(replace(c, tolerance=overrides.tolerance) for c in components)
     if overrides.energy:
         components, settings = _with_energy(components, settings)
     warnings = tuple(str(w) for w in _sorted(reader.warnings))
-    return System(package.name, components, connections, *times, settings, warnings)
+    system = System(package.name, components, connections, *times, settings, warnings, overrides.may_stop_early)
+    if text := scenario_checks.empty_cells(system, overrides.empty):
+        raise RequestError(text)
+    system = without(system, overrides.absent)
+    if overrides.stop is None and _goes_on_until_end(structure):
+        system = _until_end(system)
+    found = list(scenario_checks.problems(system, system.may_stop_early))
+    if found:
+        raise ScenarioError([Problem(SSD_NAME, 0, "interval", text) for text in found])
+    return system
+
+
+def _goes_on_until_end(structure: Structure) -> bool:
+    """Whether the end of the interval of interest ends the run, and not a stop time."""
+    interval = structure.annotations.settings.interval
+    if interval.until is None:
+        return structure.stop is None and interval.end is not None
+    return interval.until == "end"
+
+
+def _until_end(system: System) -> System:
+    stop = scenario_checks.stop_after_interval(system)
+    text = stop if isinstance(stop, str) else _step_problem(system.start, stop, system.step)
+    if text or isinstance(stop, str):
+        raise ScenarioError([Problem(SSD_NAME, 0, "stop", text)])
+    return replace(system, stop=stop)
 
 
 def _sorted(problems: Iterable[Problem]) -> list[Problem]:
@@ -196,8 +231,11 @@ def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) 
     start = structure.start
     stop = overrides.stop if overrides.stop is not None else structure.stop
     step = overrides.step if overrides.step is not None else structure.annotations.step or DEFAULT_STEP
+    if stop is None and _goes_on_until_end(structure):
+        return start, start + step, step  # until the system is known
     if stop is None:
-        problems.append(Problem(SSD_NAME, 0, "stop", "no stopTime in ssd:DefaultExperiment; give --stop"))
+        text = "no stopTime in ssd:DefaultExperiment, nor an end in Interval to go on until; give --stop"
+        problems.append(Problem(SSD_NAME, 0, "stop", text))
         stop = start + step
     if math.isnan(start) or math.isnan(stop):
         return 0.0, step, step  # told where it is written
@@ -269,11 +307,24 @@ def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterat
         yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components"
 
 
-def _override(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
+def with_values(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
+    """Return components with other parameter values.
+
+    Parameters
+    ----------
+    components : tuple of Component
+    values : mapping
+        Values as text, with a unit or in the FMU's own, by ``component.parameter``.
+
+    Raises
+    ------
+    RequestError
+        If there is no such parameter, or it cannot take the value.
+    """
     for full, text in values.items():
         index, variable = find_parameter(components, full)
-        parameters = {**components[index].parameters, variable.name: _typed(variable, full, text)}
-        changed = replace(components[index], parameters=parameters)
+        old = components[index]
+        changed = replace(old, parameters={**old.parameters, variable.name: _typed(old.fmu, variable, full, text)})
         components = (*components[:index], changed, *components[index + 1 :])
     return components
 
@@ -284,7 +335,7 @@ def _with_energy(
     """Make the components that can keep their energy balance do so, and record it."""
     able = [energy.MONITOR in c.fmu.variables for c in components]
     if not any(able):
-        raise UsageError(f"--energy: no FMU of the scenario has the parameter '{energy.MONITOR}'; build them anew")
+        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{energy.MONITOR}'; build them anew")
     watched = tuple(
         replace(c, parameters={**c.parameters, energy.MONITOR: 1}) if can else c
         for c, can in zip(components, able, strict=True)
@@ -298,7 +349,7 @@ def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, V
 
     Raises
     ------
-    UsageError
+    RequestError
         Naming the nearest parameters, if there is no such one.
     """
     for index, component in enumerate(components):
@@ -310,25 +361,51 @@ def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, V
     ]
     near = difflib.get_close_matches(full, settables, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
-    raise UsageError(f"there is no parameter '{full}' in the scenario{hint}")
+    raise RequestError(f"there is no parameter '{full}' in the scenario{hint}")
 
 
-def _typed(variable: Variable, full: str, text: str) -> float | int | bool | str:
+def _typed(fmu: Fmu, variable: Variable, full: str, text: str) -> float | int | bool | str:
     reason = settable(variable, variable.type if variable.type != "Enumeration" else "Integer")
     if reason:
-        raise UsageError(f"parameter '{full}' {reason}")
+        raise RequestError(f"parameter '{full}' {reason}")
     if variable.type == "String":
         return text
     if variable.type == "Boolean":
         if text.lower() not in ("true", "false", "1", "0"):
-            raise UsageError(f"parameter '{full}': '{text}' is neither true nor false")
+            raise RequestError(f"parameter '{full}': '{text}' is neither true nor false")
         return text.lower() in ("true", "1")
     items = dict(variable.items)
-    try:
-        number = items[text] if text in items else float(text) if variable.type == "Real" else int(text)
-    except ValueError:
-        raise UsageError(f"parameter '{full}': '{text}' is not a number") from None
+    number = items[text] if text in items else _number(fmu, variable, full, text)
     reason = out_of_range(variable, number)
     if reason:
-        raise UsageError(f"parameter '{full}' {reason}")
+        raise RequestError(f"parameter '{full}' {reason}")
     return number
+
+
+def _number(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
+    return _quantity(fmu, variable, full, text) if variable.type == "Real" else _whole(full, text)
+
+
+def _whole(full: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise RequestError(f"parameter '{full}': '{text}' is not a whole number") from None
+
+
+def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
+    """Return a number in the FMU's unit from a text with or without a unit of its own."""
+    number, unit = split_quantity(text)
+    if number is None:
+        example = f", or a number with its unit ('{variable.start or 1} {variable.unit}')" if variable.unit else ""
+        raise RequestError(f"parameter '{full}': '{text}' is not a number{example}")
+    if not unit or unit == variable.unit:
+        return number
+    known = {**fmu.units, **COMMON}
+    if unit not in known:
+        raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known (known: {', '.join(known)})")
+    found = conversion(known[unit], known[variable.unit]) if variable.unit in known else None
+    if found is None:
+        wanted = f"a unit of {variable.unit}" if variable.unit else "no unit: the FMU declares none"
+        raise RequestError(f"parameter '{full}' = {text}: give it in {wanted}")
+    return found(number)

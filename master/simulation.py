@@ -16,7 +16,7 @@ from master.interruption import heeded_at_once
 from master.network import Network
 from master.supervision import phase
 
-Status = Literal["complete", "interrupted", "failed"]
+Status = Literal["complete", "interrupted", "failed", "incomplete"]
 
 
 class Observer(Protocol):
@@ -63,7 +63,7 @@ class Outcome:
     Attributes
     ----------
     status : str
-        complete, interrupted or failed.
+        complete, interrupted, failed, or incomplete: it came to its end, and that is not enough to judge it.
     steps : int
         Completed macro steps.
     time : float
@@ -175,8 +175,11 @@ def check_finite(network: Network, time: float, last_good: FloatArray | None) ->
         Naming the variable, the time and its last good value.
     """
     found = _not_finite(network.output_names, network.outputs, last_good, time)
+    said = _remarks(network) if found else ""
+    if said and last_good is None:
+        raise RunError(f"the run cannot begin: {said}")
     if found:
-        raise RunError(f"{found}. {_remarks(network) or 'Try a smaller --step, and check the parameters'}")
+        raise RunError(f"{found}. {said or 'Try a smaller --step, and check the parameters'}")
 
 
 def check_inputs(network: Network, time: float, last_good: FloatArray | None) -> None:

@@ -25,8 +25,6 @@ _BUILD_SECONDS: Final = 600
 #: What an FMU of ours is known by; see docs/interoperability.md.
 _MARK: Final = "resources/openpanto.txt"
 _LONGEST_MARK: Final = 1 << 16
-#: Exit code of ``python -m fmus`` for a name it does not know.
-_UNKNOWN: Final = 2
 #: What a damaged, encrypted or exotically compressed archive raises.
 _UNREADABLE: Final = (
     OSError,
@@ -165,15 +163,13 @@ def fingerprint(name: str, pantographs: str = "") -> str | None:
         With the builder's own words, if it knows the name but cannot tell.
     """
     try:
-        answer = _fmus("fingerprint", *_ports(pantographs), "--", name, seconds=_ASK_SECONDS)
+        answer = _fmus("fingerprint", "--if-known", *_ports(pantographs), "--", name, seconds=_ASK_SECONDS)
     except subprocess.TimeoutExpired:
         return None
-    if answer.returncode == _UNKNOWN:
-        return None
-    lines = answer.stdout.split()
-    if answer.returncode != 0 or not lines:
+    if answer.returncode != 0:
         raise ValueError(f"cannot be built: {_last_line(answer)}")
-    return lines[-1]
+    lines = answer.stdout.split()
+    return lines[-1] if lines else None
 
 
 def stored_guid(path: Path) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
+from master.errors import RequestError
 from master.ssp.annotation import RunSettings
 from master.ssp.ssv import Value
 from master.ssp.units import Conversion, Unit
@@ -123,6 +125,8 @@ class System:
         Coupling, interval of interest, calibration, recording.
     warnings : tuple of str
         What in the scenario can be run but may not be meant.
+    may_stop_early : bool
+        Whether the stop time may lie before the end of the interval of interest: nothing is judged then.
     """
 
     name: str
@@ -133,6 +137,7 @@ class System:
     step: float
     settings: RunSettings
     warnings: tuple[str, ...] = ()
+    may_stop_early: bool = False
 
     @property
     def discrete(self) -> frozenset[str]:
@@ -149,3 +154,31 @@ class System:
     def step_count(self) -> int:
         """Number of macro steps: the last one ends at the stop time, or less than a step before it."""
         return max(1, math.floor((self.stop - self.start) / self.step + _ROUNDING))
+
+
+def without(system: System, names: Sequence[str]) -> System:
+    """Return a system without some components; what they were connected to keeps its start values.
+
+    Raises
+    ------
+    RequestError
+        If there is no such component.
+    """
+    for name in names:
+        if name not in {c.name for c in system.components}:
+            raise RequestError(f"the scenario has no component '{name}', which a column of the table names")
+    coupling = system.settings.coupling
+    order = tuple(name for name in coupling.order if name not in names)
+    settings = system.settings.model_copy(update={"coupling": coupling.model_copy(update={"order": order})})
+    connections = tuple(c for c in system.connections if c.source not in names and c.target not in names)
+    left = [c for c in system.components if c.name not in names]
+    exchanged = {(c.source, c.output) for c in connections} | {(c.target, c.input) for c in connections}
+    components = tuple(_trimmed(c, exchanged) for c in left)
+    return replace(system, components=components, connections=connections, settings=settings)
+
+
+def _trimmed(component: Component, exchanged: set[tuple[str, str]]) -> Component:
+    inputs, outputs = (
+        tuple(v for v in names if (component.name, v) in exchanged) for names in (component.inputs, component.outputs)
+    )
+    return replace(component, inputs=inputs, outputs=outputs)

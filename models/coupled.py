@@ -83,7 +83,7 @@ class CoupledModel:
             p.free_response(s, step, load) for p, s, load in zip(self.pantographs, self.states, loads, strict=True)
         ]
         motion = StripMotion(
-            np.array([self._strip(i, step, end, d) for i, d in enumerate(free)]),
+            np.array([self._strip(i, end, d[-1], self._speed(i, step, d)) for i, d in enumerate(free)]),
             np.array([p.compliance(step)[-1] for p in self.pantographs]),
         )
         result = self.line.step(self.line_state, step, motion)
@@ -92,6 +92,18 @@ class CoupledModel:
             model.advance(state, step, free[i] - force[i] * model.compliance(step))
         self.time = end
         return result.force, _points(result, motion.strip)
+
+    @property
+    def strips(self) -> FloatArray:
+        """Return the strips as they are, shape (P, 2, 2, 3): end A, B; position, velocity; x, y, z."""
+        states = enumerate(self.states)
+        return np.array([self._strip(i, self.time, s.displacement[-1], s.velocity[-1]) for i, s in states])
+
+    def contact_at_rest(self) -> tuple[FloatArray, FloatArray]:
+        """Return forces and points, as of `step`, of the strips with the line as it stands; nothing is advanced."""
+        strips = self.strips
+        result = self.line.contact_at_rest(self.line_state, strips)
+        return result.force, _points(result, strips)
 
     def run(
         self, stop: float, step: float, progress: Callable[[float], None] | None = None
@@ -111,12 +123,14 @@ class CoupledModel:
                 progress(n * step)
         return record
 
-    def _strip(self, i: int, step: float, time: float, displacement: FloatArray) -> FloatArray:
+    def _speed(self, i: int, step: float, displacement: FloatArray) -> float:
+        return float(self.pantographs[i].velocity_of(self.states[i], step, displacement)[-1])
+
+    def _strip(self, i: int, time: float, rise: float, vz: float) -> FloatArray:
         definition = self.pantographs[i].definition
         half = 0.5 * definition.strip_length
         x = definition.start_position + definition.speed * time
-        z = definition.reference_height + displacement[-1]
-        vz = self.pantographs[i].velocity_of(self.states[i], step, displacement)[-1]
+        z = definition.reference_height + rise
         ends = [[[x, definition.strip_offset + side, z], [definition.speed, 0.0, vz]] for side in (half, -half)]
         return np.array(ends)
 

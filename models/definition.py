@@ -54,6 +54,11 @@ def beyond_all(value: float) -> str:
     return ""
 
 
+def in_its_unit(unit: str) -> str:
+    """Return what to do about a value out of range: most such values are in another unit."""
+    return "" if unit == "1" else ": check its size and its unit"
+
+
 def one_line(text: str) -> str:
     """Return text on one line, without control characters, its middle left out if it is very long."""
     if len(text) > _LONGEST:
@@ -394,7 +399,8 @@ class Table:
             if positive and value < SMALLEST:
                 self.problem(name, f"{value:g} {unit} must be greater than 0")
             elif not minimum <= value <= maximum:
-                self.problem(name, f"{value:g} {unit} is outside {minimum:g} ... {maximum:g} {unit}")
+                text = f"{value:g} {unit} is outside {minimum:g} ... {maximum:g} {unit}"
+                self.problem(name, text + in_its_unit(unit))
 
     def _report_unknown(self) -> None:
         for name in self._data:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from models.definition import SMALLEST, Quantity, Table, beyond_all
+from models.definition import SMALLEST, Quantity, Table, beyond_all, in_its_unit
 from models.part import Parameter, ParameterError
 
 _META = "openpanto"
@@ -173,4 +173,5 @@ def _check(name: str, value: float, spec: _Spec) -> None:
     if not spec.minimum <= value <= spec.maximum:
         raise ParameterError(
             f"parameter '{name}': {value:g} {spec.unit} is outside {spec.minimum:g} ... {spec.maximum:g} {spec.unit}"
+            f"{in_its_unit(spec.unit)}"
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -72,6 +72,8 @@ class Assessment:
         Share of the interval's droppers that carry nothing for a moment as this pantograph passes.
     spans : tuple of SpanFigures
         Every whole span after the contact has settled.
+    withheld : str
+        Why there is no verdict; there are no criteria then. Empty if there is one.
     """
 
     contact: Contact
@@ -81,11 +83,16 @@ class Assessment:
     supports: int = 0
     slack: float | None = None
     spans: tuple[SpanFigures, ...] = ()
+    withheld: str = ""
 
     @property
     def passed(self) -> bool:
-        """Whether every limit is kept."""
-        return all(c.passed for c in self.criteria)
+        """Whether every limit is kept, and nothing speaks against saying so."""
+        return not self.withheld and all(c.passed for c in self.criteria)
+
+    def without_verdict(self, reason: str) -> Assessment:
+        """Return the figures without a verdict, and why."""
+        return replace(self, criteria=(), withheld=reason)
 
     @property
     def drift(self) -> str:

@@ -90,6 +90,11 @@ def chart(found: Chart) -> str:
     return f"<figure><figcaption><h3>{text(found.title)}</h3>{note}</figcaption>{place}</figure>"
 
 
+def no_badge(title: str) -> str:
+    """Return what stands in the place of a verdict where there is none."""
+    return f"<span class='badge'>{text(title)} not judged</span>"
+
+
 def mark(criterion: Criterion) -> str:
     """Return a verdict in words and a sign, not in colour alone."""
     kind, sign = ("pass", "\u2713") if criterion.passed else ("fail", "\u2717")
@@ -106,7 +111,7 @@ def verdict(assessment: Assessment, name: str, limits: LimitChoice, complete: bo
     """Return the first screen of one contact: verdict and headline figures."""
     q = assessment.quality
     where = f"{q.start:.1f} m to {q.end:.1f} m at {3.6 * q.speed:.1f} km/h"
-    word = badge(assessment.passed, limits.title, complete)
+    word = no_badge(limits.title) if assessment.withheld else badge(assessment.passed, limits.title, complete)
     aside = f"<span class='note'>{where}</span>{_broken(assessment)}"
     head = f"<div class='verdict'><b>{text(name)}</b> {word} {aside}</div>"
     tiles = "".join(
@@ -120,6 +125,8 @@ def verdict(assessment: Assessment, name: str, limits: LimitChoice, complete: bo
 
 
 def _broken(assessment: Assessment) -> str:
+    if assessment.withheld:
+        return f" <span class='warning'>no verdict: {text(assessment.withheld)}</span>"
     names = ", ".join(c.name for c in assessment.criteria if not c.passed)
     return f" <span class='fail'>not kept: {text(names)}</span>" if names else ""
 
@@ -132,6 +139,8 @@ def _sign(passed: bool | None) -> str:
 
 def criteria(assessment: Assessment) -> str:
     """Return the verdict row by row."""
+    if assessment.withheld:
+        return f"<p class='warning'>No verdict: {text(assessment.withheld)}.</p>"
     rows = "".join(
         f"<tr><td>{text(c.name)}<div class='note'>{text(c.source)}; {text(c.origin)}</div>{_remark(c)}</td>"
         f"<td class='n'>{text(c.value)}</td><td class='n'>{signs(c.limit)}</td><td>{mark(c)}</td></tr>"

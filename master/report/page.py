@@ -82,7 +82,9 @@ def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool 
     parts = [f"<section id='{key}'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
     parts.append(_cautions(summary))
     parts += [markup.verdict(a, a.contact.pantograph, limits, complete) for a in assessments]
-    if not assessments and is_coupling:
+    if reason := summary.get("not_judged", ""):
+        parts.append(f"<p class='warning'><b>Not judged.</b> There are no figures: {markup.text(reason)}.</p>")
+    elif not assessments and is_coupling:
         parts.append("<p class='warning'>No contact-quality figures: no contact force in the interval of interest.</p>")
     return "".join([*parts, "</section>"])
 

@@ -97,23 +97,31 @@ def headlines(assessment: Assessment, limits: LimitChoice) -> tuple[Headline, ..
     at, kept = limits_at(abs(q.speed), limits), {c.name: c for c in assessment.criteria}
     share = at.sigma_share.value
     found = [
-        _of_criterion("Fm", kept["mean force"]),
+        _headline("Fm", f"{q.mean:.1f}", "N", kept.get("mean force")),
         Headline(
-            "\u03c3", f"{q.sigma:.1f}", "N", f"< {share * q.mean:.1f} ({share:g} Fm)", kept["sigma / mean"].passed
+            "\u03c3", f"{q.sigma:.1f}", "N", f"< {share * q.mean:.1f} ({share:g} Fm)", _kept(kept.get("sigma / mean"))
         ),
-        _of_criterion("Fmax", kept["maximum force"]),
+        _headline("Fmax", f"{q.maximum:.1f}", "N", kept.get("maximum force")),
         Headline("Fmin", f"{q.minimum:.1f}", "N", f"Fm - 3\u03c3 = {q.statistical_minimum:.1f}"),
     ]
-    if (uplift := kept.get("uplift at supports")) is not None:
-        found.append(_of_criterion("uplift", uplift))
-    lost = f"{q.losses.percentage:.2f}"
-    found.append(Headline("loss", lost, "%", f"NQ {kept['NQ (estimate)'].limit}", kept["NQ (estimate)"].passed))
+    if assessment.uplift is not None:
+        value = f"{1e3 * assessment.uplift.maximum:.1f}"
+        found.append(_headline("uplift", value, "mm", kept.get("uplift at supports")))
+    nq = kept.get("NQ (estimate)")
+    limit = "" if nq is None else f"NQ {nq.limit}"
+    found.append(Headline("loss", f"{q.losses.percentage:.2f}", "%", limit, _kept(nq)))
     return tuple(found)
 
 
-def _of_criterion(name: str, criterion: Criterion) -> Headline:
-    value, _, unit = criterion.value.partition(" ")
-    return Headline(name, value, unit, criterion.limit.removesuffix(f" {unit}"), criterion.passed)
+def _kept(criterion: Criterion | None) -> bool | None:
+    """Return whether a limit is kept, None where there is no verdict."""
+    return None if criterion is None else criterion.passed
+
+
+def _headline(name: str, value: str, unit: str, criterion: Criterion | None) -> Headline:
+    """Return a figure with the limit that it is held to, if it is judged."""
+    limit = "" if criterion is None else criterion.limit.removesuffix(f" {unit}")
+    return Headline(name, value, unit, limit, _kept(criterion))
 
 
 def verdict_table(assessment: Assessment, limits: LimitChoice) -> Table:

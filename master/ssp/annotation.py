@@ -5,7 +5,7 @@ The annotation stands in the ``ssd:Annotations`` of the system structure descrip
     <ssc:Annotation type="urn:openpanto:ssp">
       <panto:Run xmlns:panto="urn:openpanto:ssp">
         <panto:Coupling scheme="jacobi"/>
-        <panto:Interval start="551" end="798"/>
+        <panto:Interval start="551" end="798" until="end"/>
         <panto:Filter kind="butterworth" order="6" cutoff="20" phase="zero"/>
         <panto:Limits supply="AC" maximum="300"/>
         <panto:Calibration parameter="pantograph.static_force" meanForce="157.5" tolerance="0.1"/>
@@ -74,10 +74,15 @@ class Coupling(_Settings):
 
 
 class Interval(_Settings):
-    """Interval of interest along the track [m]; from where the contact has settled and to the end, if not told."""
+    """Interval of interest along the track [m]; from where the contact has settled and to the end, if not told.
+
+    ``until="end"`` lets the run go on until the last pantograph has left the interval, whatever stop time the scenario
+    has for other tools; ``until="stop"`` until the stop time. Not given, it is the stop time if there is one.
+    """
 
     start: float | None = None
     end: float | None = None
+    until: Literal["stop", "end"] | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> Interval:
@@ -182,7 +187,7 @@ _SECTIONS: Final[dict[str, type[_Settings]]] = {
     "Record": Record,
 }
 _LISTS: Final = ("order", "variables")
-_TEXTS: Final = (*_LISTS, "scheme", "parameter", "kind", "phase", "supply")
+_TEXTS: Final = (*_LISTS, "scheme", "parameter", "kind", "phase", "supply", "until")
 #: What an ``osp:Algorithm`` may hold.
 _ALGORITHMS: Final = ("FixedStepAlgorithm", "VariableStepAlgorithm")
 

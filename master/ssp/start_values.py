@@ -215,7 +215,14 @@ def out_of_range(variable: Variable, value: float) -> str:
     if variable.items and value not in dict(variable.items).values():
         return f"= {value:g} is no item of its type ({listed(dict(variable.items))})"
     if variable.minimum is not None and value < variable.minimum:
-        return f"= {value:g} {variable.unit} is below its minimum {variable.minimum:g}"
+        return f"= {value:g} {variable.unit} is below its minimum {variable.minimum:g}{_hint(variable)}"
     if variable.maximum is not None and value > variable.maximum:
-        return f"= {value:g} {variable.unit} is above its maximum {variable.maximum:g}"
+        return f"= {value:g} {variable.unit} is above its maximum {variable.maximum:g}{_hint(variable)}"
     return ""
+
+
+def _hint(variable: Variable) -> str:
+    """Return what to do about a value out of range: most such values are in another unit."""
+    if not variable.unit or variable.unit == "1":
+        return "; give one between them"
+    return f"; a value without a unit is in {variable.unit}: check its size, or write its unit"

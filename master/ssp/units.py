@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -64,6 +65,11 @@ COMMON: Final = {
         _unit("mm", 1e-3, m=1),
         _unit("cm", 1e-2, m=1),
         _unit("km", 1e3, m=1),
+        _unit("m2", m=2),
+        _unit("cm2", 1e-4, m=2),
+        _unit("mm2", 1e-6, m=2),
+        _unit("m4", m=4),
+        _unit("mm4", 1e-12, m=4),
         _unit("s", s=1),
         _unit("ms", 1e-3, s=1),
         _unit("Hz", s=-1),
@@ -82,6 +88,11 @@ COMMON: Final = {
         _unit("kN/m", 1e3, kg=1, s=-2),
         _unit("N/mm", 1e3, kg=1, s=-2),
         _unit("N.s/m", kg=1, s=-1),
+        _unit("N.m2", kg=1, m=3, s=-2),
+        _unit("Pa", kg=1, m=-1, s=-2),
+        _unit("MPa", 1e6, kg=1, m=-1, s=-2),
+        _unit("GPa", 1e9, kg=1, m=-1, s=-2),
+        _unit("kg.m2", kg=1, m=2),
         _unit("W", kg=1, m=2, s=-3),
         _unit("J", kg=1, m=2, s=-2),
         _unit("rad", rad=1),
@@ -91,6 +102,26 @@ COMMON: Final = {
         _unit("degC", 1.0, 273.15, K=1),
     )
 }
+
+
+#: A number, as Python writes it, and a unit or none.
+_QUANTITY: Final = re.compile(
+    r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf))\s*(\S*)\s*", re.ASCII | re.IGNORECASE
+)
+
+
+def split_quantity(text: str) -> tuple[float | None, str]:
+    """Return the number in a text such as ``12 kN``, None if there is none, and its unit, empty if it has none.
+
+    Examples
+    --------
+    >>> split_quantity("12 kN"), split_quantity("-.5"), split_quantity("300km/h")
+    ((12.0, 'kN'), (-0.5, ''), (300.0, 'km/h'))
+    >>> split_quantity("much")
+    (None, '')
+    """
+    match = _QUANTITY.fullmatch(text)
+    return (None, "") if match is None else (float(match[1]), match[2])
 
 
 def parse_units(node: Any | None, reader: Reader) -> dict[str, Unit]:

@@ -1,7 +1,8 @@
 """A family as it lies in its scenario's folder: ``study.toml`` says what is reported, ``variants.csv`` what is varied.
 
 The table has a row for each variant. Its columns are ``component.parameter``, in the FMU's units, and the columns of
-the run itself (``stop``, ``step``). A component that has columns, but no value in a row, takes no part in that variant.
+the run itself (``stop``, ``step``). A value may have a unit (``12 kN``). A component that has columns, but no value in
+a row, takes no part in that variant; the line's cells must all have one.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from master.errors import MasterError, Problem, ScenarioError, UsageError
+from master.errors import MasterError, Problem, RequestError, ScenarioError
 from master.results import write_text
 
 STUDY: Final = "study.toml"
@@ -88,6 +89,8 @@ class Variant(_Model):
         Text by ``component.parameter``.
     absent : tuple of str
         Components that take no part.
+    empty : tuple of str
+        Columns without a value.
     stop, step : float, optional
         Of the run [s].
     """
@@ -95,6 +98,7 @@ class Variant(_Model):
     name: str = Field(min_length=1)
     values: dict[str, str]
     absent: tuple[str, ...] = ()
+    empty: tuple[str, ...] = ()
     stop: float | None = Field(None, gt=0)
     step: float | None = Field(None, gt=0)
 
@@ -112,13 +116,13 @@ class Family(_Model):
 
         Raises
         ------
-        UsageError
+        RequestError
             If there is none of a name.
         """
         known = [v.name for v in self.variants]
         for name in names:
             if name not in known:
-                raise UsageError(f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}")
+                raise RequestError(f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}")
         return tuple(v for v in self.variants if v.name in names or not names)
 
 
@@ -132,7 +136,7 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
 
     Raises
     ------
-    UsageError
+    RequestError
         If there is none.
     ScenarioError
         With the mistakes in its files.
@@ -140,7 +144,7 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
     folder = Path(name) if (Path(name) / STUDY).is_file() else root / f"{name}.ssp"
     if not (folder / STUDY).is_file():
         known = ", ".join(family_names(root)) or "none"
-        raise UsageError(f"there is no study '{name}'; known: {known} (or give a scenario's folder with a {STUDY})")
+        raise RequestError(f"there is no study '{name}'; known: {known} (or give a scenario's folder with a {STUDY})")
     settings = _read_settings(folder / STUDY)
     variants = _read_variants(folder / VARIANTS)
     _check_names(folder / STUDY, settings, variants)
@@ -245,7 +249,8 @@ def _read_row(
     values = {h: c for h, c in cells.items() if "." in h and c}
     data: dict[str, Any] = {h: cells[h] for h in _RUN if cells.get(h)}
     try:
-        return [Variant(name=cells[_NAME], values=values, absent=_absent(heads, values), **data)]
+        empty = tuple(h for h, c in cells.items() if "." in h and not c)
+        return [Variant(name=cells[_NAME], values=values, absent=_absent(heads, values), empty=empty, **data)]
     except ValidationError as error:
         problems += _problems(path, line, error)
         return []

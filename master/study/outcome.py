@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from master.durable import safe_cell
 from master.results import Results
-from master.study.family import Family, Interval
+from master.study.family import Family, Interval, Variant
 from master.study.figures import Entry, entries
 
 GENERATOR: Final = "openpanto study"
@@ -82,6 +82,8 @@ def shown(value: float | None, decimals: int) -> str:
 
 def verdict(entry: Entry) -> str:
     """Return the verdict on the limits in a few words."""
+    if entry.assessment.withheld:
+        return "not judged"
     criteria = entry.assessment.criteria
     failed = [c.name for c in criteria if not c.passed]
     if failed:
@@ -115,16 +117,19 @@ def filter_remarks(found: Sequence[Entry]) -> list[str]:
 def differences(found: Sequence[Entry]) -> list[tuple[str, str, str, tuple[float, float, float]]]:
     """Return what stands beside what: sigma, maximum and minimum of one less those of the other [N].
 
-    Every follower is compared with the pantograph ahead, and everyone with a variant of a single pantograph of the
-    same name ending (``single, low damping`` for ``31 m, low damping``), if there is one.
+    Every follower is compared with the pantograph ahead, and everyone of several with a variant of a single pantograph
+    of the same name ending (``single, low damping`` for ``31 m, low damping``), if there is just one. Variants of one
+    pantograph each differ in what was swept: what another one of them has less or more means nothing here.
     """
-    singles = {_kind(e.variant): e for e in found if _is_single(e, found)}
+    alone = [e for e in found if _is_single(e, found)]
+    kinds = [_kind(e.variant) for e in alone]
+    singles = {_kind(e.variant): e for e in alone if kinds.count(_kind(e.variant)) == 1}
     rows = []
     for variant in dict.fromkeys(e.variant for e in found):
         own = [e for e in found if e.variant == variant]
         rows += [_beside(b, a, a.pantograph) for a, b in pairwise(own)]
-        single = singles.get(_kind(variant))
-        rows += [_beside(e, single, single.variant) for e in own if single is not None and single is not e]
+        single = singles.get(_kind(variant)) if len(own) > 1 else None
+        rows += [_beside(e, single, single.variant) for e in own if single is not None]
     return rows
 
 
@@ -148,15 +153,33 @@ def as_csv(outcome: Outcome) -> str:
     writer = csv.writer(text, lineterminator="\n")
     heads = [f"{title} [{unit}]" for title, unit, _, _ in FIGURES]
     sharing = ["both wires from [m]", "both wires to [m]", "both wires [s]", "least total force [N]", "losses per wire"]
-    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", "filter", *sharing])
-    told = {d.name: d.results.evaluation.filter.short for d in outcome.done}
+    swept = _swept(outcome.family.variants)
+    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", "filter", *sharing, *swept])
+    filtered = {d.name: d.results.evaluation.filter.short for d in outcome.done}
     for interval in outcome.family.settings.interval:
         for e in outcome.entries(interval):
             values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
             named = map(safe_cell, (e.variant, interval.name, e.pantograph))
-            cells = [*values, verdict(e), told[e.variant], *_sharing_cells(e)]
+            told = _values_of(outcome.family, e.variant)
+            own = [told.get(name, "") for name in swept]
+            cells = [*values, verdict(e), filtered[e.variant], *_sharing_cells(e), *own]
             writer.writerow([*named, *cells])
     return text.getvalue()
+
+
+def _swept(variants: Sequence[Variant]) -> list[str]:
+    """Return the columns of the table of variants that hold a value somewhere, in their order."""
+    return list(dict.fromkeys(name for v in variants for name in _told(v)))
+
+
+def _values_of(family: Family, name: str) -> dict[str, str]:
+    """Return what a variant was given, as its table has it."""
+    return next((_told(v) for v in family.variants if v.name == name), {})
+
+
+def _told(variant: Variant) -> dict[str, str]:
+    times = {"stop": variant.stop, "step": variant.step}
+    return {**variant.values, **{name: f"{value:g}" for name, value in times.items() if value is not None}}
 
 
 def _sharing_cells(e: Entry) -> list[str]:
@@ -179,7 +202,10 @@ def as_data(outcome: Outcome) -> dict[str, Any]:
         "status": outcome.status,
         "date": outcome.date,
         "versions": dict(outcome.versions),
-        "variants": [{"name": d.name, "folder": d.results.folder.name} for d in outcome.done],
+        "variants": [
+            {"name": d.name, "folder": d.results.folder.name, "values": _values_of(outcome.family, d.name)}
+            for d in outcome.done
+        ],
         "failures": dict(outcome.failures),
         "figures": [_entry_data(e) for i in outcome.family.settings.interval for e in outcome.entries(i)],
     }

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Final
 
 from master import results
-from master.errors import InterruptedRunError, MasterError
-from master.study.family import Family, Variant, folder_name
+from master.errors import InterruptedRunError, MasterError, Problem, RequestError, ScenarioError
+from master.study.family import VARIANTS, Family, Variant, folder_name
 from master.study.outcome import GENERATOR, Done, Outcome, as_csv, as_data
 from master.study.page import page
 from master.study.variants import Runner, finished
@@ -52,9 +52,12 @@ def study(
     ------
     InterruptedRunError, KeyboardInterrupt
         If the user stops it; the finished variants are in the page then.
+    ScenarioError
+        If a variant cannot be run as it is written; nothing was run then.
     MasterError
         If the folder holds something else.
     """
+    check(family, chosen, runner)
     with results.taken_over(folder, JSON, GENERATOR, "study"), unfinished(folder / JSON):
         return _study(family, chosen, folder, runner, again, show)
 
@@ -76,6 +79,22 @@ def _study(
     state = replace(state, status="complete")
     write(state, folder)
     return state
+
+
+def check(family: Family, chosen: Sequence[Variant], runner: Runner) -> None:
+    """Open every variant that is to be run, and close it again; raises `ScenarioError` with all that is wrong."""
+    problems: list[Problem] = []
+    for variant in chosen:
+        try:
+            with runner.opened(family, variant):
+                pass
+        except ScenarioError as error:
+            found = (Problem(VARIANTS, 0, p.rule, f"variant '{variant.name}': {p}") for p in error.problems)
+            problems += found
+        except RequestError as error:
+            problems.append(Problem(VARIANTS, 0, "variants", f"variant '{variant.name}': {error}"))
+    if problems:
+        raise ScenarioError(problems)
 
 
 def write(state: Outcome, folder: Path) -> None:

@@ -13,14 +13,14 @@ from typing import Any
 from master import results
 from master.calibrate import Found, find_values
 from master.caution import CautionObserver
-from master.errors import MasterError, UsageError
+from master.errors import MasterError, RequestError
 from master.results import Results
 from master.rounding import adjustments
 from master.run import run
 from master.scenario import Overrides, find_parameter, open_scenario
 from master.simulation import Observer
 from master.study.family import Calibration, Family, Interval, Variant
-from master.system import Component, System
+from master.system import System
 
 #: Makes the observers of one run, and takes them away after it.
 Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
@@ -64,41 +64,13 @@ class Runner:
 
         Raises
         ------
-        ScenarioError, UsageError
+        ScenarioError, RequestError
             If scenario and table do not go together.
         """
-        overrides = Overrides(stop=variant.stop, step=variant.step, parameters=variant.values)
+        v = variant
+        overrides = Overrides(v.stop, v.step, parameters=v.values, absent=v.absent, empty=v.empty)
         with open_scenario(family.folder, overrides, self.tell, self.build) as scenario:
-            system = without(scenario.system, variant.absent)
-            yield replace(system, name=f"{family.name}: {variant.name}")
-
-
-def without(system: System, names: Sequence[str]) -> System:
-    """Return a system without some components; what they were connected to keeps its start values.
-
-    Raises
-    ------
-    UsageError
-        If there is no such component.
-    """
-    for name in names:
-        if name not in {c.name for c in system.components}:
-            raise UsageError(f"the scenario has no component '{name}', which a column of the table names")
-    coupling = system.settings.coupling
-    order = tuple(name for name in coupling.order if name not in names)
-    settings = system.settings.model_copy(update={"coupling": coupling.model_copy(update={"order": order})})
-    connections = tuple(c for c in system.connections if c.source not in names and c.target not in names)
-    left = [c for c in system.components if c.name not in names]
-    exchanged = {(c.source, c.output) for c in connections} | {(c.target, c.input) for c in connections}
-    components = tuple(_trimmed(c, exchanged) for c in left)
-    return replace(system, components=components, connections=connections, settings=settings)
-
-
-def _trimmed(component: Component, exchanged: set[tuple[str, str]]) -> Component:
-    inputs, outputs = (
-        tuple(v for v in names if (component.name, v) in exchanged) for names in (component.inputs, component.outputs)
-    )
-    return replace(component, inputs=inputs, outputs=outputs)
+            yield replace(scenario.system, name=f"{family.name}: {variant.name}")
 
 
 def finished(folder: Path, system: System) -> Results | None:
@@ -128,7 +100,7 @@ def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[
     """
     wanted = family.settings.calibration
     if wanted is None:
-        raise UsageError(f"study '{family.name}' has no [calibration]")
+        raise RequestError(f"study '{family.name}' has no [calibration]")
     interval = next(i for i in family.settings.interval if i.name == wanted.interval)
     with runner.opened(family, variant) as system:
         names = _calibrated(system, wanted)

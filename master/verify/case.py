@@ -12,7 +12,7 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from master.errors import Problem, ScenarioError, UsageError
+from master.errors import Problem, RequestError, ScenarioError
 from master.verify.quantities import QUANTITIES, Choice
 
 #: The cases that ship with the package, and the scenarios they name.
@@ -235,7 +235,7 @@ def find_cases(names: Iterable[str]) -> tuple[Path, ...]:
 
     Raises
     ------
-    UsageError
+    RequestError
         Naming the nearest case, if there is none of a name.
     """
     known = {path.stem: path for path in sorted(CASES.glob("*.toml"))}
@@ -248,7 +248,7 @@ def _find(name: str, known: dict[str, Path]) -> Path:
     path = Path(name)
     if path.suffix == ".toml" and path.is_file():
         return path
-    raise UsageError(f"there is no case '{name}'{_hint(name, known)} (--list names them all)")
+    raise RequestError(f"there is no case '{name}'{_hint(name, known)} (--list names them all)")
 
 
 def load_cases(paths: Iterable[Path]) -> tuple[Case, ...]:

@@ -37,7 +37,7 @@ def content_key(system: System) -> str:
 
 def first_instant(system: System) -> System:
     """Return the system with a run of a single step: enough for static figures."""
-    return replace(system, stop=system.start + system.step)
+    return replace(system, stop=system.start + system.step, may_stop_early=True)
 
 
 class _Wanted(NamedTuple):

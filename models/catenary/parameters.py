@@ -37,14 +37,15 @@ MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 class Wire:
     """A tensioned wire of round section.
 
-    The limits here and below are not those of good design: beyond them a value was written in another unit.
+    The limits here and below are those of the things themselves, not of good design: beyond them a value was written
+    in another unit, or for another thing.
     """
 
-    area: float = quantity("m2", "cross-section", positive=True, minimum=1e-8, maximum=0.1)
-    mass: float = quantity("kg/m", "mass per length", positive=True, minimum=1e-4, maximum=1e3)
-    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e6, maximum=1e14)
-    tension: float = quantity("N", "tension", positive=True, minimum=1.0, maximum=1e8)
-    bending_stiffness: float | None = quantity("N.m2", "bending stiffness EI", default=None, minimum=0.0, maximum=1e9)
+    area: float = quantity("m2", "cross-section", positive=True, minimum=1e-6, maximum=1e-2)
+    mass: float = quantity("kg/m", "mass per length", positive=True, minimum=0.01, maximum=20.0)
+    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e7, maximum=1e12)
+    tension: float = quantity("N", "tension", positive=True, minimum=500.0, maximum=1e5)
+    bending_stiffness: float | None = quantity("N.m2", "bending stiffness EI", default=None, minimum=0.0, maximum=1e5)
 
     @property
     def EI(self) -> float:
@@ -58,7 +59,9 @@ class Wire:
 class StitchWire(Wire):
     """A wire hung from the messenger wire on both sides of a support."""
 
-    length: float = quantity("m", "length, centred on the support", default=18.0, positive=True, tunable=False)
+    length: float = quantity(
+        "m", "length, centred on the support", default=18.0, minimum=1.0, maximum=100.0, tunable=False
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,11 +74,11 @@ class Dropper:
     """
 
     stiffness: float | None = quantity(
-        "N/m", "axial stiffness (instead of EA/L)", default=None, minimum=1.0, maximum=1e12
+        "N/m", "axial stiffness (instead of EA/L)", default=None, minimum=100.0, maximum=1e10
     )
-    area: float | None = quantity("m2", "cross-section", default=None, minimum=1e-9, maximum=0.1)
-    youngs_modulus: float | None = quantity("Pa", "Young's modulus", default=None, minimum=1.0, maximum=1e14)
-    mass: float = quantity("kg/m", "mass per length", minimum=0.0, maximum=1e3)
+    area: float | None = quantity("m2", "cross-section", default=None, minimum=1e-7, maximum=1e-2)
+    youngs_modulus: float | None = quantity("Pa", "Young's modulus", default=None, minimum=1e6, maximum=1e12)
+    mass: float = quantity("kg/m", "mass per length", minimum=0.0, maximum=20.0)
     compression_ratio: float = quantity(
         "1", "stiffness in compression over that in tension", default=0.0, minimum=0.0, maximum=1.0
     )
@@ -86,10 +89,10 @@ class Dropper:
 class SteadyArm:
     """A steady arm: pinned at its registration end, clamped to the contact wire."""
 
-    area: float = quantity("m2", "cross-section", positive=True, minimum=1e-8, maximum=0.1)
-    mass: float = quantity("kg/m", "mass per length", minimum=0.0, maximum=1e3)
-    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e6, maximum=1e14)
-    length: float = quantity("m", "length", positive=True, minimum=0.05, maximum=20.0)
+    area: float = quantity("m2", "cross-section", positive=True, minimum=1e-6, maximum=1e-1)
+    mass: float = quantity("kg/m", "mass per length", minimum=0.0, maximum=50.0)
+    youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e9, maximum=1e12)
+    length: float = quantity("m", "length", positive=True, minimum=0.1, maximum=10.0)
     angle: float = quantity(
         "rad", "angle to the horizontal, from the registration end; negative: falls towards the wire",
         minimum=-1.2, maximum=1.2,
@@ -100,26 +103,28 @@ class SteadyArm:
 class Clamps:
     """Lumped masses on the wires."""
 
-    dropper_upper: float = quantity("kg", "claw of a dropper on the wire above", default=0.0, minimum=0.0, maximum=1e3)
-    dropper_lower: float = quantity("kg", "claw of a dropper on the wire below", default=0.0, minimum=0.0, maximum=1e3)
-    steady_arm: float = quantity("kg", "clamp of a steady arm", default=0.0, minimum=0.0, maximum=1e3)
-    stitch_wire: float = quantity("kg", "clamp of a stitch wire on the messenger wire", default=0.0, minimum=0.0)
+    dropper_upper: float = quantity("kg", "claw of a dropper on the wire above", default=0.0, minimum=0.0, maximum=50.0)
+    dropper_lower: float = quantity("kg", "claw of a dropper on the wire below", default=0.0, minimum=0.0, maximum=50.0)
+    steady_arm: float = quantity("kg", "clamp of a steady arm", default=0.0, minimum=0.0, maximum=50.0)
+    stitch_wire: float = quantity(
+        "kg", "clamp of a stitch wire on the messenger wire", default=0.0, minimum=0.0, maximum=50.0
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class MessengerSupport:
     """Vertical spring-damper under the messenger wire at a support; rigid roller without it."""
 
-    stiffness: float = quantity("N/m", "vertical stiffness of a support", positive=True)
-    damping: float = quantity("N.s/m", "vertical damping of a support", default=0.0, minimum=0.0)
+    stiffness: float = quantity("N/m", "vertical stiffness of a support", minimum=1e3, maximum=1e10)
+    damping: float = quantity("N.s/m", "vertical damping of a support", default=0.0, minimum=0.0, maximum=1e6)
 
 
 @dataclass(frozen=True)
 class Rayleigh:
     """Damping C = alpha K + beta M of a component."""
 
-    alpha: float = quantity("s", "damping: factor of the stiffness matrix", minimum=0.0)
-    beta: float = quantity("1/s", "damping: factor of the mass matrix", minimum=0.0)
+    alpha: float = quantity("s", "damping: factor of the stiffness matrix", minimum=0.0, maximum=10.0)
+    beta: float = quantity("1/s", "damping: factor of the mass matrix", minimum=0.0, maximum=100.0)
 
 
 #: Component types, each with its own stiffness, mass and damping.
@@ -130,8 +135,8 @@ COMPONENTS = ("contact_wire", "messenger_wire", "stitch_wire", "auxiliary_wire",
 class Damping:
     """Damping C = alpha K + beta M, of the whole line or of a component type where it has its own."""
 
-    alpha: float = quantity("s", "damping: factor of the stiffness matrix", minimum=0.0)
-    beta: float = quantity("1/s", "damping: factor of the mass matrix", minimum=0.0)
+    alpha: float = quantity("s", "damping: factor of the stiffness matrix", minimum=0.0, maximum=10.0)
+    beta: float = quantity("1/s", "damping: factor of the mass matrix", minimum=0.0, maximum=100.0)
     contact_wire: Rayleigh | None = None
     messenger_wire: Rayleigh | None = None
     stitch_wire: Rayleigh | None = None
@@ -150,11 +155,13 @@ class Contact:
     """Contact of collector strip and contact wire; ``law`` is one of ``CONTACT_LAWS``."""
 
     law: str = "continuous"
-    stiffness: float = quantity("N/m", "contact stiffness (N/m^n for an exponent n)", default=20000.0, positive=True)
+    stiffness: float = quantity(
+        "N/m", "contact stiffness (N/m^n for an exponent n)", default=20000.0, minimum=100.0, maximum=1e10
+    )
     exponent: float = quantity("1", "exponent n of the penetration", default=1.0, minimum=1.0, maximum=3.0)
     restitution: float = quantity("1", "coefficient of restitution", default=1.0, minimum=0.0, maximum=1.0)
-    wire_radius: float = quantity("m", "radius of the contact wire", default=0.0, minimum=0.0)
-    strip_radius: float = quantity("m", "radius of the collector strip", default=0.0, minimum=0.0)
+    wire_radius: float = quantity("m", "radius of the contact wire", default=0.0, minimum=0.0, maximum=0.05)
+    strip_radius: float = quantity("m", "radius of the collector strip", default=0.0, minimum=0.0, maximum=0.5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,16 +285,16 @@ class Profile:
     """Static heights of the wires."""
 
     contact_wire_height: float = quantity(
-        "m", "height of the contact wire at the supports", positive=True, maximum=100.0
+        "m", "height of the contact wire at the supports", minimum=2.0, maximum=10.0
     )
     encumbrance: float = quantity(
-        "m", "messenger wire above contact wire at the supports", positive=True, minimum=0.05, maximum=20.0
+        "m", "messenger wire above contact wire at the supports", minimum=0.05, maximum=5.0
     )
     pre_sag: float = quantity(
         "1", "sag of the contact wire over the span length", default=0.0, minimum=-0.01, maximum=0.01
     )
     auxiliary_height: float | None = quantity(
-        "m", "auxiliary wire above the contact wire", default=None, minimum=0.01
+        "m", "auxiliary wire above the contact wire", default=None, minimum=0.01, maximum=3.0
     )
 
 
@@ -491,8 +498,8 @@ def _read_contact(table: Table) -> Contact:
 def _read_damping(table: Table) -> Damping:
     own = {name: table.table(name) for name in COMPONENTS}
     return Damping(
-        alpha=table.quantity("alpha", "s", minimum=0.0),
-        beta=table.quantity("beta", "1/s", minimum=0.0),
+        alpha=table.quantity("alpha", "s", minimum=0.0, maximum=10.0),
+        beta=table.quantity("beta", "1/s", minimum=0.0, maximum=100.0),
         **{name: schema.read(Rayleigh, t) for name, t in own.items() if t is not None},
     )
 
@@ -542,10 +549,10 @@ def _span(start: float, end: float, droppers: _Hung, hangers: _Hung) -> Span:
 def _read_boundaries(table: Table) -> list[float]:
     start = table.quantity("start", "m", minimum=-1e7, maximum=1e7)
     if table.has("length"):
-        length = table.quantity("length", "m", positive=True, maximum=1e4)
+        length = table.quantity("length", "m", minimum=1.0, maximum=200.0)
         lengths = [length] * table.integer("count", minimum=1, maximum=MAX_SPANS)
     else:
-        lengths = list(table.quantities("lengths", "m", positive=True, maximum=1e4))
+        lengths = list(table.quantities("lengths", "m", minimum=1.0, maximum=200.0))
         if table.has("lengths") and not 1 <= len(lengths) <= MAX_SPANS:
             table.problem("lengths", f"gives {len(lengths)} spans, not 1 ... {MAX_SPANS}")
     boundaries = [start]
@@ -598,7 +605,7 @@ def _hung(table: Table, index: int, length: float) -> _Hung:
     given = table.has("positions")
     offsets = table.quantities("positions", "m") if given else _dropper_rule(table, length)
     _check_droppers(table, index, length, offsets)
-    lengths = table.quantities("lengths", "m", default=(), positive=True)
+    lengths = table.quantities("lengths", "m", default=(), minimum=1e-3, maximum=10.0)
     if len(lengths) == 1:
         lengths = lengths * len(offsets)
     if lengths and len(lengths) != len(offsets):
@@ -707,7 +714,7 @@ def _read_supports(
 def _read_stagger(table: Table, boundaries: Sequence[float], registered: Sequence[bool]) -> list[float]:
     inner = [i for i, ok in enumerate(registered) if ok]
     values = dict(zip(inner, _registered_stagger(table, len(inner)), strict=True))
-    anchors = table.quantity("anchor", "m", default=0.0)
+    anchors = table.quantity("anchor", "m", default=0.0, minimum=-10.0, maximum=10.0)
     known = {0: anchors, len(boundaries) - 1: anchors} | values
     held = sorted(known)
     return [_straight(known, held, boundaries, i) for i in range(len(boundaries))]
@@ -716,7 +723,7 @@ def _read_stagger(table: Table, boundaries: Sequence[float], registered: Sequenc
 def _registered_stagger(table: Table, count: int) -> tuple[float, ...]:
     """Return the stagger of the registered supports: listed, or alternating."""
     if table.has("listed"):
-        return table.quantities("listed", "m", length=count)
+        return table.quantities("listed", "m", length=count, minimum=-1.0, maximum=1.0)
     amplitude = table.quantity("amplitude", "m", minimum=0.0, maximum=1.0)
     return tuple(amplitude * (-1.0) ** n for n in range(count))
 
@@ -736,7 +743,7 @@ def _read_measured(table: Table, boundaries: Sequence[float]) -> tuple[tuple[flo
     if measured is None:
         return ()
     x = measured.quantities("positions", "m")
-    z = measured.quantities("heights", "m", length=len(x), positive=True)
+    z = measured.quantities("heights", "m", length=len(x), minimum=2.0, maximum=10.0)
     if any(b <= a for a, b in pairwise(x)):
         measured.problem("positions", "are not in rising order")
     elif x and (x[0] > boundaries[0] or x[-1] < boundaries[-1]):

@@ -11,6 +11,7 @@ from models.catenary.mesh import CatenaryMesh, build_mesh
 from models.catenary.model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.parameters import CatenaryDefinition
 from models.catenary.statics import contact_wire_wave_speed, elasticity
+from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
 from models.contact import application_point
 from models.energy import NO_BALANCE
 from models.extrapolation import StripExtrapolation
@@ -175,6 +176,25 @@ class CatenaryPart:
         span = spans[len(spans) // 2]
         return elasticity(self.model, np.array([(span.start + span.end) / 2.0, span.start]), _PUSH).value
 
+    @property
+    def contact_wire_ends(self) -> FloatArray:
+        """Return where the contact wires begin and end along the track [m], shape (2,)."""
+        ends = [wire.ends for wire in self.model.wires]
+        return np.array([min(first for first, _ in ends), max(last for _, last in ends)])
+
+    def check_strips(self, strips: FloatArray) -> None:
+        """Refuse strips that the line, just initialised with them, cannot be meant for; raises ``ParameterError``.
+
+        Parameters
+        ----------
+        strips : ndarray, shape (P, 2, 2, 3)
+        """
+        check_strips(wires_at_rest(self.model), strips, self.contact_force)
+
+    def start_warning(self, strips: FloatArray) -> str:
+        """Return which of the strips begins inside the wire, empty if none does; shape as of `check_strips`."""
+        return start_warning(wires_at_rest(self.model), strips, self.contact_force)
+
     def initialise(self, time: float, strips: FloatArray) -> None:
         """Put the line to rest at ``time`` and find the contacts of the strips with it.
 
@@ -239,6 +259,17 @@ class CatenaryPart:
         for place, *contact in zip(self.contact_point, result.force, result.point, strips, strict=True):
             place[...] = application_point(*contact)
         self.support_uplift[...] = self.model.uplift(self.state)
+
+
+def wires_at_rest(model: CatenaryModel) -> tuple[WireAtRest, ...]:
+    """Return the static shape of the contact wires, section by section."""
+    positions, chains = model.static.positions, model.mesh.chains
+    of_wire = (chain for chain in chains if chain.component == "contact_wire")
+    sections = model.definition.sections
+    return tuple(
+        WireAtRest(positions[chain.nodes], section.ends.working)
+        for chain, section in zip(of_wire, sections, strict=True)
+    )
 
 
 def _sites(mesh: CatenaryMesh, nodes: IntArray) -> tuple[Site, ...]:

@@ -29,7 +29,7 @@ _USER_ERRORS = (
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run ``python -m models``; return 0, 1 (the run failed) or 2 (wrong command line or input)."""
+    """Run ``python -m models``; return 0, 1 (failed or invalid) or 2 (a command line that was not understood)."""
     parser = argparse.ArgumentParser(prog="python -m models", description="Physics of lines and pantographs.")
     subparsers = parser.add_subparsers(dest="verb", required=True)
     for verb in _VERBS:
@@ -45,7 +45,7 @@ def main(argv: Sequence[str]) -> int:
         return 1
     except _USER_ERRORS as error:
         print(f"error: {printable(str(error))}", file=sys.stderr)
-        return 2 if isinstance(error, (DefinitionError, UnknownNameError, ParameterError)) else 1
+        return 1
     except MemoryError:
         print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
         return 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,8 @@ from master.evaluation.filters import SETTLING, ForceFilter, evaluated, low_pass
 from models.catenary import limits
 from models.catenary.model import CatenaryModel
 from models.catenary.parameters import SHORTEST_STEP
-from models.catenary.part import CatenaryPart
+from models.catenary.part import CatenaryPart, wires_at_rest
+from models.catenary.strip_checks import check_strips, start_warning
 from models.commands.options import (
     add_filter,
     add_settings,
@@ -31,11 +33,14 @@ from models.commands.options import (
 from models.commands.output_files import write_csv
 from models.coupled import CoupledModel, CoupledRecord
 from models.library import load_line, load_lumped
+from models.pantograph.lumped_advice import working_height_warning
 from models.pantograph.parameters import LumpedDefinition
 from models.part import FloatArray, ParameterError
 
 #: Longest step of the monolithic run [s]: a contact lasts longer than it.
 LONGEST_STEP = 0.1
+#: Time after the uplift acts fully in which a strip that can reach the wire has reached it [s].
+LONGEST_RISE = 1.0
 #: Steps of a run: enough for the filter, and not more than fit into memory.
 FEWEST_STEPS, MOST_STEPS = 100, 10**7
 
@@ -64,15 +69,18 @@ def run(arguments: argparse.Namespace) -> int:
     """Run and print the contact-force figures."""
     _check_step(arguments)
     chosen = chosen_filter(arguments)
-    definition = load_line(arguments.line).with_values(settings(arguments.set, "line"))
+    definition = load_line(arguments.line)
+    definition = definition.with_values(settings(arguments.set, "line", definition))
     line = CatenaryModel(definition)
     span = _span_of(arguments, line)
     _check_length(arguments, span)
     speed = arguments.speed / 3.6
-    wanted = {"speed": speed, "start_position": span[0]} | settings(arguments.set, "pantograph")
-    pantograph = load_lumped(arguments.pantograph).with_values(wanted)
-    warn(_limits(line, pantograph, arguments.step))
+    pantograph = load_lumped(arguments.pantograph)
+    given = settings(arguments.set, "pantograph", pantograph)
+    _check_given(given)
+    pantograph = pantograph.with_values({"speed": speed, "start_position": span[0]} | given)
     coupled = CoupledModel(line, [pantograph])
+    warn([*_limits(line, pantograph, arguments.step), *_at_start(coupled)])
     stop = (span[1] - span[0]) / speed
     begin = time.perf_counter()
     with Progress(
@@ -81,6 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
         task = bar.add_task(f"{arguments.line} + {arguments.pantograph}, monolithic", total=stop)
         record = coupled.run(stop, arguments.step, lambda t: bar.update(task, completed=t))
     wall = time.perf_counter() - begin
+    _check_touched(record, pantograph)
     run_of = Evaluated.of(record, line, pantograph.strip_offset, tuple(arguments.interval or (None, None)), chosen)
     if arguments.out is not None:
         write_timeseries(new_folder(arguments.out) / "timeseries.csv", run_of)
@@ -96,6 +105,39 @@ def _limits(line: CatenaryModel, pantograph: LumpedDefinition, step: float) -> t
         limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.dropper_force),
         limits.slack_law_warning(line.definition),
     )
+
+
+def _at_start(coupled: CoupledModel) -> tuple[str, ...]:
+    """Refuse a strip that the line cannot be meant for; return what deserves a second look in how it starts."""
+    wires, strips = wires_at_rest(coupled.line), coupled.strips
+    force, point = coupled.contact_at_rest()
+    forces = force.sum(axis=1)
+    check_strips(wires, strips, forces)
+    heights = (
+        working_height_warning(p.definition, float(x), float(z))
+        for p, (x, _, z) in zip(coupled.pantographs, point, strict=True)
+    )
+    return (start_warning(wires, strips, forces), *heights)
+
+
+def _check_touched(record: CoupledRecord, pantograph: LumpedDefinition) -> None:
+    """Refuse a run in which the strip had time to reach the wire, and never did."""
+    latest = pantograph.raise_start + pantograph.raise_duration + LONGEST_RISE
+    if record.contact_force.any() or record.time[-1] <= latest:
+        return
+    raise ParameterError(
+        f"'{pantograph.name}' never touches the wire (its strip ends at z = {record.strip_height[-1, 0]:.3f} m): "
+        "check static_force, reference_height, strip_length and strip_offset against the wire's height and stagger"
+    )
+
+
+def _check_given(values: Mapping[str, float]) -> None:
+    """Refuse values of the pantograph that the command has options for, or with which nothing would happen."""
+    for name, option in (("speed", "--speed"), ("start_position", "--start")):
+        if name in values:
+            raise ParameterError(f"--set pantograph.{name}: the run's own options say that; give {option}")
+    if values.get("static_force", 1.0) <= 0.0:
+        raise ParameterError("pantograph.static_force = 0 N never lifts the strip to the wire: give it more than 0")
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,12 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     parser.add_argument("--kind", choices=RESPONSE_KINDS, default="receptance", help="what the two parts are of")
     parser.add_argument("--stages", type=int, default=3, help="number of masses (default 3)")
     parser.add_argument(
-        "--fix", action="append", default=[], metavar="NAME=VALUE", help="known value: m3=7.75 (m, c, k; 1 is lowest)"
+        "--fix",
+        action="append",
+        default=[],
+        type=_fixed,
+        metavar="NAME=VALUE",
+        help="known value: m3=7.75 (m, c, k; 1 is lowest)",
     )
     parser.add_argument("--plot", type=Path, default=None, help="PNG file for measured and fitted response")
     parser.set_defaults(run=run)
@@ -50,8 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _all_fixed(texts: Sequence[str]) -> dict[str, float]:
-    given = [_fixed(text) for text in texts]
+def _all_fixed(given: Sequence[tuple[str, float]]) -> dict[str, float]:
     if twice := [name for name, _ in given if sum(name == other for other, _ in given) > 1]:
         raise ParameterError(f"--fix {twice[0]}: is given twice")
     return dict(given)
@@ -60,11 +64,11 @@ def _all_fixed(texts: Sequence[str]) -> dict[str, float]:
 def _fixed(text: str) -> tuple[str, float]:
     name, equals, value = text.partition("=")
     if not equals:
-        raise ParameterError(f"--fix {text}: write NAME=VALUE")
+        raise argparse.ArgumentTypeError(f"'{text}': write NAME=VALUE")
     try:
         return name, float(value)
     except ValueError as error:
-        raise ParameterError(f"--fix {text}: '{value}' is not a number") from error
+        raise argparse.ArgumentTypeError(f"'{text}': '{value}' is not a number") from error
 
 
 def _rows(model: IdentifiedModel) -> list[tuple[str, str, str]]:

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
 from models.definition import LARGEST, SMALLEST, printable
-from models.part import ParameterError
+from models.part import Definition, ParameterError
+from models.units import to_si
+
+_PARTS = ("line", "pantograph")
+#: A number, as Python writes it, and a unit or none.
+_WITH_UNIT = re.compile(
+    r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf))\s*(\S*)\s*", re.ASCII | re.IGNORECASE
+)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
@@ -22,8 +31,9 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         "--set",
         action="append",
         default=[],
+        type=_setting,
         metavar="PART.PARAMETER=VALUE",
-        help="change a parameter: line.damping.alpha=0.00275, pantograph.static_force=170 (SI units)",
+        help="change a parameter: line.damping.alpha=0.00275, line.contact_wire.tension='12 kN' (SI where no unit is)",
     )
 
 
@@ -57,25 +67,47 @@ def chosen_filter(arguments: argparse.Namespace) -> ForceFilter:
 _HIGHEST_ORDER = 20
 
 
-def settings(given: Iterable[str], part: str) -> dict[str, float]:
-    """Return the ``--set`` values of one part.
+class Setting(NamedTuple):
+    """A value from the command line: of the line or the pantograph, its parameter, and as text with or without unit."""
+
+    part: str
+    parameter: str
+    value: str
+
+
+def settings(given: Iterable[Setting], part: str, definition: Definition) -> dict[str, float]:
+    """Return the ``--set`` values of one part [SI].
 
     Raises
     ------
     ParameterError
-        If a setting is not of the form PART.PARAMETER=VALUE.
+        If a value is no number, or has a unit that does not fit its parameter.
     """
-    result = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        head, dot, parameter = name.partition(".")
-        if not equals or not dot or head not in ("line", "pantograph"):
-            raise ParameterError(
-                f"--set {text}: write line.PARAMETER=VALUE or pantograph.PARAMETER=VALUE"
-            )
-        if head == part:
-            result[parameter] = _number(text, value)
-    return result
+    units = {p.name: p.unit for p in definition.parameters()}
+    own = (s for s in given if s.part == part)
+    return {s.parameter: _value(s, units.get(s.parameter)) for s in own}
+
+
+def _setting(text: str) -> Setting:
+    name, equals, value = text.partition("=")
+    part, dot, parameter = name.partition(".")
+    if not (equals and dot and parameter and value) or part not in _PARTS:
+        raise argparse.ArgumentTypeError(f"'{text}': write line.PARAMETER=VALUE or pantograph.PARAMETER=VALUE")
+    return Setting(part, parameter, value)
+
+
+def _value(setting: Setting, wanted: str | None) -> float:
+    what = f"--set {setting.part}.{setting.parameter}"
+    match = _WITH_UNIT.fullmatch(setting.value)
+    if match is None:
+        raise ParameterError(f"{what}: '{setting.value}' is not a number, or a number with its unit ('12 kN')")
+    number, unit = float(match[1]), match[2]
+    if not unit or wanted is None:  # that there is no such parameter is told by the definition
+        return number
+    try:
+        return to_si(number, unit, wanted)
+    except ValueError as error:
+        raise ParameterError(f"{what}={setting.value}: {error}; give it in {wanted}") from error
 
 
 def finite(text: str) -> float:
@@ -120,8 +152,3 @@ def new_folder(path: Path) -> Path:
     return path
 
 
-def _number(text: str, value: str) -> float:
-    try:
-        return float(value)
-    except ValueError as error:
-        raise ParameterError(f"--set {text}: '{value}' is not a number") from error

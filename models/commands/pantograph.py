@@ -65,7 +65,8 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
-    definition = load_pantograph(arguments.pantograph).with_values(settings(arguments.set, "pantograph"))
+    definition = load_pantograph(arguments.pantograph)
+    definition = definition.with_values(settings(arguments.set, "pantograph", definition))
     result = (
         _multibody(definition, arguments)
         if isinstance(definition, MechanismDefinition)

@@ -73,7 +73,8 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     ParameterError
         If the line has no such section or span.
     """
-    definition = load_line(arguments.line).with_values(settings(arguments.set, "line"))
+    definition = load_line(arguments.line)
+    definition = definition.with_values(settings(arguments.set, "line", definition))
     section = arguments.section - 1
     if not 0 <= section < len(definition.sections):
         raise ParameterError(f"--section {arguments.section}: the line has sections 1 to {len(definition.sections)}")

@@ -20,15 +20,23 @@ class Operation:
     The names are the same for every kind of pantograph.
     """
 
-    speed: float = quantity("m/s", "speed along the track", default=300.0 / 3.6, minimum=0.0, maximum=200.0)
-    start_position: float = quantity("m", "position along the track at time 0", default=0.0)
+    speed: float = quantity("m/s", "speed along the track", default=300.0 / 3.6, minimum=0.0, maximum=170.0)
+    start_position: float = quantity("m", "position along the track at time 0", default=0.0, minimum=-1e7, maximum=1e7)
     reference_height: float = quantity(
-        "m", "height of the strip at time 0, where the springs carry the weights", default=5.02, positive=True
+        "m",
+        "height of the strip at time 0, where the springs carry the weights",
+        default=5.02,
+        minimum=2.0,
+        maximum=10.0,
     )
-    raise_start: float = quantity("s", "when the uplift begins to act", default=0.0, minimum=0.0)
-    raise_duration: float = quantity("s", "time over which the uplift grows to its value", default=0.1, minimum=0.0)
-    strip_length: float = quantity("m", "working length of the collector strip", default=1.45, positive=True)
-    strip_offset: float = quantity("m", "lateral position of the strip's middle", default=0.0)
+    raise_start: float = quantity("s", "when the uplift begins to act", default=0.0, minimum=0.0, maximum=1e4)
+    raise_duration: float = quantity(
+        "s", "time over which the uplift grows to its value", default=0.1, minimum=0.0, maximum=100.0
+    )
+    strip_length: float = quantity("m", "working length of the collector strip", default=1.45, minimum=0.1, maximum=4.0)
+    strip_offset: float = quantity(
+        "m", "lateral position of the strip's middle", default=0.0, minimum=-2.0, maximum=2.0
+    )
     extrapolation_order: int = count(
         "order of the extrapolation of the contact force inside a step: 0 held, 1 linear, 2 quadratic",
         default=2, minimum=0, maximum=2,
@@ -50,9 +58,9 @@ class Operation:
 class Stage:
     """One stage of a lumped model: a mass on a spring-damper to the stage below."""
 
-    mass: float = quantity("kg", "mass", positive=True)
-    stiffness: float = quantity("N/m", "stiffness to the stage below", minimum=0.0)
-    damping: float = quantity("N.s/m", "damping to the stage below", minimum=0.0)
+    mass: float = quantity("kg", "mass", positive=True, minimum=1e-3, maximum=1e3)
+    stiffness: float = quantity("N/m", "stiffness to the stage below", minimum=0.0, maximum=1e9)
+    damping: float = quantity("N.s/m", "damping to the stage below", minimum=0.0, maximum=1e6)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +82,9 @@ class LumpedDefinition(Operation):
     name: str
     title: str
     stage: tuple[Stage, ...]
-    static_force: float = quantity("N", "static uplift on the lowest mass at the reference height", minimum=0.0)
+    static_force: float = quantity(
+        "N", "static uplift on the lowest mass at the reference height", minimum=0.0, maximum=5e3
+    )
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
 
     def parameters(self) -> tuple[Parameter, ...]:

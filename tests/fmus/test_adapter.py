@@ -264,7 +264,7 @@ def test_parameter_out_of_range_is_named_and_can_be_corrected(instantiate):
     with refused():
         instance["mass[1].z"]
     assert math.isnan(instance["mass[1].z"])
-    assert instance.errors == ["parameter 'stiffness': -5 N/m is outside 1 ... 1e+06 N/m"]
+    assert instance.errors == ["parameter 'stiffness': -5 N/m is outside 1 ... 1e+06 N/m: check its size and its unit"]
     instance["stiffness"] = 5.0
     instance["force"] = 1.0
     assert instance["mass[1].z"] == 0.2

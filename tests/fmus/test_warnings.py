@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fmus.build import build
+from fmus.build import build, recipe
 from models.catenary.limits import slack_warning
 from models.catenary.part import CatenaryPart
 from models.library import line_names, load_line
@@ -24,6 +24,12 @@ def slack(tmp_path_factory):
     """A line whose fourth dropper of every span is far too long."""
     folder = tmp_path_factory.mktemp("slack")
     return build(short_line_recipe(folder, "[1.25, 1.15, 1.1, 2.5, 1.1, 1.15, 1.25]"), folder)
+
+
+@pytest.fixture(scope="module")
+def pantographs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pantographs")
+    return {name: build(recipe(f"Pantograph_{name}"), folder) for name in ("CX", "CX_multibody")}
 
 
 @pytest.fixture
@@ -94,9 +100,19 @@ def test_the_first_step_can_be_too_long(instantiate, sound):
 def test_a_line_that_cannot_be_built_tells_errors_alone(instantiate, sound):
     line = instantiate(sound)
     with refused():
-        line.initialise(**{"contact_wire.tension": 1.0})
+        line.initialise(**{"contact_wire.tension": 500.0, "contact_wire.mass": 20.0})
     assert line.warnings == []
     assert "no static equilibrium of the wanted shape" in line.errors[0]
+
+
+@pytest.mark.parametrize(("z", "expected"), [(5.08, 0), (5.30, 1)])
+@pytest.mark.parametrize("name", ["CX", "CX_multibody"])
+def test_a_wire_at_another_working_height(instantiate, pantographs, name, z, expected):
+    """What the line tells as the contact's place is where the wire is above the strip."""
+    pantograph = instantiate(pantographs[name])
+    pantograph.initialise(**{"contact.x": 0.0, "contact.z": z})
+    assert len(pantograph.warnings) == expected
+    assert all("at the wire's, 5.30 m, " in text for text in pantograph.warnings)
 
 
 @pytest.mark.parametrize("name", line_names())

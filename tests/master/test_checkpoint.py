@@ -12,7 +12,7 @@ from master import checkpoint
 from master.algorithm import Iterative, Jacobi
 from master.checkpoint import Continuation, index_at, pack, unpack
 from master.cli import main
-from master.errors import MasterError, RunError, UsageError
+from master.errors import MasterError, RequestError, RunError
 from master.recorder import load
 from master.run import loaded
 from master.scenario import Overrides, open_scenario
@@ -77,7 +77,7 @@ def test_a_settled_line_takes_a_new_pantograph(toy, tmp_path, saved):
 )
 def test_what_does_not_fit_is_said_before_anything_is_run(toy, tmp_path, saved, capsys, options, text):
     command = [str(toy), "--no-build", "--quiet", "--out", str(tmp_path / "no"), "--resume", str(saved[1])]
-    assert main([*command, *options]) == 2
+    assert main([*command, *options]) == 1
     assert text in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "no").exists()
 
@@ -156,7 +156,7 @@ def test_fmus_that_cannot_serialise_are_named(toy):
     with open_scenario(toy, Overrides(), build=False) as scenario:
         system = scenario.system
         mute = replace(system.components[0], fmu=replace(system.components[0].fmu, can_serialise=False))
-        with pytest.raises(UsageError, match="FMU of catenary cannot serialise"):
+        with pytest.raises(RequestError, match="FMU of catenary cannot serialise"):
             index_at(replace(system, components=(mute, system.components[1])), 0.1)
 
 

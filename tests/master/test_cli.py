@@ -106,7 +106,7 @@ def test_overrides_are_honoured(toy, in_folder):
     ],
 )
 def test_parameters_that_cannot_be_set(toy, in_folder, capsys, assignment, text):
-    assert main([str(toy), "--set", assignment, "--no-build"]) == 2
+    assert main([str(toy), "--set", assignment, "--no-build"]) == 1
     assert text in " ".join(capsys.readouterr().err.split())
     assert not (in_folder / "results").exists()
 
@@ -230,8 +230,8 @@ def test_validate_accepts(toy, capsys):
 
 
 def test_results_may_not_lie_in_the_scenario(toy, capsys):
-    assert main([str(toy), "--out", str(toy / "results"), "--no-build"]) == 2
-    assert main([str(toy), "--out", str(toy.parent), "--no-build"]) == 2
+    assert main([str(toy), "--out", str(toy / "results"), "--no-build"]) == 1
+    assert main([str(toy), "--out", str(toy.parent), "--no-build"]) == 1
     assert "lie inside each other" in capsys.readouterr().err
 
 
@@ -324,7 +324,7 @@ def test_calibrate_stores_what_it_finds(toy, in_folder, capsys):
 
 
 def test_calibrate_without_a_target(toy, capsys):
-    assert main(["calibrate", str(toy), "--no-build"]) == 2
+    assert main(["calibrate", str(toy), "--no-build"]) == 1
     assert "give --parameter and --mean" in capsys.readouterr().err
 
 

@@ -84,7 +84,7 @@ def test_balances_have_a_row_in_the_report():
 
 
 def test_asking_for_it_of_fmus_that_cannot_is_refused(toy, tmp_path, capsys):
-    assert main([str(toy), "--no-build", "--quiet", "--energy", "--out", str(tmp_path / "out")]) == 2
+    assert main([str(toy), "--no-build", "--quiet", "--energy", "--out", str(tmp_path / "out")]) == 1
     assert "no FMU of the scenario has the parameter 'monitor_energy'" in capsys.readouterr().err
 
 

@@ -23,7 +23,8 @@ FORCE = "catenary.pantograph[1].contact.force"
 
 
 def go(toy, folder, **overrides):
-    with open_scenario(toy, Overrides(**overrides), build=False) as scenario:
+    asked = Overrides(**overrides, may_stop_early="stop" in overrides)
+    with open_scenario(toy, asked, build=False) as scenario:
         return run(scenario.system, folder)
 
 

@@ -61,7 +61,7 @@ def test_missing_then_fresh_then_stale(builder, tmp_path):
 
 
 def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
-    builder.code = 2
+    builder.fingerprint = ""  # what it says of a name that it does not know
     (tmp_path / "X.fmu").write_text("foreign")
     store.ensure(tmp_path / "X.fmu", print)
     assert builder.asked == ["fingerprint"]
@@ -113,11 +113,12 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
     store.ensure(path, told.append)
     assert told == []
-    assert builder.orders[-1] == ("fingerprint", "--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+    ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+    assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
     store.ensure(path, told.append)
     assert told == ["building Mine.fmu again: its sources have changed"]
-    assert builder.orders[-1][3:] == ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+    assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
     store.ensure(path, told.append)
     assert "which it was built from, is not there" in told[-1]

@@ -83,10 +83,10 @@ def assert_quick(answer: Answer) -> None:
         assert text not in answer.err, answer.err
 
 
-def assert_refused(answer: Answer, *parts: str, codes: Sequence[int] = (1, 2)) -> None:
+def assert_refused(answer: Answer, *parts: str, code: int = 1) -> None:
     """The answer is an error in words, which says every one of ``parts``."""
     assert_quick(answer)
-    assert answer.code in codes, answer
+    assert answer.code == code, answer
     said = " ".join(answer.err.split())
     assert "error: " in said, answer
     for part in parts:

@@ -57,7 +57,7 @@ CLIMBING = ["../evil", "a/../../evil", "/tmp/evil", "//evil", "..", "C:evil", "C
 @pytest.mark.parametrize("name", CLIMBING)
 def test_nothing_climbs_out(scenario, tmp_path, kind, name):
     answer, rule = asked(scenario, tmp_path, kind, [(entry(name), b"x")])
-    assert_refused(answer, "would be written outside the folder", codes=(1,))
+    assert_refused(answer, "would be written outside the folder")
     assert rule in answer.err
     assert not (tmp_path / "evil").exists()
     assert not Path("/tmp/evil").exists()
@@ -97,7 +97,7 @@ def asked(scenario, tmp_path, kind, more):
 def test_unsafe_members(scenario, tmp_path, kind, more, said):
     answer, rule = asked(scenario, tmp_path, kind, more)
     # Making forty megabytes of nothing took a while, refusing them does not.
-    assert_refused(answer, said, codes=(1,))
+    assert_refused(answer, said)
     assert rule in answer.err
 
 
@@ -113,7 +113,7 @@ def test_total_size(scenario, tmp_path, monkeypatch):
     monkeypatch.setattr(archive, "MAX_BYTES", 10_000)
     for kind in ("ssp", "fmu"):
         answer, _ = asked(scenario, tmp_path, kind, [("x", bytes(10_001))])
-        assert_refused(answer, "bytes, more than 10000", codes=(1,))
+        assert_refused(answer, "bytes, more than 10000")
 
 
 def _patched(data, at, form, *values):
@@ -142,7 +142,7 @@ def test_encrypted_members(tmp_path, flags):
     TRIED["hostile ssp"] += 1
     central = data.index(b"PK\x01\x02")
     path.write_bytes(_patched(_patched(data, central + 8, "<H", flags), 6, "<H", flags))
-    assert_refused(ask(main, "validate", path), "x.ssp", codes=(1,))
+    assert_refused(ask(main, "validate", path), "x.ssp")
 
 
 @pytest.mark.parametrize("method", [1, 6, 9, 12, 14, 93, 99, 0xFFFF])
@@ -152,7 +152,7 @@ def test_members_packed_in_other_ways(tmp_path, method):
     TRIED["hostile ssp"] += 1
     central = data.index(b"PK\x01\x02")
     path.write_bytes(_patched(_patched(data, central + 10, "<H", method), 8, "<H", method))
-    assert_refused(ask(main, "validate", path), "is not a readable .ssp archive", codes=(1,))
+    assert_refused(ask(main, "validate", path), "is not a readable .ssp archive")
 
 
 def test_an_archive_in_an_archive_is_no_component(scenario, tmp_path):
@@ -163,7 +163,7 @@ def test_an_archive_in_an_archive_is_no_component(scenario, tmp_path):
         'source="inner.ssp" type="application/x-ssp-package"')
     path = pack(tmp_path / "x.ssp", [*{**members, SSD: text.encode(), "inner.ssp": inner.read_bytes()}.items()])
     TRIED["hostile ssp"] += 1
-    assert_refused(ask(main, "validate", path, "--no-build"), "only FMUs", codes=(1,))
+    assert_refused(ask(main, "validate", path, "--no-build"), "only FMUs")
 
 
 SECRET = "the treasure is in the cellar"
@@ -220,7 +220,7 @@ def test_documents_made_to_do_harm(scenario, tmp_path, kind, place):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
     answer = ask(main, "validate", folder, "--no-build")
-    assert_refused(answer, "ToyPantograph.fmu" if place == "fmu" else f"{place}:", codes=(1,))
+    assert_refused(answer, "ToyPantograph.fmu" if place == "fmu" else f"{place}:")
     assert SECRET not in answer.err
 
 
@@ -233,7 +233,7 @@ def test_an_entity_inside_a_sound_document(scenario, tmp_path):
         text = f"{head}?>{before}{rest}".replace('value="140"', 'value="&f;"' if "f '" in before else 'value="140"')
         (scenario / "parameters.ssv").write_text(text)
         answer = ask(main, "validate", scenario, "--no-build")
-        assert_refused(answer, "a document type declaration is not allowed", codes=(1,))
+        assert_refused(answer, "a document type declaration is not allowed")
     restore(scenario)
 
 
@@ -256,7 +256,7 @@ def test_sources_outside_the_scenario(scenario, source, what):
     restore(scenario)
     (scenario / SSD).write_text(ssd_text().replace(old, new), encoding="utf-8")
     answer = ask(main, "validate", scenario, "--no-build")
-    assert_refused(answer, f"{SSD}:", codes=(1,))
+    assert_refused(answer, f"{SSD}:")
     assert "root:" not in answer.err
     restore(scenario)
 
@@ -271,7 +271,7 @@ def test_links_in_a_folder(scenario, tmp_path, target):
     (folder / "parameters.ssv").unlink()
     (folder / "circle").symlink_to("circle")
     (folder / "parameters.ssv").symlink_to(target)
-    assert_refused(ask(main, "validate", folder, "--no-build"), f"{SSD}:", "parameters.ssv", codes=(1,))
+    assert_refused(ask(main, "validate", folder, "--no-build"), f"{SSD}:", "parameters.ssv")
 
 
 BAD_FMUS = {
@@ -302,7 +302,7 @@ def test_descriptions_of_fmus_that_cannot_be(scenario, tmp_path, kind):
     members["resources/ToyPantograph.fmu"] = pack(path, [("modelDescription.xml", text.replace(old, new,
         1))]).read_bytes()
     answer = ask(main, "validate", pack(tmp_path / "x.ssp", list(members.items())), "--no-build")
-    assert_refused(answer, "ToyPantograph.fmu", said, codes=(1,))
+    assert_refused(answer, "ToyPantograph.fmu", said)
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\x05\x06" + bytes(18), b"PK\x03\x04", b"\x00" * 100, b"<xml/>"],

@@ -183,6 +183,10 @@ def test_responses_blindly(tmp_path_factory, change):
     assert all(any(_same(cell, f) for cell in cells) for f in found.frequency.tolist())
 
 
+#: What argparse says of options that it cannot read.
+UNREAD = ("invalid int value", "invalid choice", "write NAME=VALUE", "'x' is not a number")
+
+
 @pytest.mark.parametrize(
     ("text", "options", "said"),
     [
@@ -216,7 +220,7 @@ def test_responses_blindly(tmp_path_factory, change):
 def test_identify_says_what_is_wrong(tmp_path, text, options, said):
     TRIED["models identify"] += 1
     (tmp_path / "r.csv").write_text(text)
-    assert_refused(ask(models, "identify", tmp_path / "r.csv", *options), said, codes=(2,))
+    assert_refused(ask(models, "identify", tmp_path / "r.csv", *options), said, code=2 if said in UNREAD else 1)
 
 
 FAMILY = SCENARIOS / "cx_generic_pair.ssp"
@@ -238,7 +242,7 @@ def test_studies_blindly(tmp_path_factory, name, change):
     family(folder, **{name.replace(".", "__"): change((FAMILY / name).read_bytes())})
     answer = ask(master, "study", folder, "--list")
     if answer.code:
-        assert_refused(answer, codes=(1,))
+        assert_refused(answer)
         assert name in answer.err or "there is no" in answer.err
         return
     assert_accepted(answer)
@@ -274,7 +278,7 @@ CELLS = ("nan", "inf", "-1", "x", "1e999")
 def test_variants_that_cannot_be(tmp_path, text, said):
     TRIED["study, by hand"] += 1
     family(tmp_path, variants__csv=text.encode())
-    assert_refused(ask(master, "study", tmp_path, "--list"), said, codes=(1,))
+    assert_refused(ask(master, "study", tmp_path, "--list"), said)
 
 
 @pytest.mark.parametrize("name", ["..", ".", "../../x", "/etc/passwd", "a/../../b", "\\..\\x", "con\x00"])
@@ -299,7 +303,7 @@ BROKEN_STUDIES = [
 def test_settings_of_a_study_that_cannot_be(tmp_path, text):
     TRIED["study, by hand"] += 1
     family(tmp_path, study__toml=text.encode())
-    assert_refused(ask(master, "study", tmp_path, "--list"), "study.toml", codes=(1,))
+    assert_refused(ask(master, "study", tmp_path, "--list"), "study.toml")
 
 
 def test_measurements_reach_the_command(measured_run, tmp_path):
@@ -309,7 +313,7 @@ def test_measurements_reach_the_command(measured_run, tmp_path):
         rows = [[f"{x}", f"{100 + x}"] for x in range(ROWS)]
         rows[5][column] = f'"{bad}"'
         (tmp_path / "m.csv").write_text(csv_text("position [m],force [N]", rows))
-        assert_refused(ask(master, "report", measured_run, "--measured", tmp_path / "m.csv"), "m.csv:7: ", codes=(1,))
+        assert_refused(ask(master, "report", measured_run, "--measured", tmp_path / "m.csv"), "m.csv:7: ")
         assert not (measured_run / "report.html").exists()
 
 

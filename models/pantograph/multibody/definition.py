@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -243,6 +243,37 @@ class MechanismDefinition:
         return next((f for f in self.forces if f.lift), None)
 
 
+
+class Range(NamedTuple):
+    """Least and largest value of engineering size, in SI: beyond it a value was written in another unit."""
+
+    minimum: float
+    maximum: float
+
+
+_ANY: Final = Range(-np.inf, np.inf)
+_MASS: Final = Range(1e-3, 1e3)
+_INERTIA: Final = Range(1e-9, 1e4)
+_PLACE: Final = Range(-20.0, 20.0)
+_LENGTH: Final = Range(-10.0, 10.0)
+_STIFFNESS: Final = Range(0.0, 1e9)
+_DAMPING: Final = Range(0.0, 1e6)
+_STOP: Final = Range(1.0, 1e9)
+_FORCE: Final = Range(-1e5, 1e5)
+_MOMENT: Final = Range(-1e5, 1e5)
+_FRICTION: Final = Range(0.0, 1e4)
+_TRANSITION: Final = Range(1e-9, 100.0)
+_GRAVITY: Final = Range(0.0, 30.0)
+_TOLERANCE: Final = Range(1e-15, 0.1)
+_GAP: Final = Range(1e-9, 10.0)
+#: Of a bushing, by the unit.
+_BUSHING: Final = {
+    "N/m": Range(0.0, 1e10),
+    "N.s/m": Range(0.0, 1e8),
+    "N.m/rad": Range(0.0, 1e9),
+    "N.m.s/rad": Range(0.0, 1e7),
+}
+
 _COMPONENTS: Final = {"inertia": ("xx", "yy", "zz")}
 _XYZ: Final = ("x", "y", "z")
 #: Names of bodies, joints and forces: parts of dotted parameter names.
@@ -304,9 +335,9 @@ class _Reader:
             assembly=self._assembly(),
             operation=operation,
             lift=self._lift(moment_driven, any(f.lift for f in forces)),
-            gravity=self.number(root, "gravity", "m/s2", "acceleration of gravity", default=9.81),
+            gravity=self.number(root, "gravity", "m/s2", "acceleration of gravity", _GRAVITY, default=9.81),
             tolerance=self.number(
-                root, "tolerance", "m", "local error of an internal step", default=1e-8, positive=True
+                root, "tolerance", "m", "local error of an internal step", _TOLERANCE, default=1e-8
             ),
             _data=copy.deepcopy(root.data),
             _file=root.file,
@@ -319,8 +350,9 @@ class _Reader:
         if not driven:
             return 0.0
         if moment_driven:
-            return self.number(self.root, "static_moment", "N.m", "lifting moment after the raise")
-        return self.number(self.root, "static_force", "N", "net uplift at the reference height after the raise")
+            return self.number(self.root, "static_moment", "N.m", "lifting moment after the raise", _MOMENT)
+        text = "net uplift at the reference height after the raise"
+        return self.number(self.root, "static_force", "N", text, _FORCE)
 
     def _each(self, section: str, read: Any) -> tuple[Any, ...]:
         table = self.root.table(section)
@@ -335,9 +367,9 @@ class _Reader:
     def _body(self, name: str, table: Table) -> Body:
         return Body(
             name,
-            self.number(table, "mass", "kg", f"mass of {name}", positive=True),
-            self.triple(table, "inertia", "kg.m2", f"moment of inertia of {name}", positive=True),
-            self._plain_triple(table, "position", "m"),
+            self.number(table, "mass", "kg", f"mass of {name}", _MASS),
+            self.triple(table, "inertia", "kg.m2", f"moment of inertia of {name}", _INERTIA),
+            self._plain_triple(table, "position", "m", _PLACE),
             self._euler(table),
         )
 
@@ -349,7 +381,7 @@ class _Reader:
                 continue
             if kind in _WITH_POINTS:
                 given[f"point_{side}"] = self.triple(
-                    table, f"point_{side}", "m", f"{name}: point on body {side}"
+                    table, f"point_{side}", "m", f"{name}: point on body {side}", _PLACE
                 )
         if kind in _WITH_AXIS_I:
             given["axis_i"] = self._axis(table, "axis_i")
@@ -373,7 +405,7 @@ class _Reader:
         if kind != "actuator_moment":
             for side in ("i", "j"):
                 given[f"point_{side}"] = self.triple(
-                    table, f"point_{side}", "m", f"{name}: point on body {side}"
+                    table, f"point_{side}", "m", f"{name}: point on body {side}", _PLACE
                 )
         if kind in FORCE_KINDS:  # of another the table has told already
             given |= self._force_readers[kind](name, table)
@@ -399,39 +431,39 @@ class _Reader:
         if carries and table.has("free_length"):
             table.problem("free_length", "is given although the spring is set to carry the weights")
         if not carries:
-            length = self.number(table, "free_length", "m", f"{name}: length without force", default=0.0)
+            length = self.number(table, "free_length", "m", f"{name}: length without force", _LENGTH, default=0.0)
         if not (table.has("stiffness") or table.has("damping")):
             table.problem("", "needs a stiffness or a damping: without either it does nothing")
-        stiffness = self.number(table, "stiffness", "N/m", f"{name}: stiffness", default=0.0, minimum=0.0)
+        stiffness = self.number(table, "stiffness", "N/m", f"{name}: stiffness", _STIFFNESS, default=0.0)
         if carries and stiffness == 0.0:
             table.problem("stiffness", "must be greater than 0: a spring set to carry the weights has to give way")
         return self._direction(table) | {
             "stiffness": stiffness,
-            "damping": self.number(table, "damping", "N.s/m", f"{name}: damping", default=0.0, minimum=0.0),
+            "damping": self.number(table, "damping", "N.s/m", f"{name}: damping", _DAMPING, default=0.0),
             "free_length": length,
         }
 
     def _actuator_force(self, name: str, table: Table) -> dict[str, Any]:
-        return self._direction(table) | self._value(name, table, "N", "force")
+        return self._direction(table) | self._value(name, table, "N", "force", _FORCE)
 
     def _actuator_moment(self, name: str, table: Table) -> dict[str, Any]:
-        return {"direction": self._axis(table, "axis_i")} | self._value(name, table, "N.m", "moment")
+        return {"direction": self._axis(table, "axis_i")} | self._value(name, table, "N.m", "moment", _MOMENT)
 
-    def _value(self, name: str, table: Table, unit: str, word: str) -> dict[str, Any]:
+    def _value(self, name: str, table: Table, unit: str, word: str, within: Range) -> dict[str, Any]:
         if table.flag("lift", default=False):
             return {"lift": True}
-        return {"value": self.number(table, word, unit, f"{name}: {word}")}
+        return {"value": self.number(table, word, unit, f"{name}: {word}", within)}
 
     def _bump_stop(self, name: str, table: Table) -> dict[str, Any]:
         given = self._direction(table) | {
-            "stiffness": self.number(table, "stiffness", "N/m", f"{name}: stiffness", positive=True),
-            "damping": self.number(table, "damping", "N.s/m", f"{name}: damping", default=0.0, minimum=0.0),
+            "stiffness": self.number(table, "stiffness", "N/m", f"{name}: stiffness", _STOP),
+            "damping": self.number(table, "damping", "N.s/m", f"{name}: damping", _DAMPING, default=0.0),
         }
         if not (table.has("shortest") or table.has("longest")):
             table.problem("", "needs a length 'shortest' or 'longest'")
         for key in ("shortest", "longest"):
             if table.has(key):
-                given[key] = self.number(table, key, "m", f"{name}: {key} length without force")
+                given[key] = self.number(table, key, "m", f"{name}: {key} length without force", _LENGTH)
         return given
 
     def _bushing(self, name: str, table: Table) -> dict[str, Any]:
@@ -443,15 +475,15 @@ class _Reader:
             "rotation_damping": "N.m.s/rad",
         }
         return {
-            key: self.triple(table, key, unit, f"{name}: {key.replace('_', ' ')}", default=zero, minimum=0.0)
+            key: self.triple(table, key, unit, f"{name}: {key.replace('_', ' ')}", _BUSHING[unit], default=zero)
             for key, unit in units.items()
         }
 
     def _friction(self, name: str, table: Table) -> Force:
         slides = table.has("force")
         key, unit, rate = ("force", "N", "m/s") if slides else ("moment", "N.m", "rad/s")
-        level = self.number(table, key, unit, f"{name}: friction {key}", minimum=0.0)
-        transition = self.number(table, "transition", rate, f"{name}: speed of transition", positive=True)
+        level = self.number(table, key, unit, f"{name}: friction {key}", _FRICTION)
+        transition = self.number(table, "transition", rate, f"{name}: speed of transition", _TRANSITION)
         joint = table.text("joint")
         return Force(name, "joint_friction", joint=joint, friction=level, transition=transition)
 
@@ -461,7 +493,7 @@ class _Reader:
             return None
         return Strip(
             self._body_name(table, "body"),
-            self.number(table, "height", "m", "height of the strip above its body's centre", default=0.0),
+            self.number(table, "height", "m", "height of the strip above its body's centre", _LENGTH, default=0.0),
         )
 
     def _assembly(self) -> Assembly:
@@ -471,7 +503,7 @@ class _Reader:
         return Assembly(
             self._body_name(table, "body") if table.has("body") else "",
             table.text("coordinate", default="z", choices=COORDINATES),
-            table.quantity("largest_gap", "m", default=0.02, positive=True),
+            table.quantity("largest_gap", "m", default=0.02, minimum=_GAP.minimum, maximum=_GAP.maximum),
         )
 
     def number(
@@ -480,14 +512,13 @@ class _Reader:
         name: str,
         unit: str,
         description: str,
+        within: Range,
         *,
         default: float | None = None,
-        minimum: float = -np.inf,
-        positive: bool = False,
     ) -> float:
         """Read a value and list it as a parameter."""
-        value = table.quantity(name, unit, default=default, minimum=minimum, positive=positive)
-        self._list(table, name, "", value, unit, description, 0.0 if positive else minimum)
+        value = table.quantity(name, unit, default=default, minimum=within.minimum, maximum=within.maximum)
+        self._list(table, name, "", value, unit, description, within)
         return value
 
     def triple(
@@ -496,22 +527,21 @@ class _Reader:
         name: str,
         unit: str,
         description: str,
+        within: Range,
         *,
         default: Triple | None = None,
-        minimum: float = -np.inf,
-        positive: bool = False,
     ) -> Triple:
         """Read three values and list them as parameters NAME.x, .y, .z."""
         value = table.quantities(
-            name, unit, length=3, default=default, minimum=minimum, positive=positive
+            name, unit, length=3, default=default, minimum=within.minimum, maximum=within.maximum
         )
         for label, component in zip(_COMPONENTS.get(name, _XYZ), value, strict=True):
             text = f"{description}, {label}"
-            self._list(table, name, label, component, unit, text, 0.0 if positive else minimum)
+            self._list(table, name, label, component, unit, text, within)
         return value[0], value[1], value[2]
 
     def _list(
-        self, table: Table, name: str, label: str, value: float, unit: str, description: str, minimum: float
+        self, table: Table, name: str, label: str, value: float, unit: str, description: str, within: Range
     ) -> None:
         key = table.key(name)
         origin = table.provenance.get(key)
@@ -521,13 +551,14 @@ class _Reader:
                 value,
                 unit,
                 description,
-                minimum=minimum if np.isfinite(minimum) else None,
+                minimum=within.minimum,
+                maximum=within.maximum,
                 source=origin.source if origin is not None else "choice: default",
             )
         )
 
-    def _plain_triple(self, table: Table, name: str, unit: str) -> Triple:
-        value = table.quantities(name, unit, length=3)
+    def _plain_triple(self, table: Table, name: str, unit: str, within: Range = _ANY) -> Triple:
+        value = table.quantities(name, unit, length=3, minimum=within.minimum, maximum=within.maximum)
         return value[0], value[1], value[2]
 
     def _axis(self, table: Table, name: str) -> Triple:

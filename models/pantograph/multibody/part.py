@@ -10,6 +10,7 @@ import numpy as np
 
 from models.energy import NO_BALANCE
 from models.extrapolation import ForceExtrapolation, lead_of
+from models.pantograph.multibody.advice import working_height_warning
 from models.pantograph.multibody.assembly import project
 from models.pantograph.multibody.definition import MechanismDefinition
 from models.pantograph.multibody.energy import MechanismBalance
@@ -257,6 +258,11 @@ class MultibodyPantographPart:
     def observation_values(self) -> FloatArray:
         """Return the values of ``observed``."""
         return self._observation.copy()
+
+    def working_height_warning(self, x: float, z: float) -> str:
+        """Say so if the wire above the start, at (x, z) [m], is higher than the lifting value is for."""
+        built = self._ready()
+        return working_height_warning(built.mechanism, built.standing, x, z)
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""

@@ -12,7 +12,7 @@ import pytest
 
 from master.algorithm import make_algorithm
 from master.cli import main
-from master.errors import ScenarioError, SlaveError, UsageError
+from master.errors import RequestError, ScenarioError, SlaveError
 from master.fmu.typed_values import TEXTS
 from master.isolation import Isolation
 from master.run import Manner, loaded, run
@@ -251,7 +251,7 @@ def test_texts_are_exchanged(scenario, tmp_path):
     assert "a.s_out" not in ran(folder, tmp_path)
     with pytest.raises(SlaveError, match="between processes only numbers are exchanged"):
         ran(folder, tmp_path, Manner(isolation=Isolation()))
-    with pytest.raises(UsageError, match=r"'a\.s_out' is a text"):
+    with pytest.raises(RequestError, match=r"'a\.s_out' is a text"):
         ran(folder, tmp_path, Manner(checkpoint=0.5))
 
 

@@ -18,6 +18,9 @@ WIRE = '<ssd:Connection startElement="{}" startConnector="{}" endElement="{}" en
 ENDS = [f"{end}.{kind}{axis}" for end in "AB" for kind in ("", "v") for axis in "xyz"]
 POINT = [f"contact.{n}" for n in ("force", "x", "y", "z")]
 
+#: What the toy pantograph passes in 0.2 s.
+PASSED = '<panto:Interval start="2" end="9"/>'
+
 
 def nest(text, attribute="", body="/>", before=""):
     """The toy scenario with its pantograph in a system ``train``, in a system ``consist``.
@@ -61,7 +64,7 @@ def force(folder, out):
 
 @pytest.fixture
 def flat(toy, toy_text, tmp_path):
-    (toy / "SystemStructure.ssd").write_text(toy_text(stop="0.2"))
+    (toy / "SystemStructure.ssd").write_text(toy_text(PASSED, stop="0.2"))
     return force(toy, tmp_path / "flat").tolist()
 
 
@@ -77,7 +80,7 @@ def problems(folder):
 
 
 def test_nested_systems_give_the_same_numbers(toy, toy_text, flat, tmp_path):
-    rewrite(toy, nest(toy_text(stop="0.2")))
+    rewrite(toy, nest(toy_text(PASSED, stop="0.2")))
     assert force(toy, tmp_path / "nested").tolist() == flat
     with open_scenario(toy, build=False) as scenario:
         assert [c.name for c in scenario.system.components] == ["catenary", "consist.train.pantograph"]
@@ -87,7 +90,7 @@ def test_nested_systems_give_the_same_numbers(toy, toy_text, flat, tmp_path):
 def test_transformations_on_the_way_are_applied_in_turn(toy, toy_text, flat, tmp_path):
     """What leaves the train is doubled: halved again outside, it is the same."""
     twice = '><ssc:LinearTransformation factor="FACTOR"/></ssd:Connection>'
-    text = nest(toy_text(stop="0.2"), body=twice)
+    text = nest(toy_text(PASSED, stop="0.2"), body=twice)
     whole, wires = text, re.search(r"<ssd:Connections>\s.*</ssd:Connections>", text, re.DOTALL)[0]
     half, double = (f'><ssc:LinearTransformation factor="{f}"/></ssd:Connection>' for f in ("0.5", "2"))
     lines = wires.splitlines()
@@ -168,7 +171,7 @@ def test_mistakes_in_a_mapping_are_found_with_file_and_line(toy, toy_text):
 
 
 def test_version_2_with_what_1_had(toy, toy_text, flat, tmp_path):
-    text = nest(toy_text(stop="0.2")).replace('version="1.0" name="toy"', 'version="2.0" name="toy"')
+    text = nest(toy_text(PASSED, stop="0.2")).replace('version="1.0" name="toy"', 'version="2.0" name="toy"')
     rewrite(toy, text)
     ssv = toy / "parameters.ssv"
     ssv.write_text(ssv.read_text().replace('version="1.0" name=', 'version="2.0" name='))
@@ -235,7 +238,7 @@ def test_validate_lists_all_problems_at_once(toy, toy_text, capsys):
 
 
 def test_unused_root_outputs_do_no_harm(toy, toy_text, flat, tmp_path):
-    text = toy_text(stop="0.2").replace(
+    text = toy_text(PASSED, stop="0.2").replace(
         '<ssd:System name="toy">', f'<ssd:System name="toy"><ssd:Connectors>{OUTPUT.format("f", "")}</ssd:Connectors>'
     )
     wire = '<ssd:Connection startElement="catenary" startConnector="pantograph[1].contact.force" endConnector="f"/>'

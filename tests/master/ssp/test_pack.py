@@ -7,7 +7,7 @@ import pytest
 
 from master.errors import MasterError
 from master.ssp.archive import open_package
-from master.ssp.pack import pack
+from master.ssp.pack import left_out, pack
 
 
 def test_same_files_same_bytes_whatever_their_times_and_modes(toy, tmp_path):
@@ -44,3 +44,14 @@ def test_links_are_refused(toy, tmp_path):
     with pytest.raises(MasterError, match="symbolic link"):
         pack(toy, tmp_path / "a.ssp")
     assert not list(tmp_path.glob("a.ssp*"))
+
+
+def test_what_the_description_does_not_name_stays_out(toy, tmp_path):
+    """The FMU of a pantograph that was replaced is somebody's data."""
+    (toy / "resources" / "Secret.fmu").write_bytes(b"the old pantograph")
+    (toy / "notes.txt").write_text("mine")
+    with zipfile.ZipFile(pack(toy, tmp_path / "a.ssp")) as file:
+        names = file.namelist()
+    assert left_out(toy) == ("notes.txt", "resources/Secret.fmu")
+    assert not set(names) & set(left_out(toy))
+    assert "resources/ToyPantograph.fmu" in names

@@ -2,7 +2,7 @@
 
 import pytest
 
-from master.errors import MasterError, ScenarioError, UsageError
+from master.errors import MasterError, RequestError, ScenarioError
 from master.study.family import family_names, load_family, store_values
 
 
@@ -29,7 +29,7 @@ def test_families_are_found_by_name(family_folder):
     root = family_folder.parent
     assert family_names(root) == ("toy",)
     assert load_family("toy", root).folder == root / "toy.ssp"
-    with pytest.raises(UsageError, match="no study 'boy'; known: toy"):
+    with pytest.raises(RequestError, match="no study 'boy'; known: toy"):
         load_family("boy", root)
 
 
@@ -37,7 +37,7 @@ def test_variants_are_chosen_by_name(family_folder):
     family = load(family_folder)
     assert [v.name for v in family.chosen(["hard, heavy"])] == ["hard, heavy"]
     assert family.chosen([]) == family.variants
-    with pytest.raises(UsageError, match="no variant 'firm'; known: soft; hard, heavy"):
+    with pytest.raises(RequestError, match="no variant 'firm'; known: soft; hard, heavy"):
         family.chosen(["firm"])
 
 

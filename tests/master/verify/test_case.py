@@ -2,7 +2,7 @@
 
 import pytest
 
-from master.errors import ScenarioError, UsageError
+from master.errors import RequestError, ScenarioError
 from master.verify.case import CASES, find_cases, load_case, load_cases
 
 GOOD = """
@@ -101,7 +101,7 @@ def test_all_mistakes_of_all_files_at_once(tmp_path):
 
 
 def test_unknown_cases_name_the_nearest():
-    with pytest.raises(UsageError, match="did you mean 'cx_ln2'"):
+    with pytest.raises(RequestError, match="did you mean 'cx_ln2'"):
         find_cases(["cx_ln"])
 
 

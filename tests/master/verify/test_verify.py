@@ -121,7 +121,7 @@ def test_quiet_and_json(case, in_folder, capsys):
 
 
 def test_wrong_command_lines_and_files(case, capsys):
-    assert _verify("no_such_case") == 2
+    assert _verify("no_such_case") == 1
     assert "there is no case 'no_such_case'" in " ".join(capsys.readouterr().err.split())
     assert _verify(case("title = 3")) == 1
     assert "toy.toml: title" in capsys.readouterr().err

@@ -229,7 +229,8 @@ def test_is_the_same_with_and_without_kernels(short_line, cx, highest, monkeypat
 @pytest.mark.parametrize("name", line_names())
 def test_every_line_of_the_library_steps_with_few_modes(name):
     model = reduced(load_line(name), 15.0, **{"mesh.elements_between_droppers": 2})
-    assert model.modes.followers or name == "EN50318_2002"  # whose intervals are long
+    long_or_slow = ("EN50318_2002", "CA160", "CA220")  # every interval has a mode below 15 Hz
+    assert model.modes.followers or name in long_or_slow
     x = 0.5 * sum(model.wires[0].ends)
     wire = model.static.positions[model.mesh.contact_chains()[0].nodes]
     z = np.interp(x, wire[:, 0], wire[:, 2]) + 0.03
@@ -245,8 +246,8 @@ def test_every_line_of_the_library_steps_with_few_modes(name):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (-1.0, "-1 Hz is outside 0 ... 1e+09 Hz"),
-        (1e10, "1e+10 Hz is outside 0 ... 1e+09 Hz"),
+        (-1.0, "-1 Hz is outside 0 ... 1e+09 Hz: check its size and its unit"),
+        (1e10, "1e+10 Hz is outside 0 ... 1e+09 Hz: check its size and its unit"),
         (float("nan"), "nan is not finite, or larger than anything here can be (1e+15)"),
     ],
 )

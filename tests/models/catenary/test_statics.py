@@ -188,7 +188,7 @@ def test_command_writes_tables_and_plots_of_every_line(name, tmp_path, capsys):
     ],
 )
 def test_wrong_input_is_told_on_one_line(arguments, message, capsys):
-    assert main(["statics", *arguments]) == 2
+    assert main(["statics", *arguments]) == 1
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1

@@ -1,0 +1,60 @@
+"""Whether a record covers the interval of interest: figures of a part of it are not those of the interval."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from master.arrays import FloatArray
+from master.contacts import Contact, strip_centre, track_position
+from master.recorder import Recording
+
+Interval = tuple[float | None, float | None]
+
+
+def shortfall(recording: Recording, contacts: Iterable[Contact], interval: Interval) -> str:
+    """Return what of the interval a record lacks, empty if every contact has passed all of it.
+
+    Parameters
+    ----------
+    recording : Recording
+        The one at every step.
+    contacts : iterable of Contact
+    interval : tuple
+        Start and end [m]; None where it has none.
+
+    Examples
+    --------
+    >>> run = Recording(np.array([0.0, 1.0]), ("c.force", "c.x"), ("N", "m"), np.array([[1.0, 40.0], [1.0, 90.0]]))
+    >>> shortfall(run, [Contact(1, "line", "train", "c")], (50.0, 100.0))
+    "the run ends with 'train' at 90 m, before the end of the interval of interest, 100 m"
+    """
+    if not len(recording.time):
+        return ""
+    found = (_lacking(_place(recording, c), c.pantograph, interval) for c in contacts if c.force in recording)
+    return next(filter(None, found), "")
+
+
+def _place(recording: Recording, contact: Contact) -> FloatArray:
+    centre = strip_centre(recording, contact, "x")
+    return track_position(recording, contact) if centre is None else centre
+
+
+def _lacking(x: FloatArray, pantograph: str, interval: Interval) -> str:
+    start, end = interval
+    stride = float(np.abs(np.diff(x)).max(initial=0.0))  # a bound between two samples has been passed
+    first, last = float(x.min()), float(x.max())
+    if end is not None and last + stride < end:
+        where = f"{x[-1]:.6g} m, before the end of the interval of interest, {end:g} m"
+        return f"the run ends with '{pantograph}' at {where}"
+    if start is not None and first - stride > start:
+        where = f"{x[0]:.6g} m, beyond the start of the interval of interest, {start:g} m"
+        return f"the run begins with '{pantograph}' at {where}"
+    return ""
+
+
+def never_touched(recording: Recording, contacts: Iterable[Contact]) -> str:
+    """Return the pantograph that no force was told in all of a record, empty if there is none."""
+    silent = (c.pantograph for c in contacts if c.force in recording and not np.any(recording[c.force] > 0.0))
+    return next(silent, "")

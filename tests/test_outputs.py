@@ -97,7 +97,7 @@ def test_an_fmu_that_cannot_be_written_is_named(tmp_path, monkeypatch):
 
 def test_a_pack_that_does_not_fit_leaves_the_old_one(tmp_path, monkeypatch):
     (tmp_path / "s.ssp").mkdir()
-    (tmp_path / "s.ssp" / "SystemStructure.ssd").write_text("x" * 1000)
+    (tmp_path / "s.ssp" / "SystemStructure.ssd").write_text(f"<a>{'x' * 1000}</a>")
     archive = tmp_path / "out.ssp"
     archive.write_text("old")
     monkeypatch.setattr(durable.os, "fsync", full)

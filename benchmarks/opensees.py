@@ -301,7 +301,7 @@ def our_history(run: Run) -> History:
     for x in run.path.tolist():
         run.model.push(state, STEP, [(0, x, run.force)])
         uplift.append(run.model.uplift(state).copy())
-        dropper_force.append(run.model.dropper_force(state))
+        dropper_force.append(np.maximum(run.model.spring_force(state), 0.0))  # OpenSees tells no damper's share
     return History(np.array(uplift), np.array(dropper_force))
 
 

@@ -428,7 +428,10 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         run = slice(first, last + 1)
         if self._references[run] == references:
             return run, first, last
-        return references, min(references), max(references)
+        highest = max(references)
+        if highest >= len(self._references):
+            raise AdapterError(f"the FMU has no variable with value reference {highest}")
+        return references, min(references), highest
 
     def _set_one_by_one(self, references: Sequence[int], values: Sequence[float]) -> None:
         for reference, value in zip(references, values, strict=True):

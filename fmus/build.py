@@ -12,7 +12,7 @@ import tempfile
 import tomllib
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -51,6 +51,7 @@ MAX_PORTS = 16
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
 #: In every FMU of ours: what it is, for the loader and for whoever wants to know whether it may be replaced.
 MARK = "resources/openpanto.txt"
+DESCRIPTION_XML = "modelDescription.xml"
 #: Where a standalone FMU holds its own Python.
 RUNTIME = "resources/runtime"
 
@@ -156,7 +157,7 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     BuildError
         If the file is not there, or is no definition.
     """
-    if name.endswith(".toml"):
+    if name.lower().endswith(".toml"):
         return _own_recipe(Path(name), pantographs or 1)
     kind, _, rest = name.partition("_")
     stem, ports = _split_ports(rest, pantographs)
@@ -292,7 +293,10 @@ def _with_runtime(files: Mapping[str, bytes], name: str, runtime: Mapping[str, b
         files = with_windows_loader(files, name) if is_for_windows else with_loader(files, name)
     except LoaderError as error:
         raise BuildError(f"{name} cannot be standalone: {error}") from error
-    return {**files, **{f"{RUNTIME}/{inner}": data for inner, data in runtime.items()}}
+    brought = {f"{RUNTIME}/{inner}": data for inner, data in runtime.items()}
+    # pythonfmu's description asks for a tool, Python, on the machine.
+    description = files[DESCRIPTION_XML].replace(b'needsExecutionTool="true"', b'needsExecutionTool="false"')
+    return {**files, **brought, DESCRIPTION_XML: description}
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:
@@ -477,7 +481,7 @@ def _describe(
         with _importable(folder, (sources.package, script)):
             slave = _instance(wanted, script, folder)
             return {
-                "modelDescription.xml": _description(slave.to_xml()),
+                DESCRIPTION_XML: _description(slave.to_xml()),
                 "documentation/index.html": _page(wanted, sources, slave),
             }
 
@@ -485,9 +489,12 @@ def _describe(
 def _instance(wanted: Recipe, script: str, folder: str) -> Any:
     try:
         slave_class = getattr(importlib.import_module(script), wanted.name)
-        return slave_class(instance_name=wanted.name, resources=folder)
+        with redirect_stderr(io.StringIO()):  # an adapter tells hosts there what is raised here as well
+            return slave_class(instance_name=wanted.name, resources=folder)
     except Exception as error:
-        raise BuildError(f"{wanted.name} cannot be built: {error}") from error
+        # The user's file, not the copy of it that is gone by now.
+        text = str(error).replace(str(Path(folder) / "definition.toml"), str(wanted.definition))
+        raise BuildError(f"{wanted.name} cannot be built: {text}") from error
 
 
 def _description(root: Element) -> bytes:

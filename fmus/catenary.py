@@ -39,7 +39,8 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "dynamics.geometric_stiffness is 0; a dropper that goes slack in the run keeps that, an error of second order "
         "in a lateral force.",
         "What a slack dropper does is the definition's slack_law: with tension it carries nothing, with elastic_only, "
-        "the form of the 2012 thesis, its damper goes on acting, beside the elastic force that dropper[...].force is.",
+        "the form of the 2012 thesis, its damper goes on acting. dropper[...].force is all that a dropper carries, the "
+        "damper's part included; dropper[...].slack says whether it is slack.",
         "The contact is unilateral, without friction along the strip.",
         "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
@@ -60,7 +61,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         return Ports(
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
-            local=(_dropper_port(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
+            local=(*_dropper_ports(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
             calculated=(
                 *_geometry_ports(part),
                 *_section_ports(part),
@@ -130,12 +131,18 @@ def _uplift_port(part: CatenaryPart) -> Port:
     return Port(signals, attrgetter("support_uplift"))
 
 
-def _dropper_port(part: CatenaryPart) -> Port:
-    signals = tuple(
-        Signal(f"dropper[{j}].force", "N", f"tension of dropper {d.name}, x = {d.x:g} m")
-        for j, d in enumerate(part.droppers, 1)
+def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:
+    told = (("force", "N", "tension of"), ("slack", "1", "1 while it is slack, else 0:"))
+    return tuple(
+        Port(
+            tuple(
+                Signal(f"dropper[{j}].{name}", unit, f"{text} dropper {d.name}, x = {d.x:g} m")
+                for j, d in enumerate(part.droppers, 1)
+            ),
+            attrgetter(f"dropper_{name}"),
+        )
+        for name, unit, text in told
     )
-    return Port(signals, attrgetter("dropper_force"))
 
 
 def _geometry_ports(part: CatenaryPart) -> tuple[Port, ...]:

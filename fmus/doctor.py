@@ -158,13 +158,16 @@ def read_package(path: Path) -> Package:
 
 def ask(name: str | None = None) -> Interpreter | None:
     """Ask an interpreter (default: the one that tools take) what it has; None if it cannot be run."""
-    command = [name or interpreter_name(), "-c", PROBE.read_text(encoding="utf-8")]
+    name = name or interpreter_name()
+    command = [name, "-c", PROBE.read_text(encoding="utf-8")]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return None
-    lines = [*done.stdout.splitlines(), "", "", "", ""]
-    return Interpreter(*lines[:4]) if done.returncode == 0 and lines[1] else None
+    _, _, answers = done.stdout.partition("openpanto_probe:\n")  # what a site's own code prints comes before
+    lines = [*answers.splitlines(), "", "", "", ""]
+    # Without PATH it does not know its own place.
+    return Interpreter(lines[0] or name, *lines[1:4]) if done.returncode == 0 and lines[1] else None
 
 
 def interpreter_name() -> str:

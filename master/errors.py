@@ -35,12 +35,14 @@ def printable(text: str) -> str:
     >>> print(printable("red\x1b[31m\nnext"))
     red\x1b[31m
     next
+    >>> printable("8\N{NO-BREAK SPACE}%") == "8\N{NO-BREAK SPACE}%"
+    True
     """
     return text if text.isprintable() else "".join(c if c == "\n" else _shown(c) for c in text)
 
 
 def _shown(c: str) -> str:
-    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
+    return c if c.isprintable() or c == "\N{NO-BREAK SPACE}" else c.encode("unicode_escape").decode("ascii")
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,15 @@ alike. An event is as exact in time as its variable is recorded often.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from master.arrays import BoolArray
+from master.arrays import BoolArray, FloatArray
 from master.contacts import Contact, lateral_position, strip_centre, track_position
-from master.line import Geometry
+from master.line import Geometry, Slackness, slackness
 from master.recorder import Recording
 
 LOST: Final = "contact lost"
@@ -23,7 +22,6 @@ AT_END: Final = "wire beyond the strip's end"
 SLACK: Final = "slack"
 #: Most events that are listed; a line whose droppers chatter has no end of them.
 MOST_EVENTS: Final = 1000
-_TENSIONED: Final = re.compile(r"(?P<component>.+?)\.(?P<name>(?:dropper|support)\[\d+\])\.force")
 
 
 @dataclass(frozen=True)
@@ -57,8 +55,7 @@ def find_events(
 ) -> tuple[Event, ...]:
     """Return the events of a run in the order of their beginnings."""
     found = [e for contact in contacts if len(recordings[0].time) for e in _of_contact(recordings[0], contact)]
-    for recording in recordings:
-        found += [e for name in recording.names for e in _of_tension(recording, name, geometry)]
+    found += [e for each in slackness(recordings) for e in _of_slackness(each, geometry)]
     return tuple(sorted(found, key=lambda e: (e.time, e.kind, e.what)))
 
 
@@ -68,9 +65,9 @@ def _of_contact(recording: Recording, contact: Contact) -> Iterator[Event]:
     touches = recording[contact.force] > 0.0
     where = track_position(recording, contact)
     for first, last in _spells(_after_first(touches) & ~touches):
-        yield _event(LOST, contact.pantograph, recording, first, last, float(where[first]))
+        yield _event(LOST, contact.pantograph, recording.time, first, last, float(where[first]))
     for first, last in _spells(_beyond_end(recording, contact)):
-        yield _event(AT_END, contact.pantograph, recording, first, last, float(where[first]))
+        yield _event(AT_END, contact.pantograph, recording.time, first, last, float(where[first]))
 
 
 def _beyond_end(recording: Recording, contact: Contact) -> BoolArray:
@@ -83,19 +80,15 @@ def _beyond_end(recording: Recording, contact: Contact) -> BoolArray:
     return beyond
 
 
-def _of_tension(recording: Recording, name: str, geometry: Geometry) -> Iterator[Event]:
-    match = _TENSIONED.fullmatch(name)
-    if match is None or not len(recording.time):
-        return
-    tight = recording[name] > 0.0
-    where = geometry.get(match["component"], {}).get(f"{match['name']}.x")
-    for first, last in _spells(_after_first(tight) & ~tight):
-        yield _event(SLACK, f"{match['component']}.{match['name']}", recording, first, last, where)
+def _of_slackness(found: Slackness, geometry: Geometry) -> Iterator[Event]:
+    where = geometry.get(found.component, {}).get(f"{found.name}.x")
+    for first, last in _spells(_after_first(~found.slack) & found.slack):
+        yield _event(SLACK, f"{found.component}.{found.name}", found.time, first, last, where)
 
 
-def _event(kind: str, what: str, recording: Recording, first: int, last: int, where: float | None) -> Event:
-    time, end = recording.time[first], recording.time[min(last, len(recording.time) - 1)]
-    return Event(kind, what, float(time), float(end - time), where, last == len(recording.time))
+def _event(kind: str, what: str, times: FloatArray, first: int, last: int, where: float | None) -> Event:
+    time, end = times[first], times[min(last, len(times) - 1)]
+    return Event(kind, what, float(time), float(end - time), where, last == len(times))
 
 
 def _after_first(state: BoolArray) -> BoolArray:

@@ -6,7 +6,7 @@ import hashlib
 import math
 import re
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +14,7 @@ import fmpy
 
 from master.ssp.archive import read_member
 from master.ssp.units import BASE_UNITS, Unit
-from master.ssp.xml import XmlError, safe_root
+from master.ssp.xml import XmlError, is_one_line, safe_root
 from master.system import Fmu, Variable
 
 _DESCRIPTION: Final = "modelDescription.xml"
@@ -33,7 +33,8 @@ def read_fmu(path: Path) -> Fmu:
         With the reason, if it is not one.
     """
     try:
-        _check_variables(safe_root(read_member(path, _DESCRIPTION)))
+        root = safe_root(read_member(path, _DESCRIPTION))
+        _check_variables(root)
     except XmlError as error:
         raise ValueError(f"is not a readable FMU ({_DESCRIPTION}:{error.line}: {error})") from error
     except ValueError as error:
@@ -54,13 +55,14 @@ def read_fmu(path: Path) -> Fmu:
         path=path,
         guid=description.guid or "",
         identifier=identifier,
-        variables=_variables(description.modelVariables),
+        variables=_variables(description.modelVariables, _differences(root)),
         can_restore=bool(description.coSimulation.canGetAndSetFMUstate),
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         tool=description.generationTool or "",
         can_serialise=bool(description.coSimulation.canSerializeFMUstate),
         units=_units(description.unitDefinitions, f"{path.name} ({_DESCRIPTION})"),
         tolerance=_tolerance(description.defaultExperiment),
+        is_single=bool(description.coSimulation.canBeInstantiatedOnlyOncePerProcess),
     )
 
 
@@ -107,19 +109,22 @@ def _check_variables(root: Any) -> None:
         if not (node.get("name") and reference.isascii() and reference.isdigit() and int(reference[:11]) < 2**32):
             text = f"a variable name='{node.get('name', '')}' with valueReference='{reference}' cannot be addressed"
             raise XmlError(int(node.sourceline or 0), text)
+        if not is_one_line(node.get("name")):  # FMI has names in one line, and so have the tables of a run
+            raise XmlError(int(node.sourceline or 0), f"the variable name {node.get('name')!r} is not one line of text")
 
 
-def _variables(declared: Sequence[Any]) -> dict[str, Variable]:
+def _variables(declared: Sequence[Any], differences: Mapping[str, bool]) -> dict[str, Variable]:
     found: dict[str, Variable] = {}
     for v in declared:
         if v.name in found:
             raise ValueError(f"declares the variable '{v.name}' twice")
-        found[v.name] = _variable(v)
+        found[v.name] = _variable(v, differences.get(v.name))
     return found
 
 
-def _variable(v: Any) -> Variable:
+def _variable(v: Any, is_difference: bool | None) -> Variable:
     unit = v.unit or (v.declaredType.unit if v.declaredType is not None else None) or ""
+    of_type = bool(getattr(v.declaredType, "relativeQuantity", False))
     return Variable(
         name=v.name,
         reference=v.valueReference,
@@ -133,7 +138,15 @@ def _variable(v: Any) -> Variable:
         description=v.description or "",
         initial=v.initial or "",  # FMPy knows the defaults of the standard
         items=_items(v),
+        is_difference=of_type if is_difference is None else is_difference,
     )
+
+
+def _differences(root: Any) -> dict[str, bool]:
+    """Return which variables say of themselves whether they are relative quantities: FMPy asks their types alone."""
+    reals = ((v.get("name"), v.find("Real")) for v in root.iter("ScalarVariable"))
+    said = ((name, real.get("relativeQuantity")) for name, real in reals if real is not None)
+    return {name: text in ("true", "1") for name, text in said if text is not None}
 
 
 def _items(v: Any) -> tuple[tuple[str, int], ...]:
@@ -145,7 +158,7 @@ def _items(v: Any) -> tuple[tuple[str, int], ...]:
 
 
 def _limit(v: Any, name: str) -> float | None:
-    text = getattr(v, name)
+    text = getattr(v, name, None) or getattr(v.declaredType, name, None)
     if text is None:
         return None
     try:

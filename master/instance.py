@@ -28,8 +28,10 @@ _STATUS: Final = ("ok", "warning", "discard", "error", "fatal", "pending")
 _GOOD: Final = (0, 1)
 #: After these an instance must not be called any more; nor after a number that FMI does not know.
 _LIVING: Final = range(4)
-
-
+_DISCARD: Final = 2
+#: Kinds of fmi2StatusKind: the time of the last step that succeeded, and whether the FMU wants to end.
+_LAST_TIME: Final = 2
+_TERMINATED: Final = 3
 #: Largest state that is taken from an FMU [bytes].
 LONGEST_STATE: Final = 1 << 30
 
@@ -199,7 +201,7 @@ class Instance:
         status = self._do_step(self.handle, time, step, 1)
         self.stepping_time += perf_counter() - began
         if status not in _GOOD:
-            raise self.error("a step", status)
+            raise self.error("a step", status, self._ended() if status == _DISCARD else "")
 
     def save(self) -> c_void_p:
         """Return the FMU's state; hand it back to `release`."""
@@ -273,14 +275,28 @@ class Instance:
         self._unpacked.remove()
         return said
 
-    def error(self, doing: str, status: int) -> SlaveError:
-        """Return the error for a failed call, in the FMU's own words if it said any."""
+    def error(self, doing: str, status: int, why: str = "") -> SlaveError:
+        """Return the error for a failed call, with what is known of it and in the FMU's own words if it said any."""
         self._dead = self._dead or status not in _LIVING
         label = _STATUS[status] if 0 <= status < len(_STATUS) else f"{status}, which FMI does not know"
-        said = fmi_log.last_words(self.name) or "the FMU gave no reason"
+        words = fmi_log.last_words(self.name)
+        said = f"{why}; it said: {words}" if why and words else why or words or "the FMU gave no reason"
         at = f" at t = {self.time:.6g} s" if self.time == self.time else ""
         who = f"component '{self.name}' ({self.component.fmu.path.name})"
         return SlaveError(f"{who} failed in {doing}{at}, status {label}: {said}")
+
+    def _ended(self) -> str:
+        """Return in words that the FMU has ended the simulation itself, empty if it has not [FMI 2.0.4, 4.2.3]."""
+        ends, time = c_int(0), c_double(self.time)
+        try:
+            status = self.function("fmi2GetBooleanStatus")(self.handle, _TERMINATED, byref(ends))
+            if status != 0 or not ends.value:
+                return ""
+            if self.function("fmi2GetRealStatus")(self.handle, _LAST_TIME, byref(time)) != 0:
+                time.value = self.time
+        except AttributeError:  # some libraries leave out what they do not use
+            return ""
+        return f"the FMU has ended the simulation at t = {time.value:.6g} s, before the stop time"
 
     def _call(self, doing: str, function: str, *arguments: Any) -> None:
         status = self.function(function)(self.handle, *arguments)

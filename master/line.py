@@ -1,16 +1,16 @@
-"""The line's static geometry and the supports' uplift, as the catenary FMU reports them."""
+"""The line's static geometry, the supports' uplift and what is slack, as the catenary FMU reports them."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from master.arrays import FloatArray
+from master.arrays import BoolArray, FloatArray
 from master.evaluation.filters import stands_in
 from master.network import Network
 from master.recorder import Recording
@@ -21,6 +21,7 @@ PERIOD: Final = "period"
 #: Most laps on a line that closes on itself.
 _MOST_LAPS: Final = 10_000
 _INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
+_TENSIONED: Final = re.compile(r"(.+?)\.((?:support|dropper)\[\d+\])\.(force|slack)")
 
 #: Values of one component's calculated parameters by variable name.
 Geometry = dict[str, dict[str, float]]
@@ -65,6 +66,28 @@ class Uplift:
     def stands_in(self, interval: tuple[float | None, float | None]) -> bool:
         """Return whether the support stands in an interval of the track [m], its ends included."""
         return stands_in(self.x, interval, self.period)
+
+
+@dataclass(frozen=True)
+class Slackness:
+    """When a dropper is slack, or a support whose force is recorded.
+
+    Attributes
+    ----------
+    component : str
+        The catenary.
+    name : str
+        ``dropper[n]`` or ``support[n]``.
+    time : ndarray, shape (n,)
+        When it is recorded [s].
+    slack : ndarray of bool, shape (n,)
+        Whether it is slack then.
+    """
+
+    component: str
+    name: str
+    time: FloatArray
+    slack: BoolArray
 
 
 class GeometryObserver:
@@ -229,6 +252,31 @@ def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:
         {k: v for k, v in geometry.items() if (m := _INDEXED.fullmatch(k)) and owner.get((m[1], m[2])) == section}
         for section in sorted(set(owner.values()))
     )
+
+
+def slackness(recordings: Iterable[Recording]) -> tuple[Slackness, ...]:
+    """Return when droppers and supports are slack, of which that is recorded.
+
+    A line says it itself, by ``dropper[n].slack``, as a slack dropper whose damper goes on acting carries something all
+    the same. Of one that does not (a foreign line, results of an older version) what pulls by nothing is slack.
+
+    Examples
+    --------
+    >>> names = ("line.dropper[1].force", "line.dropper[1].slack", "line.dropper[2].force")
+    >>> values = np.array([[50.0, 0.0, 50.0], [-3.0, 1.0, 50.0], [8.0, 1.0, 0.0]])
+    >>> found = slackness([Recording(np.arange(3.0), names, ("N", "1", "N"), values)])
+    >>> [(s.name, s.slack.tolist()) for s in found]
+    [('dropper[1]', [False, True, True]), ('dropper[2]', [False, False, True])]
+    """
+    told: dict[tuple[str, str], Slackness] = {}
+    pulling: dict[tuple[str, str], Slackness] = {}
+    for recording in recordings:
+        for name, values in zip(recording.names, recording.values.T, strict=True) if len(recording.time) else ():
+            match = _TENSIONED.fullmatch(name)
+            if match is not None:
+                found, slack = (pulling, values <= 0.0) if match[3] == "force" else (told, values > 0.5)
+                found.setdefault((match[1], match[2]), Slackness(match[1], match[2], recording.time, slack))
+    return tuple((pulling | told).values())
 
 
 def support_uplifts(recordings: tuple[Recording, ...], geometry: Geometry) -> tuple[Uplift, ...]:

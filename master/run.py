@@ -220,6 +220,8 @@ def loaded(
         Takes what goes wrong when they are freed.
     """
     instances: list[Instance | IsolatedInstance] = []
+    if isolation is None:
+        _check_single(system)
     try:
         with phase("loading"), heeded_at_once():
             for component in system.components:
@@ -230,6 +232,15 @@ def loaded(
     finally:
         with phase("closing"):
             _free(instances, [] if farewells is None else farewells)
+
+
+def _check_single(system: System) -> None:
+    """Refuse several instances of an FMU of which a process can hold only one."""
+    first: dict[str, str] = {}
+    for c in system.components:
+        if c.fmu.is_single and (other := first.setdefault(c.fmu.sha256, c.name)) != c.name:
+            text = f"both are of {c.fmu.path.name}, of which a process can hold only one; --isolate gives each its own"
+            raise RunError(f"components '{other}' and '{c.name}': {text}")
 
 
 def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caution]) -> None:

@@ -129,7 +129,7 @@ def load_system(
 ) -> System:
     """Read and check the files of ``package``; FMUs are built into ``scratch`` if there is one."""
     reader = Reader(SSD_NAME)
-    sources = Sources(package.root, overrides.outside)
+    sources = Sources(package.root, overrides.outside, None if package.writable else package.origin)
     structure = read_structure(sources, reader)
     if structure is EMPTY:  # without it everything would be missing
         raise ScenarioError(reader.problems)
@@ -191,6 +191,10 @@ def _fmus(
     found: dict[str, Fmu] = {}
     by_path: dict[Path, Fmu | str] = {}
     for c in components:
+        if not c.source:
+            if not any(p.line == c.line and "'source'" in p.text for p in problems):
+                problems.append(Problem(SSD_NAME, c.line, "source", f"component '{c.name}' has an empty source"))
+            continue
         path = sources.find(c.source)
         if path is None:
             text = f"'{c.source}' does not lie inside the scenario; --allow-outside DIR allows a folder beside it"
@@ -220,7 +224,7 @@ def _provide(path: Path, provision: _Provision) -> Fmu | str:
     try:
         place = store.ensure(path, provision.tell, provision.scratch) if provision.build else path
         if not place.is_file():
-            return "does not exist"
+            return "is a folder, not an FMU" if place.is_dir() else "does not exist"
         fmu = read_fmu(place)
         return lacking_binary(place, fmu.identifier) or fmu
     except ValueError as error:

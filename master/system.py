@@ -21,7 +21,8 @@ _ROUNDING: Final = 1e-6
 class Variable:
     """A variable of an FMU, as its modelDescription.xml declares it.
 
-    ``initial`` is that of the standard where the file leaves it open; ``items`` are those of an enumeration.
+    ``initial`` is that of the standard where the file leaves it open; ``items`` are those of an enumeration;
+    ``is_difference`` tells a relative quantity, to which the offset of its unit does not apply.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Variable:
     description: str = ""
     initial: str = ""
     items: tuple[tuple[str, int], ...] = ()
+    is_difference: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Fmu:
         Units that it defines, by name.
     tolerance : float, optional
         Of its default experiment.
+    is_single : bool
+        Whether a process can hold only one instance of it.
     """
 
     path: Path
@@ -74,6 +78,7 @@ class Fmu:
     can_serialise: bool = False
     units: dict[str, Unit] = field(default_factory=dict)
     tolerance: float | None = None
+    is_single: bool = False
 
 
 @dataclass(frozen=True)

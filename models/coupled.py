@@ -15,7 +15,7 @@ from models.catenary.model import CatenaryModel, ContactResult, StripMotion
 from models.contact import application_point
 from models.pantograph.lumped import LumpedModel, LumpedState
 from models.pantograph.parameters import LumpedDefinition
-from models.part import FloatArray
+from models.part import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,9 @@ class CoupledRecord:
     uplift : ndarray, shape (n, n_supports)
         [m].
     dropper_force : ndarray, shape (n, n_droppers)
-        [N].
+        What they carry under their law [N].
+    dropper_slack : ndarray of bool, shape (n, n_droppers)
+        Which ones are slack.
     """
 
     time: FloatArray
@@ -49,6 +51,7 @@ class CoupledRecord:
     strip_height: FloatArray
     uplift: FloatArray
     dropper_force: FloatArray
+    dropper_slack: BoolArray
 
 
 class CoupledModel:
@@ -119,6 +122,7 @@ class CoupledModel:
             record.strip_height[n] = [self._height(i) for i in range(len(self.states))]
             record.uplift[n] = self.line.uplift(self.line_state)
             record.dropper_force[n] = self.line.dropper_force(self.line_state)
+            record.dropper_slack[n] = self.line.dropper_slack(self.line_state)
             if progress is not None:
                 progress(n * step)
         return record
@@ -151,6 +155,7 @@ class CoupledModel:
             strip_height=np.zeros((rows, P)),
             uplift=np.zeros((rows, len(line.uplift_places))),
             dropper_force=np.zeros((rows, len(line.dropper_stiffness))),
+            dropper_slack=np.zeros((rows, len(line.dropper_stiffness)), dtype=np.bool_),
         )
 
 

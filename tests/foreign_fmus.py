@@ -13,6 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from master.errors import ScenarioError
+from master.run import Manner, run
+from master.scenario import Overrides, open_scenario
+
 SOURCE = r"""
 #include <stdlib.h>
 #include <string.h>
@@ -134,13 +138,17 @@ def description(
 """
 
 
-def compile_library(folder: Path) -> Path:
-    """Compile the FMUs' library; skips the test where there is no compiler."""
+def compile_library(folder: Path, *changes: tuple[str, str]) -> Path:
+    """Compile the FMUs' library, with other texts in places; skips the test where there is no compiler."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None or platform.system() != "Linux":
         pytest.skip("needs a C compiler on Linux")
     source, library = folder / "panel.c", folder / "panel.so"
-    source.write_text(SOURCE)
+    text = SOURCE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    source.write_text(text)
     subprocess.run([compiler, "-shared", "-fPIC", "-O0", "-o", library, source], check=True, capture_output=True)
     return library
 
@@ -225,3 +233,22 @@ def ssd(inside: str, rest: str = "", version: str = "1.0", stop: str = ' stopTim
         f'<ssd:DefaultExperiment startTime="0"{stop}>{OSP}</ssd:DefaultExperiment>\n'
         "</ssd:SystemStructureDescription>\n"
     )
+
+
+def opened(folder, **overrides):
+    with open_scenario(folder, Overrides(**overrides), build=False) as found:
+        return found.system
+
+
+def problems(folder, **overrides):
+    with pytest.raises(ScenarioError) as caught:
+        opened(folder, **overrides)
+    return [str(p) for p in caught.value.problems]
+
+
+def ran(folder, tmp_path, manner=None, **overrides):
+    """The recording of a run, by name the values at all times."""
+    with open_scenario(folder, Overrides(**overrides), build=False) as found:
+        done = run(found.system, tmp_path / "out", manner=manner or Manner())
+    recording = done.recordings[0]
+    return {name: recording[name] for name in recording.names}

@@ -40,7 +40,11 @@ def problem(resources: str, script: str) -> str:
 
 def forget(resources: str, _: str = "") -> None:
     """Take the folder out of the places that modules come from; all that is needed has been imported."""
-    sys.path[:] = [place for place in sys.path if place != resources]
+    try:
+        while True:
+            sys.path.remove(resources)  # in one piece: another thread may be adding its own FMU's folder
+    except ValueError:
+        pass
 
 
 def set_paths(places: str, content: str) -> None:

@@ -13,6 +13,9 @@
  *
  * Whatever fails is one sentence, through the host's logger and on standard error, and NULL or an error status.
  *
+ * One file, and longer than others here: an FMU's loader has one door, fmi2Instantiate, every step behind it can fail in
+ * the same way, and what is static can be seen by no other library in the host. What the system decides is in platform_*.c.
+ *
  * To be compiled in this folder (the texts of the two Python files become part of the library); with the options in
  * loader_build.py:  cc -shared -fPIC -O2 -fvisibility=hidden -s loader.c platform_posix.c -o NAME.so -lpthread
  */
@@ -48,6 +51,7 @@ INCLUDE_TEXT(openpanto_opening, "fmu_opening.py");
 
 #define TEXT 2048 /* longest sentence */
 #define LINES 64  /* most lines of a list of settings */
+#define MARK "openpanto_probe:" /* the line before the answers of python_probe.py */
 
 typedef void *Component;
 typedef void *State;
@@ -146,6 +150,16 @@ static void *refuse(const Callbacks *host, String name, Problem *problem) {
     fflush(stderr);
     tell(host, name, ERROR, NULL, problem->text);
     return NULL;
+}
+
+static Status complain(const Instance *instance, const char *format, ...) {
+    Problem problem;
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(problem.text, sizeof problem.text, format, arguments);
+    va_end(arguments);
+    refuse(&instance->host, instance->name, &problem);
+    return ERROR;
 }
 
 /* The words of an exception out of pythonfmu's report of it: "Fatal py exception ...\nAdapterError('words')". */
@@ -280,10 +294,11 @@ static char *find_folder(const char *location, Problem *problem) {
     int is_first = (first == plain || has_decoded) && platform_is_folder(first);
     int is_second = !is_first && (second == plain || has_decoded) && platform_is_folder(second);
     char *found = is_first ? first : is_second ? second : NULL;
-    if (!found) fail(problem, "the resource location '%.400s' is not a folder that exists", location);
-    if (found != plain) free(plain);
-    if (found != decoded) free(decoded);
-    return found;
+    /* Absolute: the host may work in another folder by the time it resets the instance. */
+    char *absolute = found ? platform_absolute(found) : NULL;
+    if (!absolute) fail(problem, "the resource location '%.400s' is not a folder that exists", location);
+    free(plain), free(decoded);
+    return absolute;
 }
 
 /* ---- The FMU -------------------------------------------------------------------------------------------------- */
@@ -323,7 +338,8 @@ static int check_guid(const char *folder, String guid, Problem *problem) {
 
 /* What an interpreter says of itself (python_probe.py). */
 typedef struct {
-    char *text, *executable, *version, *library, *lack;
+    char *text;
+    const char *executable, *version, *library, *lack;
 } Interpreter;
 
 /* PyStatus and the beginnings of PyPreConfig and PyConfig, the same from Python 3.9 on; the rest is room. */
@@ -375,13 +391,17 @@ static char *next_line(char **rest) {
 
 static int ask(Interpreter *python, Problem *problem) {
     char *rest = python->text = platform_ask(interpreter_name(), openpanto_probe);
-    if (rest) {
+    char *start = rest ? strstr(rest, MARK) : NULL; /* what a site's own code prints comes before */
+    rest = start ? start + strlen(MARK) : rest;
+    if (start) next_line(&rest);
+    if (start) {
         python->executable = next_line(&rest);
         python->version = next_line(&rest);
         python->library = next_line(&rest);
         python->lack = next_line(&rest);
+        if (!*python->executable) python->executable = interpreter_name(); /* without PATH it does not know its place */
     }
-    if (!rest || !*python->version)
+    if (!start || !*python->version)
         return fail(problem, "no Python 3 found: '%s' cannot be run; install Python 3 with numpy and scipy, put it "
                              "first on PATH or name it in OPENPANTO_PYTHON", interpreter_name());
     if (*python->lack)
@@ -449,7 +469,11 @@ static int start_python(const char *executable, const char *home, Problem *probl
     configure(&config);
     config.install_signal_handlers = 0; /* they are the host's */
     platform_keep_interrupt();
+    /* With this setting Python takes the buffers from the host's standard streams, and what is in them. */
+    char *unbuffered = getenv("PYTHONUNBUFFERED"), kept = unbuffered ? *unbuffered : 0;
+    if (unbuffered) *unbuffered = 0; /* an empty setting is none */
     status = initialize(&config);
+    if (unbuffered) *unbuffered = kept;
     clear(&config);
     /* This module takes SIGINT as it is first imported, whatever was configured; so that is now. */
     if (!is_exception(status)) import("_signal");
@@ -544,18 +568,26 @@ static int bring_python(const char *resources, Problem *problem) {
     return done;
 }
 
-static int open_inner(Problem *problem) {
-    char *path = platform_self(), why[TEXT / 2] = "";
-    char *suffix = path ? strrchr(path, '.') : NULL;
+/* The name of pythonfmu's library beside this one; NULL if this one's name has no suffix. */
+static char *inner_name(int is_resolved) {
+    char *path = platform_self(is_resolved), *suffix = path ? strrchr(path, '.') : NULL;
     if (suffix) *suffix = 0;
-    char *name = suffix ? join(path, "", INNER) : NULL;
-    void *opened = name ? platform_open(name, 0, why, sizeof why) : NULL;
-    if (!opened)
+    char *name = suffix && !strchr(suffix + 1, '/') ? join(path, "", INNER) : NULL;
+    free(path);
+    return name;
+}
+
+static int open_inner(Problem *problem) {
+    char why[TEXT / 2] = "it is not there";
+    /* Where this library is a link, the other one lies beside the link or beside the file. */
+    char *name = inner_name(0);
+    if (!name || !platform_is_file(name)) free(name), name = inner_name(1);
+    inner = name ? platform_open(name, 0, why, sizeof why) : NULL;
+    if (!inner)
         fail(problem, "pythonfmu's library beside the FMU's own cannot be loaded: %s%s", why,
              strstr(why, "version `G") ? "; this system is older than the FMU needs" : "");
-    inner = opened;
-    free(path), free(name);
-    return opened != NULL;
+    free(name);
+    return inner != NULL;
 }
 
 static int ready(const char *resources, Problem *problem) {
@@ -664,12 +696,14 @@ static int open_code(Instance *instance, const char *folder, const char *script,
     return is_asked && !*answer ? 1 : fail(problem, "%s", answer);
 }
 
-static Component make_inner(Instance *instance) {
+static Component make_inner(Instance *instance, Problem *problem) {
     char answer[TEXT];
     Instantiate *make = (Instantiate *)find("fmi2Instantiate");
     instance->worst = OK;
     Component made = make ? make(instance->name, 1, "", instance->path, &instance->own, 0, 1) : NULL;
     call_opening("forget", instance->path, "", answer, sizeof answer);
+    /* "": it was told, by whoever knew why */
+    if (!made) fail(problem, "%s", instance->worst < ERROR ? "pythonfmu made no instance of the FMU" : "");
     return made;
 }
 
@@ -734,10 +768,9 @@ EXPORT Component fmi2Instantiate(String name, int type, String guid, String loca
         refuse(functions, instance->name, &problem);
         return drop(instance), NULL;
     }
-    instance->inner = make_inner(instance);
+    instance->inner = make_inner(instance, &problem);
     if (instance->inner) return instance;
-    if (instance->worst < ERROR) /* whatever it was, it told nobody */
-        refuse(functions, instance->name, (fail(&problem, "pythonfmu made no instance of the FMU"), &problem));
+    if (*problem.text) refuse(functions, instance->name, &problem);
     return drop(instance), NULL;
 }
 
@@ -751,13 +784,23 @@ EXPORT void fmi2FreeInstance(Component c) {
     drop(instance);
 }
 
+/* Whether the FMU's code can still be loaded; pythonfmu would not survive that it is gone. */
+static int is_still_there(const Instance *instance, Problem *problem) {
+    char answer[TEXT / 2] = "", *script = read_script_name(instance->path, problem);
+    int is_asked = script && call_opening("problem", instance->path, script, answer, sizeof answer);
+    free(script);
+    if (!script || (is_asked && !*answer)) return script != NULL;
+    return fail(problem, "%s", answer);
+}
+
 /* A new instance in place of the old one: pythonfmu's own reset does not survive a failure. */
 EXPORT Status fmi2Reset(Component c) {
     Instance *instance = c;
+    Problem problem;
     void (*release)(Component) = (void (*)(Component))find("fmi2FreeInstance");
     if (!is_alive(instance) || !release) return ERROR;
-    Component fresh = make_inner(instance);
-    if (!fresh) return ERROR;
+    Component fresh = is_still_there(instance, &problem) ? make_inner(instance, &problem) : NULL;
+    if (!fresh) return *problem.text ? complain(instance, "it cannot be reset: %s", problem.text) : ERROR;
     release(instance->inner);
     instance->inner = fresh;
     return OK;
@@ -771,12 +814,13 @@ EXPORT Status fmi2SetDebugLogging(Component c, int on, size_t count, const Strin
     return OK;
 }
 
-/* All others: a function NAME with parameters PARAMETERS, passed on as ARGUMENTS if GOOD holds. */
-#define PASS_ON(NAME, PARAMETERS, GOOD, ARGUMENTS)                                                                   \
-    EXPORT Status NAME PARAMETERS {                                                                                  \
+/* All others: a function OUTER with parameters PARAMETERS, passed on to pythonfmu's NAME as ARGUMENTS if GOOD holds. */
+#define PASS(OUTER, NAME, PARAMETERS, GOOD, ARGUMENTS)                                                               \
+    Status OUTER PARAMETERS {                                                                                        \
         static Status(*call) PARAMETERS;                                                                             \
         Instance *instance = c;                                                                                      \
-        if (!is_alive(instance) || !(GOOD)) return ERROR;                                                            \
+        if (!is_alive(instance)) return ERROR;                                                                       \
+        if (!(GOOD)) return complain(instance, "%s was called with a null pointer", #NAME);                          \
         if (!call) call = (Status(*) PARAMETERS)find(#NAME);                                                         \
         if (!call) return ERROR;                                                                                     \
         instance->worst = OK;                                                                                        \
@@ -785,6 +829,7 @@ EXPORT Status fmi2SetDebugLogging(Component c, int on, size_t count, const Strin
         if (status == FATAL || (status < DISCARD && instance->worst >= ERROR)) return ERROR;                         \
         return status;                                                                                               \
     }
+#define PASS_ON(NAME, PARAMETERS, GOOD, ARGUMENTS) EXPORT PASS(NAME, NAME, PARAMETERS, GOOD, ARGUMENTS)
 #define ARE(POINTERS) (n == 0 || (POINTERS))
 
 PASS_ON(fmi2SetupExperiment, (Component c, int has_tolerance, double tolerance, double start, int has_stop, double stop),
@@ -803,11 +848,23 @@ PASS_ON(fmi2SetString, (Component c, const Reference r[], size_t n, const String
 PASS_ON(fmi2GetFMUstate, (Component c, State *s), s != NULL, (c, s))
 PASS_ON(fmi2SetFMUstate, (Component c, State s), s != NULL, (c, s))
 PASS_ON(fmi2SerializedFMUstateSize, (Component c, State s, size_t *size), s && size, (c, s, size))
-PASS_ON(fmi2SerializeFMUstate, (Component c, State s, char bytes[], size_t size), s && bytes, (c, s, bytes, size))
 PASS_ON(fmi2DeSerializeFMUstate, (Component c, const char bytes[], size_t size, State *s), bytes && s,
         (c, bytes, size, s))
 PASS_ON(fmi2DoStep, (Component c, double time, double step, int no_restore), 1, (c, time, step, no_restore))
 PASS_ON(fmi2GetRealStatus, (Component c, int kind, double *v), v != NULL, (c, kind, v))
+
+static PASS(write_state, fmi2SerializeFMUstate, (Component c, State s, char bytes[], size_t size), s && bytes,
+            (c, s, bytes, size))
+
+/* pythonfmu cuts what does not fit, and says that all is well. */
+EXPORT Status fmi2SerializeFMUstate(Component c, State s, char bytes[], size_t size) {
+    size_t needed = 0;
+    if (!s || !bytes) return write_state(c, s, bytes, size);
+    Status status = fmi2SerializedFMUstateSize(c, s, &needed);
+    if (status > WARNING) return status;
+    if (size < needed) return complain(c, "the state has %zu bytes, the host has room for %zu", needed, size);
+    return write_state(c, s, bytes, size);
+}
 
 EXPORT Status fmi2FreeFMUstate(Component c, State *s) {
     Instance *instance = c;
@@ -821,11 +878,8 @@ EXPORT Status fmi2FreeFMUstate(Component c, State *s) {
 
 /* What the model description declares to be absent. */
 static Status have_not(Instance *instance, const char *name) {
-    Problem problem;
     if (!instance) return ERROR;
-    fail(&problem, "the FMU has no %s, and says so in its model description", name);
-    tell(&instance->host, instance->name, ERROR, NULL, problem.text);
-    return ERROR;
+    return complain(instance, "the FMU has no %s, and says so in its model description", name);
 }
 
 #define HAVE_NOT(NAME, PARAMETERS)                                                                                   \

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/* Locks out other threads while Python is brought into the process. */
+/* Locks out other threads, other FMUs' among them, while Python is brought into the process. */
 void platform_lock(void);
 void platform_unlock(void);
 
@@ -18,13 +18,13 @@ void *platform_open(const char *path, int is_global, char *why, size_t size);
 /* Find a symbol in a library, or in the whole process for NULL. */
 void *platform_find(void *library, const char *name);
 
-/* The path of this library, absolute. */
-char *platform_self(void);
+/* The path of this library, absolute: by the name that the host loaded it by, or where links lead. */
+char *platform_self(int is_resolved);
 
 int platform_is_file(const char *path);
 int platform_is_folder(const char *path);
-int platform_is_absolute(const char *path);
 FILE *platform_read(const char *path);
+char *platform_absolute(const char *path);
 
 /* Turn the path of a file URI ("/tmp/x") into one of this system. */
 void platform_fit_uri_path(char *path);

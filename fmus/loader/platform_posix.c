@@ -28,13 +28,25 @@ __asm__(".symver dladdr, dladdr@GLIBC_2.2.5");
 
 extern char **environ;
 
+/* One for the process, not for each FMU's loader: they all start the same Python. Of a unique symbol the dynamic linker
+ * takes the first for all, however the libraries are opened. All zeros is PTHREAD_MUTEX_INITIALIZER. */
+#if defined(__linux__) && defined(__GLIBC__)
+__asm__(".pushsection .bss\n.balign 64\n.globl openpanto_loader_mutex\n.type openpanto_loader_mutex, @gnu_unique_object\n"
+        ".size openpanto_loader_mutex, 64\nopenpanto_loader_mutex: .zero 64\n.popsection");
+extern __attribute__((visibility("default"))) pthread_mutex_t openpanto_loader_mutex;
+_Static_assert(sizeof(pthread_mutex_t) <= 64, "room for the mutex");
+#define mutex openpanto_loader_mutex
+#else
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
-static char *self;
+#endif
+static char *self, *resolved_self;
 
 /* Asked when the library is loaded: later the working folder, to which its path may be relative, can be another. */
 __attribute__((constructor)) static void find_self(void) {
     Dl_info info;
-    if (dladdr(&mutex, &info) && info.dli_fname) self = realpath(info.dli_fname, NULL);
+    if (!dladdr(&self, &info) || !info.dli_fname) return;
+    self = platform_absolute(info.dli_fname);
+    resolved_self = realpath(info.dli_fname, NULL);
 }
 
 void platform_lock(void) { pthread_mutex_lock(&mutex); }
@@ -52,7 +64,10 @@ void *platform_open(const char *path, int is_global, char *why, size_t size) {
 
 void *platform_find(void *library, const char *name) { return dlsym(library ? library : RTLD_DEFAULT, name); }
 
-char *platform_self(void) { return self ? strdup(self) : NULL; }
+char *platform_self(int is_resolved) {
+    const char *path = is_resolved ? resolved_self : self;
+    return path ? strdup(path) : NULL;
+}
 
 int platform_is_file(const char *path) { return !platform_is_folder(path) && access(path, R_OK) == 0; }
 
@@ -62,7 +77,14 @@ int platform_is_folder(const char *path) { /* without stat, which would need gli
     return handle >= 0;
 }
 
-int platform_is_absolute(const char *path) { return *path == '/'; }
+char *platform_absolute(const char *path) { /* without realpath: a link is to stay one, it may be moved */
+    char *here = *path == '/' ? strdup("") : getcwd(NULL, 0);
+    size_t size = here ? strlen(here) + strlen(path) + 2 : 0;
+    char *made = here ? malloc(size) : NULL;
+    if (made) snprintf(made, size, "%s%s%s", here, *here ? "/" : "", path);
+    free(here);
+    return made;
+}
 
 FILE *platform_read(const char *path) { return fopen(path, "rbe"); }
 

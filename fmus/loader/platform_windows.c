@@ -11,11 +11,19 @@
 #define ANSWER 65536 /* most bytes of an answer */
 #define SECONDS 120  /* longest wait for one */
 
-static SRWLOCK lock = SRWLOCK_INIT;
+static HANDLE lock;
 
-void platform_lock(void) { AcquireSRWLockExclusive(&lock); }
+/* One for the process, not for each FMU's loader: they all start the same Python. */
+void platform_lock(void) {
+    wchar_t name[64];
+    wsprintfW(name, L"Local\\openpanto-loader-%lu", (unsigned long)GetCurrentProcessId());
+    if (!lock) lock = CreateMutexW(NULL, FALSE, name); /* by whichever thread: the name makes it the same one */
+    if (lock) WaitForSingleObject(lock, INFINITE);
+}
 
-void platform_unlock(void) { ReleaseSRWLockExclusive(&lock); }
+void platform_unlock(void) {
+    if (lock) ReleaseMutex(lock);
+}
 
 wchar_t *platform_wide(const char *text) {
     int size = MultiByteToWideChar(CP_UTF8, 0, text, -1, NULL, 0);
@@ -62,7 +70,8 @@ void *platform_find(void *library, const char *name) {
     return NULL;
 }
 
-char *platform_self(void) {
+char *platform_self(int is_resolved) {
+    (void)is_resolved;
     enum { LONGEST = 32768 };
     HMODULE self;
     wchar_t *path = malloc(LONGEST * sizeof *path);
@@ -95,7 +104,14 @@ static int is_drive(const char *path) {
     return ((*path >= 'A' && *path <= 'Z') || (*path >= 'a' && *path <= 'z')) && path[1] == ':';
 }
 
-int platform_is_absolute(const char *path) { return is_drive(path) || *path == '/' || *path == '\\'; }
+char *platform_absolute(const char *path) {
+    wchar_t *wide = platform_wide(path), *whole = wide ? _wfullpath(NULL, wide, 0) : NULL;
+    char *made = whole ? narrow(whole) : NULL;
+    free(wide), free(whole);
+    for (char *c = made; c && *c; c++)
+        if (*c == '\\') *c = '/';
+    return made;
+}
 
 FILE *platform_read(const char *path) {
     wchar_t *wide = wide_path(path);

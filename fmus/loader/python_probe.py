@@ -1,4 +1,4 @@
-"""Asked of the Python that an FMU would run in; prints one answer a line.
+"""Asked of the Python that an FMU would run in; prints one answer a line, after a line that says where they begin.
 
 The loader carries this text. Nothing that Python 3.8 does not know.
 """
@@ -15,6 +15,7 @@ folders = [var("LIBDIR"), var("LIBPL"), os.path.join(sys.base_prefix, "lib")]
 folders += [os.path.join(f, var("MULTIARCH")) for f in folders if f and var("MULTIARCH")]
 places = [os.path.join(f, n) for f in folders if f for n in names if n and (".so" in n or ".dylib" in n)]
 missing = [m for m in ("numpy", "scipy") if importlib.util.find_spec(m) is None]
+print("openpanto_probe:")
 print(sys.executable)
 print(version)
 print(next((p for p in places if os.path.isfile(p)), ""))

@@ -15,7 +15,7 @@ from master.evaluation.contact_quality import Quality, figures_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals
 from master.evaluation.en50367_limits import Criterion, judge
 from master.evaluation.filters import evaluated, stands_in
-from master.line import Geometry, Uplift, indexed, met, passages, period_of, support_uplifts
+from master.line import Geometry, Slackness, Uplift, indexed, met, passages, period_of, slackness, support_uplifts
 from master.recorder import Recording
 
 #: A pantograph's effect on a dropper begins this long before it passes, and is followed this long after [s].
@@ -69,7 +69,7 @@ class Assessment:
     supports : int
         How many supports stand in the interval.
     slack : float, optional
-        Share of the interval's droppers that carry nothing for a moment as this pantograph passes.
+        Share of the interval's droppers that are slack for a moment as this pantograph passes.
     spans : tuple of SpanFigures
         Every whole span after the contact has settled.
     withheld : str
@@ -181,45 +181,39 @@ def slack_share(
     follower: Contact | None,
     limits: tuple[float, float],
 ) -> float | None:
-    """Return the share of the interval's droppers that carry nothing for a moment as a pantograph passes.
+    """Return the share of the interval's droppers that are slack for a moment as a pantograph passes.
 
     From just before it passes until the next pantograph comes, or for a second. On a line that closes on itself a
     dropper counts once a lap.
     """
-    named = [
-        (recording, name, _droppers_met(geometry, name, contact, limits))
-        for recording in recordings
-        for name in recording.matching(f"{contact.catenary}.dropper[*].force")
-    ]
-    places = np.concatenate([np.zeros(0), *(x for _, _, x in named)])
+    own = [s for s in slackness(recordings) if s.component == contact.catenary and s.name.startswith("dropper")]
+    met_at = [_droppers_met(geometry, s.name, limits) for s in own]
+    places = np.concatenate([np.zeros(0), *met_at])
     if not len(places):
         return None
     begin = passing_times(recordings[0], contact, places) - _BEFORE
     end = begin + _BEFORE + _AFTER
     if follower is not None:
         end = np.minimum(end, passing_times(recordings[0], follower, places) - _BEFORE)
-    parts = np.cumsum([len(x) for _, _, x in named])[:-1]
-    windows = zip(named, np.split(begin, parts), np.split(end, parts), strict=True)
-    slack = sum(_count_slack(recording, name, b, e) for (recording, name, _), b, e in windows)
-    return slack / len(places)
+    parts = np.cumsum([len(x) for x in met_at])[:-1]
+    windows = zip(own, np.split(begin, parts), np.split(end, parts), strict=True)
+    return sum(_count_slack(s, b, e) for s, b, e in windows) / len(places)
 
 
-def _droppers_met(
-    geometry: Mapping[str, float], name: str, contact: Contact, limits: tuple[float, float]
-) -> FloatArray:
+def _droppers_met(geometry: Mapping[str, float], name: str, limits: tuple[float, float]) -> FloatArray:
     """Return where a dropper is met within limits [m]."""
-    x = geometry.get(f"{name.removeprefix(f'{contact.catenary}.').removesuffix('.force')}.x")
+    x = geometry.get(f"{name}.x")
     if x is None:
         return np.zeros(0)
     return passages(x, limits, limits, period_of(geometry))
 
 
-def _count_slack(recording: Recording, name: str, begin: FloatArray, end: FloatArray) -> int:
-    """Return in how many stretches of time [s] a tension vanishes."""
+def _count_slack(found: Slackness, begin: FloatArray, end: FloatArray) -> int:
+    """Return in how many stretches of time [s] a dropper is slack."""
     if not len(begin):
         return 0
-    counted = np.concatenate(([0], np.cumsum(recording[name] <= 0.0)))
-    first, last = (np.searchsorted(recording.time, t, side="left") for t in (begin, end))
+    counted = np.concatenate(([0], np.cumsum(found.slack)))
+    first, last = (np.searchsorted(found.time, t, side="left") for t in (begin, end))
     return int(np.count_nonzero(counted[np.maximum(first, last)] > counted[first]))
 
 

@@ -16,7 +16,7 @@ from master.arrays import FloatArray
 from master.evaluation.contact_signals import Signals, power_spectrum
 from master.evaluation.en50367_limits import limits_at
 from master.evaluation.filters import FILTER_REACH, stands_in
-from master.line import Uplift, aligned, by_section, indexed, met, period_of
+from master.line import Uplift, aligned, by_section, indexed, met, period_of, slackness
 from master.recorder import Recording
 from master.report.encode import kept_samples, packed
 from master.results import Results
@@ -73,8 +73,8 @@ class Curve:
 
     @property
     def line(self) -> dict[str, Any]:
-        """Return colour, dash and width."""
-        dash = DASHES[self.index % len(DASHES)]
+        """Return colour, dash and width; no two of the first 36 are alike."""
+        dash = DASHES[(self.index + self.index // len(COLOURS)) % len(DASHES)]
         return {"color": COLOURS[self.index % len(COLOURS)], "dash": dash, "width": self.wide}
 
 
@@ -354,11 +354,14 @@ def _dropper_charts(results: Results, recording: Recording, component: str, name
     x, period = indexed(values, "dropper", "x"), period_of(values)
     place = x if len(x) == len(names) else np.arange(1.0, len(names) + 1.0)
     forces = np.column_stack([recording[n] for n in names])
+    told = {f"{s.component}.{s.name}.force": 100.0 * float(np.mean(s.slack)) for s in slackness(results.recordings)}
+    shares = np.array([told[n] for n in names])
     title = f"track position of the dropper{_IN_LAP if period else ''} [m]" if place is x else "dropper number"
     limits = (float(place.min()), float(place.max()))
     axes = Axes(title, "dropper force [N]", interval_shape(results, limits) if place is x and not period else [])
     note = "Bar: from least to greatest in the run; dot: at the start; cross: slack at some time (hover for its share)."
-    found = [Chart(f"droppers_{component}", "Dropper forces", _figure(_dropper_range(place, forces), axes), note, 360)]
+    figure = _figure(_dropper_range(place, forces, shares), axes)
+    found = [Chart(f"droppers_{component}", "Dropper forces", figure, note, 360)]
     inside = [i for i, p in enumerate(place) if stands_in(float(p), results.interval, period)]
     chosen = _middle(inside or list(range(len(names))))
     curves = [_dropper_curve(recording.time, forces[:, i], f"{place[i]:.1f}", k) for k, i in enumerate(chosen)]
@@ -371,11 +374,10 @@ def _middle(chosen: list[int]) -> list[int]:
     return chosen[first : first + _MOST_DROPPERS]
 
 
-def _dropper_range(place: FloatArray, forces: FloatArray) -> list[Figure]:
+def _dropper_range(place: FloatArray, forces: FloatArray, share: FloatArray) -> list[Figure]:
     low, high = forces.min(axis=0), forces.max(axis=0)
     xs = np.repeat(place, 3)
     ys = np.column_stack((low, high, np.full(len(place), np.nan))).ravel()
-    share = 100.0 * np.mean(forces <= 0.0, axis=0)
     slack = share > 0.0
     traces = [
         {**_trace(xs, ys, {"color": COLOURS[0], "width": 3}, "least to greatest"), "hoverinfo": "skip"},
@@ -392,7 +394,7 @@ def _dropper_history(component: str, curves: list[Figure]) -> Chart:
     middle = len(curves) // 2
     for i, curve in enumerate(curves):
         curve["visible"] = True if abs(i - middle) <= 3 else "legendonly"
-    figure = _figure(curves, Axes("time [s]", "dropper force [N]", [_level(0.0, "slack")]))
+    figure = _figure(curves, Axes("time [s]", "dropper force [N]", [_level(0.0, "carries nothing")]))
     note = "Droppers in the middle of the interval of interest; click a name to hide or show it."
     return Chart(f"dropper_history_{component}", "History of the dropper forces", figure, note, 400)
 

@@ -17,7 +17,7 @@ import numpy as np
 from master.arrays import BoolArray, FloatArray, IntArray
 from master.contacts import strip_centre
 from master.evaluation.contact_signals import Signals
-from master.line import by_section, indexed, laps
+from master.line import by_section, indexed, laps, slackness
 from master.recorder import Recording
 from master.report.encode import packed, packed_integers
 from master.results import Results
@@ -141,8 +141,7 @@ def _section(
     moved = sorted((h for h in moved if h[1] is not None), key=lambda h: h[0])
     if not moved:
         return None
-    forces = [f for _, f in _histories(results, catenary, values, "dropper", "dropper[{}].force", time)]
-    slack = np.column_stack([np.zeros(len(time), np.bool_) if f is None else f <= 0.0 for f in forces] * len(at))
+    slack = np.column_stack(_slack(results, catenary, values, time) * len(at))
     displacement = np.column_stack([h for _, h in moved if h is not None])
     return Section(line, np.array([x for x, _ in moved]), displacement, slack)
 
@@ -173,12 +172,28 @@ def _frames(time: FloatArray) -> FloatArray:
     return np.linspace(time[0], time[-1], count)
 
 
+def _slack(results: Results, catenary: str, values: Mapping[str, float], time: FloatArray) -> list[BoolArray]:
+    """Return for every dropper when it is slack; one of which nothing is recorded never is."""
+    told = {s.name: s for s in slackness(results.recordings) if s.component == catenary}
+    droppers = [told.get(f"dropper[{i}]") for i in _numbers(values, "dropper")]
+    return [
+        np.zeros(len(time), np.bool_) if s is None else np.interp(time, s.time, s.slack.astype(np.float64)) > 0.5
+        for s in droppers
+    ]
+
+
+def _numbers(values: Mapping[str, float], kind: str) -> list[int]:
+    return sorted(int(n[len(kind) + 1 : -3]) for n in values if n.startswith(f"{kind}[") and n.endswith("].x"))
+
+
 def _histories(
     results: Results, catenary: str, values: Mapping[str, float], kind: str, form: str, time: FloatArray
 ) -> list[tuple[float, FloatArray | None]]:
     """Return the position and the recorded variable (None if it is not) of all supports or droppers."""
-    numbers = sorted(int(n[len(kind) + 1 : -3]) for n in values if n.startswith(f"{kind}[") and n.endswith("].x"))
-    return [(values[f"{kind}[{i}].x"], _at(results.recordings, f"{catenary}.{form.format(i)}", time)) for i in numbers]
+    return [
+        (values[f"{kind}[{i}].x"], _at(results.recordings, f"{catenary}.{form.format(i)}", time))
+        for i in _numbers(values, kind)
+    ]
 
 
 def _at(recordings: Sequence[Recording], name: str, time: FloatArray) -> FloatArray | None:

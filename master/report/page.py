@@ -135,7 +135,7 @@ def _figures(done: Results, assessments: tuple[Assessment, ...]) -> str:
 INTERVAL_NOTE: Final = (
     "Forces, losses and heights: while the strip is in the interval, which, where it has no beginning, begins "
     f"{SETTLING:g} s after the first contact. Uplift: supports in it, its ends included, over the whole run. Slack "
-    "droppers: share of those in it that carry nothing for a moment as the pantograph passes, until the next one comes."
+    "droppers: share of those in it that are slack for a moment as the pantograph passes, until the next one comes."
 )
 
 

@@ -24,6 +24,7 @@ from typing import Any, Final, Literal, get_args
 from lxml import etree
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from master.ssp.ssm import NOTE, several
 from master.ssp.xml import SSC, Reader, children, elements, namespace, tag
 
 NAMESPACE: Final = "urn:openpanto:ssp"
@@ -164,7 +165,9 @@ class Record(_Settings):
 
 
 #: Bulky variables of a catenary, recorded at a coarser rate unless the scenario says otherwise.
-DEFAULT_RECORDS: Final = (Record(variables=("*.dropper[*].force", "*.support[*].uplift"), every=0.005),)
+DEFAULT_RECORDS: Final = (
+    Record(variables=("*.dropper[*].force", "*.dropper[*].slack", "*.support[*].uplift"), every=0.005),
+)
 
 
 class RunSettings(_Settings):
@@ -264,12 +267,22 @@ def check_places(root: Any, read: list[Any], reader: Reader) -> None:
         if node.get("type") == NAMESPACE and node.getparent() not in read:
             text = "is not read here; put it into the ssd:Annotations of the description or its DefaultExperiment"
             reader.problem(node, "annotation", f"an annotation of type {NAMESPACE} {text}")
+    _tell_of_others(root, reader)
     for node in root.iter(f"{{{NAMESPACE}}}*"):
         if _is_stray(node):
             holder = next(node.iterancestors(f"{{{SSC}}}Annotation"), None)
             written = "no annotation" if holder is None else f"an annotation of type '{holder.get('type', '')}'"
             text = f"{tag(node)} of {NAMESPACE} stands in {written}, so nobody reads it; the type is {NAMESPACE}"
             reader.problem(node, "annotation", text)
+
+
+def _tell_of_others(root: Any, reader: Reader) -> None:
+    """Note which tools' annotations are not read: they may hold steps, solvers or events of those tools."""
+    found = [a for a in root.iter(f"{{{SSC}}}Annotation") if a.get("type") not in (NAMESPACE, OSP_TYPE)]
+    if found:
+        names = several(list(dict.fromkeys(str(a.get("type")) for a in found)))
+        text = f"annotations of type {names} are not read; what they tell of steps, solvers and events has no effect"
+        reader.warn(int(found[0].sourceline or 0), NOTE, text)
 
 
 def _is_stray(node: Any) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import lzma
+import os
 import stat
 import struct
 import tempfile
@@ -138,10 +139,13 @@ class Sources:
         The scenario's own folder, to which URIs are relative.
     outside : tuple of Path
         Folders beside it that the user has allowed.
+    archive : Path, optional
+        The archive that the folder was extracted from: what lies beside it is named as from a folder in its place.
     """
 
     root: Path
     outside: tuple[Path, ...] = ()
+    archive: Path | None = None
 
     def find(self, source: str) -> Path | None:
         """Return the file that a URI names, None if it lies neither in the scenario nor in an allowed folder.
@@ -152,6 +156,8 @@ class Sources:
         try:
             name = _decoded(source)
             path = (self.root / PurePosixPath(name)).resolve()
+            if self.archive is not None and not self.is_inside(path):
+                path = Path(os.path.normpath(self.archive.absolute() / PurePosixPath(name))).resolve()
             path.is_file()
             homes = [folder.resolve() for folder in (self.root, *self.outside)]
         except (OSError, RuntimeError, ValueError):

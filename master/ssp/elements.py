@@ -124,6 +124,21 @@ class Feed:
 
 
 @dataclass(frozen=True)
+class Joint:
+    """A connection as written that touches a system's connector: the connectors at both ends.
+
+    ``component`` and ``other_component`` name the components that they belong to, empty for a system's.
+    """
+
+    component: str
+    connector: Connector
+    other_component: str
+    other: Connector
+    suppress_unit_conversion: bool
+    line: int
+
+
+@dataclass(frozen=True)
 class SystemNode:
     """A system with what is in it."""
 

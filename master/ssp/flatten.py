@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from master.ssp.elements import Binding, Component, Connection, Connector, Feed, Leg, Stop, SystemNode
+from master.ssp.elements import Binding, Component, Connection, Connector, Feed, Joint, Leg, Stop, SystemNode
 from master.ssp.xml import Reader
 
 #: Owner (its path, empty for the whole) and connector.
@@ -30,6 +30,8 @@ class Flat:
         What leads to components through the connectors of systems, fed or not.
     connectors : dict
         The systems' own connectors, by their full names.
+    joints : tuple of Joint
+        Every connection that touches a system's connector, wherever it leads.
     """
 
     components: tuple[Component, ...]
@@ -37,6 +39,7 @@ class Flat:
     bindings: tuple[Binding, ...]
     feeds: tuple[Feed, ...]
     connectors: dict[str, Connector]
+    joints: tuple[Joint, ...]
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,8 @@ class _Edge:
     source: _Place
     target: _Place
     connection: Connection
+    giving: Connector
+    taking: Connector
 
 
 def flatten(root: SystemNode, reader: Reader) -> Flat:
@@ -53,9 +58,11 @@ def flatten(root: SystemNode, reader: Reader) -> Flat:
     systems = dict(_systems(root, ""))
     components = tuple(replace(c, name=_join(path, c.name)) for path, s in systems.items() for c in s.components)
     direct, edges = _connections(systems, reader)
-    followed, feeds = _followed(edges, systems, reader)
+    _report_ends(edges, systems, reader)
+    followed, feeds = _followed(edges, systems)
     own = {_join(path, x.name): x for path, s in systems.items() for x in s.connectors}
-    return Flat(components, (*direct, *followed), _bindings(systems), feeds, own)
+    joints = tuple(_joint(e, systems) for e in edges)
+    return Flat(components, (*direct, *followed), _bindings(systems), feeds, own, joints)
 
 
 def _systems(system: SystemNode, path: str) -> Iterator[tuple[str, SystemNode]]:
@@ -84,7 +91,10 @@ def _connections(systems: dict[str, SystemNode], reader: Reader) -> tuple[list[C
     """Return the connections between components as they are, and those that touch a system's connector."""
     direct, edges = [], []
     for path, system in systems.items():
+        inside = {*(x.name for x in system.components), *(x.name for x in system.systems)}
         for c in system.connections:
+            if _leads_out(c, inside, system.name, reader):
+                continue
             ends = [(c.start_element, c.start_connector), (c.end_element, c.end_connector)]
             touched = [_system_at(path, element, systems) for element, _ in ends]
             if touched == [None, None]:
@@ -93,6 +103,16 @@ def _connections(systems: dict[str, SystemNode], reader: Reader) -> tuple[list[C
             elif (edge := _edge(path, c, systems, reader)) is not None:
                 edges.append(edge)
     return direct, edges
+
+
+def _leads_out(c: Connection, inside: set[str], system: str, reader: Reader) -> bool:
+    """Report a connection with an element inside another system: from outside one connects that system."""
+    for element in (c.start_element, c.end_element):
+        if "." in element and element not in inside:
+            text = f"'{element}' is not a component or system in system '{system}'; connect the system that holds it"
+            reader.report(c.line, "connection", text)
+            return True
+    return False
 
 
 def _system_at(path: str, element: str, systems: dict[str, SystemNode]) -> str | None:
@@ -115,17 +135,17 @@ def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Read
             reader.report(c.line, "unsupported", text)
             return None
         # Seen from inside, a system's own input gives values and its own output takes them.
-        ends.append((place, connector.kind, (connector.kind in _GIVING) == bool(element)))
+        ends.append((place, connector, (connector.kind in _GIVING) == bool(element)))
     (first, one, first_gives), (second, other, second_gives) = ends
-    if (one in _PARAMETERS) != (other in _PARAMETERS):
-        kinds = f"'{first[1]}' of kind '{one}' and '{second[1]}' of kind '{other}'"
+    if (one.kind in _PARAMETERS) != (other.kind in _PARAMETERS):
+        kinds = f"'{first[1]}' of kind '{one.kind}' and '{second[1]}' of kind '{other.kind}'"
         reader.report(c.line, "connection", f"connects {kinds}, which do not fit")
         return None
     if first_gives == second_gives:
         both = "give" if first_gives else "take"
         reader.report(c.line, "connection", f"'{first[1]}' and '{second[1]}' both {both} values")
         return None
-    return _Edge(first, second, c) if first_gives else _Edge(second, first, c)
+    return _Edge(first, second, c, one, other) if first_gives else _Edge(second, first, c, other, one)
 
 
 def _connector(path: str, element: str, name: str, systems: dict[str, SystemNode]) -> Connector | None:
@@ -138,18 +158,15 @@ def _connector(path: str, element: str, name: str, systems: dict[str, SystemNode
 
 
 def _followed(
-    edges: list[_Edge], systems: dict[str, SystemNode], reader: Reader
+    edges: list[_Edge], systems: dict[str, SystemNode]
 ) -> tuple[list[Connection], tuple[Feed, ...]]:
     """Return a connection for every connector of a component that others reach through systems, and what leads there.
 
     A way that begins at a connector of a system, which nothing feeds, makes no connection: its values hold.
     """
-    into: dict[_Place, list[_Edge]] = {}
-    for edge in edges:
-        into.setdefault(edge.target, []).append(edge)
-    connections, feeds = [], []
+    into, connections, feeds = _into(edges), [], []
     for last in edges:
-        if last.target[0] in systems or (chain := _chain(last, into, systems, reader)) is None:
+        if last.target[0] in systems or (chain := _chain(last, into, systems)) is None:
             continue
         is_fed = chain[0].source[0] not in systems
         feeds.append(Feed(*last.target, _stops(chain, systems), is_fed))
@@ -158,14 +175,19 @@ def _followed(
     return connections, tuple(feeds)
 
 
-def _chain(
-    last: _Edge, into: dict[_Place, list[_Edge]], systems: dict[str, SystemNode], reader: Reader
-) -> list[_Edge] | None:
+def _into(edges: list[_Edge]) -> dict[_Place, list[_Edge]]:
+    """Return the connections that lead to each place."""
+    into: dict[_Place, list[_Edge]] = {}
+    for edge in edges:
+        into.setdefault(edge.target, []).append(edge)
+    return into
+
+
+def _chain(last: _Edge, into: dict[_Place, list[_Edge]], systems: dict[str, SystemNode]) -> list[_Edge] | None:
     """Return the connections that lead to a component one after the other, None if they are not sound."""
     chain = [last]
     while chain[0].source[0] in systems and (before := into.get(chain[0].source, [])):
         if len(before) != 1 or len(chain) > len(into):
-            _report_end(chain[0], before, systems, reader)
             return None
         chain.insert(0, before[0])
     return chain
@@ -202,12 +224,32 @@ def _leg(edge: _Edge, systems: dict[str, SystemNode]) -> Leg:
     return Leg(unit, c.transformation, c.suppress_unit_conversion, c.line)
 
 
-def _report_end(edge: _Edge, before: list[_Edge], systems: dict[str, SystemNode], reader: Reader) -> None:
-    path, name = edge.source
-    where = f"connector '{name}' of system '{path or systems[''].name}'"
-    if len(before) > 1:
-        text = f"{where} has {len(before)} connections; one is allowed"
-    else:
-        text = f"{where} is fed by itself: the connections of systems form a circle, into which no component leads"
-    # At the first of those that feed it, so that a connector that leads to many components is told once.
-    reader.report(before[0].connection.line, "connection", text)
+def _joint(edge: _Edge, systems: dict[str, SystemNode]) -> Joint:
+    component, other = ("" if owner in systems else owner for owner, _ in (edge.source, edge.target))
+    c = edge.connection
+    return Joint(component, edge.giving, other, edge.taking, c.suppress_unit_conversion, c.line)
+
+
+def _report_ends(edges: list[_Edge], systems: dict[str, SystemNode], reader: Reader) -> None:
+    """Report connectors of systems that several connections feed, or that feed themselves, wherever they lead."""
+    into = {place: before for place, before in _into(edges).items() if place[0] in systems}
+    told: set[_Place] = set()
+    for place, before in into.items():
+        if len(before) > 1:
+            text = f"has {len(before)} connections; one is allowed"
+        elif place not in told and place in (circle := _ahead(place, into)):
+            text = "is fed by itself: the connections of systems form a circle, into which no component leads"
+            told.update(circle)
+        else:
+            continue
+        where = f"connector '{place[1]}' of system '{place[0] or systems[''].name}'"
+        reader.report(before[0].connection.line, "connection", f"{where} {text}")
+
+
+def _ahead(place: _Place, into: dict[_Place, list[_Edge]]) -> list[_Place]:
+    """Return the connectors of systems that lead to one, itself among them if it is fed by itself."""
+    found: list[_Place] = []
+    while place in into and into[place][0].source not in found:
+        place = into[place][0].source
+        found.append(place)
+    return found

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from master.ssp.annotation import Annotations, RunSettings, check_places, parse_annotations
 from master.ssp.archive import SSD_NAME, Sources
-from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, Feed, SystemNode
+from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, Feed, Joint, SystemNode
 from master.ssp.enumerations import Items, parse_enumerations
 from master.ssp.flatten import flatten
 from master.ssp.ssm import Entry, apply, parse_mapping, parse_transformation, read_mapping_file
@@ -19,6 +19,8 @@ from master.ssp.units import Unit, parse_units
 from master.ssp.xml import SSC, SSD, SSM, SSV, VERSIONS, Reader, child, children, elements, tag
 
 FMU_TYPES: Final = ("application/x-fmu-sharedlibrary",)
+SET_TYPE: Final = "application/x-ssp-parameter-set"
+MAPPING_TYPE: Final = "application/x-ssp-parameter-mapping"
 CONNECTOR_TYPES: Final = ("Real", "Integer", "Boolean", "String", "Enumeration", "Binary")
 TRANSFORMATIONS: Final = (
     "BooleanMappingTransformation",
@@ -42,6 +44,7 @@ class Structure:
     enumerations: dict[str, Items] = field(default_factory=dict)
     feeds: tuple[Feed, ...] = ()
     connectors: dict[str, Connector] = field(default_factory=dict)
+    joints: tuple[Joint, ...] = ()
 
 
 EMPTY: Final = Structure("", (), (), (), {}, 0.0, None, Annotations(RunSettings(), None))
@@ -79,6 +82,7 @@ def parse_structure(node: Any, sources: Sources, reader: Reader) -> Structure:
         parse_enumerations(child(node, SSD, "Enumerations"), reader),
         flat.feeds,
         flat.connectors,
+        flat.joints,
     )
 
 
@@ -172,9 +176,9 @@ def parse_bindings(node: Any | None, sources: Sources, reader: Reader) -> tuple[
 
 def parse_binding(node: Any, sources: Sources, reader: Reader) -> Binding | None:
     """Parse ``ssd:ParameterBinding``, inline or with its ``.ssv`` file, and apply its mapping if it has one."""
-    if not _beside_the_ssd(node, reader):
+    if not _is_plain(node, child(node, SSD, "ParameterValues"), SET_TYPE, reader):
         return None
-    found = _inline_set(node, reader) if node.get("source") is None else _file_set(node, sources, reader)
+    found = _inline_set(node, reader) if not node.get("source") else _file_set(node, sources, reader)
     if found is None:
         return None
     binding = Binding(reader.text(node, "prefix"), found, int(node.sourceline or 0))
@@ -192,10 +196,10 @@ def _mapped(binding: Binding, node: Any, sources: Sources, reader: Reader) -> Bi
 
 
 def _mapping(node: Any, sources: Sources, reader: Reader) -> tuple[Entry, ...] | None:
-    if not _beside_the_ssd(node, reader):
+    if not _is_plain(node, node, MAPPING_TYPE, reader):
         return None
     source = node.get("source")
-    if source is None:
+    if not source:
         inline = child(node, SSM, "ParameterMapping")
         if inline is None:
             reader.problem(node, "mapping", "the mapping has neither a source nor an inline ssm:ParameterMapping")
@@ -208,10 +212,20 @@ def _mapping(node: Any, sources: Sources, reader: Reader) -> tuple[Entry, ...] |
     return read_mapping_file(path, reader.beside(source))
 
 
-def _beside_the_ssd(node: Any, reader: Reader) -> bool:
-    if reader.text(node, "sourceBase", "SSD") == "SSD":
+def _is_plain(node: Any, holder: Any | None, kind: str, reader: Reader) -> bool:
+    """Whether a binding or mapping is of the type that is read, in a file or else once inside ``holder``."""
+    what, inside = tag(node), list(elements(holder))
+    if reader.text(node, "sourceBase", "SSD") != "SSD":
+        reader.problem(node, "unsupported", "sourceBase='component' is not supported; put the file beside the SSD")
+    elif (told := reader.text(node, "type", kind)) != kind:
+        reader.problem(node, "unsupported", f"the {what} is of type '{told}'; only {kind} is supported")
+    elif inside and node.get("source"):
+        text = f"the {what} has a source, '{node.get('source')}', and content as well; remove one of them"
+        reader.problem(inside[0], "binding", text)
+    elif len(inside) > 1:
+        reader.problem(inside[1], "binding", f"the {what} holds {len(inside)} elements; one is allowed")
+    else:
         return True
-    reader.problem(node, "unsupported", "sourceBase='component' is not supported; put the file beside the SSD")
     return False
 
 

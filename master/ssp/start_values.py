@@ -147,20 +147,22 @@ class StartValues:
     def _direct(self, given: Given, variable: Variable, where: str) -> Conversion:
         p = given.parameter
         unit = "" if p.suppress_unit_conversion else p.unit
-        found = self._units.convert(unit, variable.unit, where, p.line, p.file, given.within.units)
+        found = self._units.convert(
+            unit, variable.unit, where, p.line, p.file, given.within.units, variable.is_difference
+        )
         return found.then(p.transformation)
 
     def _along(self, component: Component, given: Given, stop: Stop, variable: Variable, where: str) -> Conversion:
         """Return the conversion of a value that is bound to a system's connector, in whose unit it is from there on."""
         p, legs = given.parameter, stop.legs
-        unit = stop.connector.unit or p.unit
+        unit, is_difference = stop.connector.unit or p.unit, variable.is_difference
         first = Conversion()
         if not p.suppress_unit_conversion:
-            first = self._units.convert(p.unit, unit, where, p.line, p.file, given.within.units)
+            first = self._units.convert(p.unit, unit, where, p.line, p.file, given.within.units, is_difference)
         own = next((x.unit for x in component.connectors if x.name == variable.name), "") or variable.unit
-        way, unit = self._units.along(unit, legs[:-1], where)
-        way_in, unit = self._units.along(unit, [replace(legs[-1], unit=own)], where)
-        end = self._units.convert(unit, variable.unit, where, legs[-1].line)
+        way, unit = self._units.along(unit, legs[:-1], where, is_difference)
+        way_in, unit = self._units.along(unit, [replace(legs[-1], unit=own)], where, is_difference)
+        end = self._units.convert(unit, variable.unit, where, legs[-1].line, is_difference=is_difference)
         return first.then(p.transformation).then(way).then(way_in).then(end)
 
     def _item(self, variable: Variable, where: str, given: Given) -> int | None:
@@ -214,10 +216,11 @@ def out_of_range(variable: Variable, value: float) -> str:
         return f"= {value:g} is not finite"
     if variable.items and value not in dict(variable.items).values():
         return f"= {value:g} is no item of its type ({listed(dict(variable.items))})"
+    told = f"{value:g} {variable.unit}".strip()
     if variable.minimum is not None and value < variable.minimum:
-        return f"= {value:g} {variable.unit} is below its minimum {variable.minimum:g}{_hint(variable)}"
+        return f"= {told} is below its minimum {variable.minimum:g}{_hint(variable)}"
     if variable.maximum is not None and value > variable.maximum:
-        return f"= {value:g} {variable.unit} is above its maximum {variable.maximum:g}{_hint(variable)}"
+        return f"= {told} is above its maximum {variable.maximum:g}{_hint(variable)}"
     return ""
 
 

@@ -154,14 +154,37 @@ def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
     """
     first: dict[str, Unit] = {}
     for unit in declared:
-        other, usual = first.setdefault(unit.name, unit), COMMON.get(unit.name)
+        other = first.setdefault(unit.name, unit)
         where = f"{other.file}, line {other.line}" if other.line else other.file
         if other.dimension != unit.dimension and other.line:  # many tools tell no more of an FMU's unit than its name
             yield unit, f"measures something else in {where}"
         elif other.dimension == unit.dimension and not _agree(other, unit):
             yield unit, f"is declared with {_scale(unit)} here, with {_scale(other)} in {where}"
-        elif usual and unit.name != "%" and usual.dimension == unit.dimension and not _agree(usual, unit):
-            yield unit, f"is declared with {_scale(unit)}; everywhere else it has {_scale(usual)}"
+        elif text := unusual(unit):
+            yield unit, text
+
+
+def unusual(unit: Unit) -> str:
+    """Return how a unit that everybody knows is declared otherwise, empty if it is not."""
+    usual = COMMON.get(unit.name)
+    if usual is None or unit.name == "%":
+        return ""
+    if any(unit.dimension) and usual.dimension[:-1] != unit.dimension[:-1]:  # but for angles
+        return "is declared to measure something else than everywhere"
+    if usual.dimension == unit.dimension and not _agree(usual, unit):
+        return f"is declared with {_scale(unit)}; everywhere else it has {_scale(usual)}"
+    return ""
+
+
+def unlike(unit: Unit, other: Unit) -> str:
+    """Return how two FMUs' units of one name differ, empty if they do not; many tools tell no more than the name."""
+    if unit.dimension[:-1] != other.dimension[:-1]:  # but for angles
+        return "measures something else" if any(unit.dimension) and any(other.dimension) else ""
+    return (
+        ""
+        if unit.name == "%" or _agree(unit, other)
+        else f"is declared with {_scale(unit)}, there with {_scale(other)}"
+    )
 
 
 def _agree(one: Unit, other: Unit) -> bool:

@@ -15,7 +15,7 @@ from typing import Final
 
 from master.errors import Problem
 from master.ssp.archive import SSD_NAME
-from master.ssp.elements import Component, Connection, Connector, Leg
+from master.ssp.elements import Component, Connection, Connector, Joint, Leg
 from master.ssp.enumerations import Items
 from master.ssp.ssd import Structure
 from master.ssp.start_values import StartValues, listed
@@ -79,14 +79,18 @@ class Checker:
         self._connectors = {(c.name, x.name): x for c in self._named.values() for x in reversed(c.connectors)}
         self._units = UnitChecks(structure, fmus.values(), problems)
         self._faulty: set[Connector] = set()
+        self._ill_typed: set[int] = set()  # lines of connections that have been told
 
     def connections(self) -> tuple[SystemConnection, ...]:
         """Return the connections that are sound, in the order of the SSD."""
         self._check_names()
-        self._problems += unit_problems(self._structure, self._fmus.values())
+        self._problems += unit_problems(self._structure, self._fmus)
         for component in self._known:
             for connector in component.connectors:
                 self._check_connector(component, connector)
+        self._check_system_connectors()
+        for joint in self._structure.joints:
+            self._check_joint(joint)
         checked = (self._connection(c) for c in self._structure.connections)
         sound = tuple(c for c in checked if c is not None)
         self._check_counts(sound)
@@ -108,8 +112,21 @@ class Checker:
     ) -> SystemComponent:
         outputs = dict.fromkeys(x.output for x in connections if x.source == c.name)
         inputs = dict.fromkeys(x.input for x in connections if x.target == c.name)
-        fmu = self._fmus[c.name]
-        return SystemComponent(c.name, fmu, values.of(c), tuple(inputs), tuple(outputs), fmu.tolerance)
+        fmu, given = self._fmus[c.name], values.of(c)
+        self._check_aliases(c, {n: repr(value) for n, value in given.items()}, "are given")
+        self._check_aliases(c, {x.input: _told(x) for x in connections if x.target == c.name}, "take")
+        return SystemComponent(c.name, fmu, given, tuple(inputs), tuple(outputs), fmu.tolerance)
+
+    def _check_aliases(self, c: Component, told: Mapping[str, str], verb: str) -> None:
+        """Report names of one variable of the FMU that are told different things: the last one would count."""
+        first: dict[tuple[str, int], str] = {}
+        for name, what in told.items():
+            variable = self._fmus[c.name].variables[name]
+            place = ("Integer" if variable.type == "Enumeration" else variable.type, variable.reference)
+            other = first.setdefault(place, name)
+            if what != told[other]:
+                text = f"'{other}' and '{name}' of component '{c.name}' are one variable in the FMU, but {verb}"
+                self._report(c.line, "alias", f"{text} {told[other]} and {what}; leave out one of them")
 
     def _report(self, line: int, rule: str, text: str, file: str = SSD_NAME) -> None:
         self._problems.append(Problem(file, line, rule, text))
@@ -159,6 +176,43 @@ class Checker:
             text = f"{where}: enumeration '{name}' has the items {listed(declared)}"
             self._report(connector.line, "enumeration", f"{text}, the FMU's type {listed(dict(variable.items))}")
 
+    def _check_system_connectors(self) -> None:
+        for name, connector in self._structure.connectors.items():
+            declared = connector.enumeration in self._structure.enumerations
+            if connector.enumeration and not declared:
+                text = f"connector '{name}': enumeration '{connector.enumeration}' is not declared in ssd:Enumerations"
+                self._report(connector.line, "enumeration", text)
+                self._faulty.add(connector)
+
+    def _check_joint(self, joint: Joint) -> None:
+        """Report connectors of systems that are not of the type or unit of what they are connected to, each once."""
+        ends = ((joint.component, joint.connector), (joint.other_component, joint.other))
+        if self._faulty.intersection(connector for _, connector in ends):
+            self._ill_typed.add(joint.line)
+            return
+        variables = [self._fmus[c].variables.get(x.name) if c in self._fmus else None for c, x in ends]
+        kinds = [v.type if v else x.type for v, (_, x) in zip(variables, ends, strict=True)]
+        names = [f"'{c}.{x.name}'" if c else f"'{x.name}'" for c, x in ends]
+        items = [self._known_items(x, v) for v, (_, x) in zip(variables, ends, strict=True)]
+        if all(kinds) and kinds[0] != kinds[1]:
+            text = f"{names[0]} is {kinds[0]} and {names[1]} is {kinds[1]}; only variables of the same type can be"
+            self._report(joint.line, "type", f"{text} connected")
+        elif kinds[0] == "Enumeration" and items[0] and items[1] and items[0] != items[1]:
+            text = f"{names[0]} has the items {listed(items[0])}, {names[1]} {listed(items[1])}"
+            self._report(joint.line, "enumeration", f"{text}; connected enumerations must have the same ones")
+        else:
+            if not joint.suppress_unit_conversion:
+                units = [x.unit or (v.unit if v else "") for v, (_, x) in zip(variables, ends, strict=True)]
+                self._units.convert(units[0], units[1], f"{names[0]} to {names[1]}", joint.line)
+            return
+        self._ill_typed.add(joint.line)
+        self._faulty.update(x for c, x in ends if not c)  # what it is connected to else is no second mistake
+
+    def _known_items(self, connector: Connector, variable: Variable | None) -> Items | None:
+        if variable is not None and variable.items:
+            return dict(variable.items)
+        return self._structure.enumerations.get(connector.enumeration)
+
     def _connection(self, c: Connection) -> SystemConnection | None:
         source = self._endpoint(c.start_element, c.start_connector, c.line)
         target = self._endpoint(c.end_element, c.end_connector, c.line)
@@ -204,6 +258,8 @@ class Checker:
         """Whether both ends are of the same type, which can be exchanged; reports what is not so."""
         ends = [(end, v.type if v else end.connector.type) for end, v in zip((source, target), variables, strict=True)]
         told = [kind for _, kind in ends if kind]
+        if self._ill_typed.intersection((c.line, *(leg.line for leg in c.before))):
+            return False
         if len(set(told)) > 1:
             text = " and ".join(f"'{end.full_name}' is {kind}" for end, kind in ends)
             self._report(c.line, "type", f"{text}; only variables of the same type can be connected")
@@ -222,17 +278,12 @@ class Checker:
     def _has_same_items(
         self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
     ) -> bool:
-        known = [self._items(end, v) for end, v in zip((source, target), variables, strict=True)]
+        known = [self._known_items(end.connector, v) for end, v in zip((source, target), variables, strict=True)]
         if known[0] is None or known[1] is None or known[0] == known[1]:
             return True
         text = f"'{source.full_name}' has the items {listed(known[0])}, '{target.full_name}' {listed(known[1])}"
         self._report(c.line, "enumeration", f"{text}; connected enumerations must have the same ones")
         return False
-
-    def _items(self, end: _Endpoint, variable: Variable | None) -> Items | None:
-        if variable is not None and variable.items:
-            return dict(variable.items)
-        return self._structure.enumerations.get(end.connector.enumeration)
 
     def _conversion(
         self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
@@ -241,10 +292,12 @@ class Checker:
         # The FMU's own unit is what the number is in; the connector's unit is what the SSD talks in.
         fmu_units = [v.unit if v else "" for v in variables]
         written = [end.connector.unit or u for end, u in zip((source, target), fmu_units, strict=True)]
-        total = self._units.convert(fmu_units[0], written[0], where, c.line)
+        is_difference = any(v is not None and v.is_difference for v in variables)
+        total = self._units.convert(fmu_units[0], written[0], where, c.line, is_difference=is_difference)
         legs = (*c.before, Leg(written[1], c.transformation, c.suppress_unit_conversion, c.line))
-        way, unit = self._units.along(written[0], legs, where)
-        total = total.then(way).then(self._units.convert(unit, fmu_units[1], where, c.line))
+        way, unit = self._units.along(written[0], legs, where, is_difference)
+        way_in = self._units.convert(unit, fmu_units[1], where, c.line, is_difference=is_difference)
+        total = total.then(way).then(way_in)
         if not (math.isfinite(total.factor) and math.isfinite(total.offset)):
             text = f"{where}: factor {total.factor:g} and offset {total.offset:g} are not finite"
             self._report(c.line, "number", text)
@@ -316,6 +369,13 @@ class Checker:
 
     def _warn(self, line: int, text: str) -> None:
         self._warnings.append(Problem(SSD_NAME, line, "connection", text))
+
+
+def _told(c: SystemConnection) -> str:
+    """Return in words what an input is told."""
+    factor, offset = c.conversion.factor, c.conversion.offset
+    converted = "" if c.conversion.is_identity else f" x {factor:g} + {offset:g}"
+    return f"'{c.source}.{c.output}'{converted}"
 
 
 def _start(component: SystemComponent, connector: Connector) -> str:

@@ -34,6 +34,8 @@ _VERSIONED: Final = ("SystemStructureDescription", "ParameterSet", "ParameterMap
 _RENAMED: Final = {"Float64": "Real", "Int32": "Integer"}
 #: What 2.0 may say about a file or an element beside what is run.
 _REMARKS: Final = (f"{{{SSC}}}MetaData", f"{{{SSC}}}Signature")
+#: What XML Schema leaves out around a value.
+_BLANKS: Final = " \t\r\n"
 #: Types of which XML Schema says no more than that a value is none.
 _TYPE_ERROR: Final = re.compile(r"is not a valid value of the (?:local )?atomic type")
 
@@ -134,6 +136,8 @@ class Reader:
         first: dict[str, int] = {}
         for node in nodes:
             name = self.text(node, "name")
+            if not is_one_line(name):
+                self.problem(node, "name", f"{what} {name!r}: a name is one line of text")
             if name in first:
                 where = f", first in line {first[name]}" if first[name] else ""
                 self.problem(node, "name", f"{what} '{name}' is there twice{where}; remove one")
@@ -169,6 +173,7 @@ class Reader:
         raw = node.get(name)
         if raw is None:
             return default
+        raw = raw.strip(_BLANKS)
         if raw not in ("true", "false", "1", "0"):
             self.replace_problem(node, raw, "boolean", f"{name}='{raw}' is neither true nor false")
         return raw in ("true", "1")
@@ -177,6 +182,11 @@ class Reader:
 @cache
 def _schema(kind: str) -> Any:
     return etree.XMLSchema(file=str(importlib.resources.files("fmpy") / "ssp" / "schema" / SCHEMAS[kind]))
+
+
+def is_one_line(name: str) -> bool:
+    """Whether a name has no line breaks nor other control characters."""
+    return len(name.splitlines()) < 2 and not any(ord(letter) < ord(" ") for letter in name)
 
 
 def tag(node: Any) -> str:

@@ -21,7 +21,7 @@ SCENARIOS: Final = Path(__file__).parents[2] / "ssp_scenarios"
 _ONLY_RUN: Final = "run"
 
 #: must hold: a row that fails fails the verification. indicative: so it does, but its reference is said to be only
-#: indicative. report: printed, judged, never failing.
+#: indicative. report: printed, judged, never failing but outside its band.
 Kind = Literal["must hold", "indicative", "report"]
 
 
@@ -81,7 +81,8 @@ class Row(_Data):
     source : str
         Where the reference comes from.
     band : (float, float)
-        What readings of the source's data span that nobody has tuned: how little agreement alone proves.
+        What readings of the source's data span that nobody has tuned: how little agreement alone proves. A figure
+        outside fails, of whatever kind the row is.
     recalled : bool
         Whether the reference is recalled from texts, not read where it was published.
     kind : Kind

@@ -16,7 +16,7 @@ from master.verify.quantities import QUANTITIES, Measured, Quantity
 #: reported: agrees, departs.
 Verdict = Literal["holds", "near", "fails", "agrees", "departs"]
 Place = Literal["inside", "near", "outside"]
-FAILING: Final = "fails"
+FAILING: Final[Verdict] = "fails"
 _ORDER: Final = ("inside", "near", "outside")
 #: Share by which a figure may miss a limit for want of digits.
 _ROUNDING: Final = 1e-9
@@ -150,14 +150,21 @@ def decide(row: Row, quantity: Quantity, measured: Measured, others: Mapping[str
         reference=reference_text(row, quantity, others),
         measured=measured,
         bounds=bounds,
-        verdict=verdict_of(row, place),
+        verdict=verdict_of(row, place, stands_in_band(row, measured.values)),
         deviation=worst[0],
         remark="; ".join([t for t in (measured.remark or _where(measured, worst[1]),) if t] + notes),
     )
 
 
-def verdict_of(row: Row, place: Place) -> Verdict:
-    """Return the verdict from where the worst number lies."""
+def stands_in_band(row: Row, values: Sequence[float]) -> bool:
+    """Return whether all numbers lie in what untuned readings span; anywhere does where no band is known."""
+    return row.band is None or all(Bounds(*row.band).place(v) == "inside" for v in values)
+
+
+def verdict_of(row: Row, place: Place, in_band: bool = True) -> Verdict:
+    """Return the verdict from where the worst number lies; beyond its band a row fails, of whatever kind."""
+    if not in_band:
+        return FAILING
     if row.kind == "report":
         return "agrees" if place == "inside" else "departs"
     verdicts: dict[Place, Verdict] = {"inside": "holds", "near": "near", "outside": "fails"}
@@ -232,7 +239,8 @@ def _notes(row: Row, quantity: Quantity, measured: Measured) -> Iterator[str]:
     if row.recalled:
         yield "reference recalled, not read"
     if row.band is not None:
-        yield f"untuned readings span {row.band[0]:g} to {row.band[1]:g} {quantity.unit}".rstrip()
+        out = "" if stands_in_band(row, measured.values) else "outside the band: "
+        yield f"{out}untuned readings span {row.band[0]:g} to {row.band[1]:g} {quantity.unit}".rstrip()
     if measured.others and (row.recalled or measured.is_told):
         yield "with other filters " + ", ".join(f"{quantity.show(v)} ({name})" for name, v in measured.others)
 

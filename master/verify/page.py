@@ -37,7 +37,7 @@ _LEGEND: Final = (
     "<b class='holds'>holds</b>: within its range, or within the tolerance of its value. "
     "<b class='near'>near</b>: outside its range, but within the tolerance stated for it. "
     "<b class='fails'>FAILS</b>: neither. A row marked <i>indicative</i> is meant to hold too, though its source "
-    "calls its own data indicative. A row marked <i>report</i> is printed and never fails: it "
+    "calls its own data indicative. A row marked <i>report</i> is printed and fails only outside its band: it "
     "<b class='agrees'>agrees</b> or <b class='departs'>departs</b>. "
     "Percentages are of the value, or of the range's nearer limit."
 )

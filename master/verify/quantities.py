@@ -9,14 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from master.arrays import BoolArray, FloatArray
 from master.contacts import track_position
 from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_quality import Filtered, Quality
 from master.evaluation.filters import interval_mask
-from master.line import Uplift, indexed, passages, period_of
-from master.recorder import Recording
+from master.line import Uplift, indexed, passages, period_of, slackness
 from master.results import Results
 
 #: A support belongs to a place along the track within this distance [m].
@@ -181,31 +179,22 @@ def _slack_share(results: Results, choice: Choice) -> Measured:
     found = assessment(results, choice)
     contact = found.contact
     geometry = results.geometry.get(contact.catenary, {})
-    recording, names = _dropper_recording(results, f"{contact.catenary}.dropper[*].force")
+    told = slackness(results.recordings)
+    droppers = [s for s in told if s.component == contact.catenary and s.name.startswith("dropper")]
+    if not droppers:
+        raise MissingQuantityError("the run records no dropper forces")
     whole = results.recordings[0]
-    position = np.interp(recording.time, whole.time, track_position(whole, contact))
+    position = track_position(whole, contact)
     travelled, period = (float(position.min()), float(position.max())), period_of(geometry)
-    x = {n: geometry.get(f"{n.removeprefix(contact.catenary + '.').removesuffix('.force')}.x") for n in names}
     slack = [
-        _goes_slack(recording[n], np.abs(position - at) <= choice.within)
-        for n, place in x.items()
-        if place is not None
+        bool(np.any(s.slack[np.abs(np.interp(s.time, whole.time, position) - at) <= choice.within]))
+        for s in droppers
+        if (place := geometry.get(f"{s.name}.x")) is not None
         for at in passages(place, results.interval, travelled, period)
     ]
     if not slack:
         raise MissingQuantityError("there is no dropper in the interval of interest")
     return Measured((100.0 * sum(slack) / len(slack),), remark=f"{sum(slack)} of {len(slack)} droppers")
-
-
-def _dropper_recording(results: Results, pattern: str) -> tuple[Recording, tuple[str, ...]]:
-    for recording in results.recordings:
-        if len(recording.time) and (names := recording.matching(pattern)):
-            return recording, names
-    raise MissingQuantityError("the run records no dropper forces")
-
-
-def _goes_slack(force: FloatArray, near: BoolArray) -> bool:
-    return bool(np.any(force[near] <= 0.0))
 
 
 def _wave_speed(results: Results, choice: Choice) -> Measured:

@@ -40,7 +40,7 @@ from models.catenary.product import Product, inner
 from models.catenary.reaction import Meeting, Reaction
 from models.catenary.stepping import Known, Stepper, local_motion
 from models.contact import CONTACT_LAWS
-from models.part import FloatArray, IntArray, Snapshot
+from models.part import BoolArray, FloatArray, IntArray, Snapshot
 from models.time_integration import Newmark
 
 #: Step sizes whose factorisation is kept.
@@ -169,10 +169,10 @@ class CatenaryModel:
             self.modes = self._modes([part for parts in by_wire for part in parts])
         self.B = self._dropper_rows()
         self._rest_load = self.B.T @ self.rest_compensation
-        #: Elastic forces of the droppers from the attachments' displacements; from velocities what counts beside them.
+        #: Elastic forces of the droppers from the attachments' displacements; those of their dampers from velocities.
         self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
-        self._damp = Product(sp.diags(self.slack_delay * self.dropper_stiffness) @ self.B)
-        self._delayed = bool(self.slack_delay.any())
+        alpha = definition.damping.of("dropper").alpha
+        self._damp = Product(alpha * sp.diags(self.dropper_stiffness) @ self.B)
         #: Their pulls at the end of a step from the attachments' motion at its beginning; `_Step.pull` finds the rest.
         self._pull = self._pulls()
         #: What each of them pulls at.
@@ -311,18 +311,24 @@ class CatenaryModel:
         return self._in_lap(result, strips)
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
-        """Return the tension of every dropper under its law [N], shape (n_droppers,): 0 where it is slack.
+        """Return what every dropper carries under its law [N], shape (n_droppers,), its damper's part included.
 
-        By the law "tension" that is all that the dropper carries, its damper's part included. By "elastic_only" it is
-        the elastic force; the damper, which knows no slack there, belongs to the proportional damping of the line and
-        comes on top, as it does in the wires.
+        By the law "tension" that is nothing where it is slack; by "elastic_only" what the damper, which knows no slack
+        there, pulls or pushes. `dropper_slack` says which ones are slack.
         """
-        force = self.spring_force(state)
-        if self._delayed:
-            self._damp.add(state.motion.attached[1], force)
+        released, damper = self.spring_force(state), np.zeros(len(self.dropper_stiffness))
+        self._damp.add(state.motion.attached[1], damper)
+        together = self.slack_delay > 0.0  # spring and damper are released as one
+        released[together] += damper[together]
         slack = state.slack
-        force[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, force[slack] + state.compensation)
-        return force
+        released[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, released[slack] + state.compensation)
+        return released + np.where(together, 0.0, damper)
+
+    def dropper_slack(self, state: CatenaryState) -> BoolArray:
+        """Return which droppers are slack, shape (n_droppers,): by the law "elastic_only" those whose spring is."""
+        slack = np.zeros(len(self.dropper_stiffness), dtype=np.bool_)
+        slack[state.slack] = True
+        return slack
 
     def spring_force(self, state: CatenaryState) -> FloatArray:
         """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""

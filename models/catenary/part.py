@@ -123,8 +123,13 @@ class CatenaryPart:
 
     @property
     def dropper_force(self) -> FloatArray:
-        """Return the tension of every dropper [N], shape (n_droppers,); 0 where slack."""
+        """Return what every dropper carries under its law [N], shape (n_droppers,)."""
         return self.model.dropper_force(self.state)
+
+    @property
+    def dropper_slack(self) -> FloatArray:
+        """Return 1 for every dropper that is slack by its law, 0 for the others, shape (n_droppers,)."""
+        return self.model.dropper_slack(self.state).astype(np.float64)
 
     @property
     def energy(self) -> FloatArray:

@@ -141,3 +141,23 @@ def test_unknown_name_lists_the_known_ones(tmp_path, capsys):
 def test_list_names_every_definition(capsys):
     assert main(["list"]) == 0
     assert "Catenary_LN2" in capsys.readouterr().out.split()
+
+
+def test_what_is_wrong_in_a_file_of_ones_own_is_said_once_and_of_that_file(tmp_path, capfd):
+    path = tmp_path / "Mine.TOML"
+    path.write_text('type = "lumped"\n')
+    assert main(["build", str(path), "--out", str(tmp_path / "out")]) == 1
+    told = capfd.readouterr().err
+    assert told.startswith(f"error: Pantograph_Mine cannot be built: {path}: stage: ")
+    assert told.count("stage: ") == 1
+    assert "definition.toml" not in told
+
+
+def test_a_reader_that_has_had_enough_is_no_error():
+    script = "import sys; from fmus.__main__ import main; sys.exit(main(['list']))"
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-u", "-c", script]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, cwd=REPOSITORY, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (1, "")

@@ -197,6 +197,8 @@ def test_a_strip_s_ends_and_velocities_are_told_by_their_own_names(short, tmp_pa
     assert uplifts == pytest.approx(part.support_uplift.tolist())
     forces = made.get([f"dropper[{j}].force" for j in range(1, len(part.droppers) + 1)])
     assert forces == pytest.approx(part.dropper_force.tolist())
+    slack = made.get([f"dropper[{j}].slack" for j in range(1, len(part.droppers) + 1)])
+    assert slack == part.dropper_slack.tolist()
     made.free()
 
 

@@ -117,7 +117,8 @@ def test_the_probe_answers_line_by_line():
     probe = PROBE.read_text(encoding="utf-8")
     compile(probe, "probe", "exec", dont_inherit=True)
     answer = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
-    lines = answer.stdout.splitlines()
+    begin, *lines = answer.stdout.splitlines()
+    assert begin == "openpanto_probe:"
     assert Path(lines[0]).resolve() == Path(sys.executable).resolve()
     assert lines[1] == f"{sys.version_info.major}.{sys.version_info.minor}"
     assert lines[3] == ""

@@ -76,9 +76,12 @@ def test_a_definition_has_one_guid_and_its_licence_wherever_the_package_lies(whe
 
 
 def _base_interpreter(version):
-    places = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
-    found = shutil.which(f"python{version}")
-    return found or (str(places[-1]) if places else None)
+    """Return an interpreter that answers, and can make environments: one on PATH may be pyenv's stand-in for none."""
+    places = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"), reverse=True)
+    for place in (shutil.which(f"python{version}"), *places):
+        if place and _python(place, "-c", "import ensurepip, venv", cwd=Path.home(), check=False).returncode == 0:
+            return str(place)
+    return None
 
 
 @pytest.fixture(scope="module")

@@ -72,6 +72,23 @@ def test_slack_droppers_and_supports_by_their_names():
     )
 
 
+def test_what_a_line_says_itself_counts_not_the_force():
+    """Where a damper goes on acting a slack dropper carries something, and a taut one may be pushed for a moment."""
+    table = {
+        "line.dropper[2].force": [50, -20, 15, 40, -5],
+        "line.dropper[2].slack": [0, 1, 1, 0, 0],
+        "line.dropper[3].force": [50, 50, 0, 50, 50],  # of this one it says nothing
+    }
+    wanted = [("line.dropper[2]", 0.005, 0.01), ("line.dropper[3]", 0.01, 0.005)]
+    forces = {name: values for name, values in table.items() if name.endswith("force")}
+    apart = [recording(0.005, **forces), recording(0.005, **{"line.dropper[2].slack": [0, 1, 1, 0, 0]})]
+    for recordings in ([recording(0.005, **table)], apart, apart[::-1]):
+        found = find_events([recording(0.1, t=[0] * 5), *recordings], [], GEOMETRY)
+        assert [(e.what, e.time, e.duration) for e in found] == [
+            (what, pytest.approx(time), pytest.approx(duration)) for what, time, duration in wanted
+        ]
+
+
 def test_an_empty_recording_has_none():
     assert find_events([of_contact([])], [CONTACT], GEOMETRY) == ()
 

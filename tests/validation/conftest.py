@@ -44,7 +44,7 @@ def simulate(tmp_path_factory):
         key = (scenario, *options)
         if key not in done:
             folder = tmp_path_factory.mktemp("run") / "results"
-            path = ROOT / "ssp_scenarios" / f"{scenario}.ssp"
+            path = scenario if isinstance(scenario, Path) else ROOT / "ssp_scenarios" / f"{scenario}.ssp"
             command = [sys.executable, "-m", "master", str(path), "--out", str(folder), "--quiet", "--no-report"]
             answer = subprocess.run([*command, *options], cwd=ROOT, capture_output=True, text=True, check=False)
             assert answer.returncode == 0, answer.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import shutil
 import subprocess
@@ -27,6 +28,10 @@ from tests.fmus.support import Instance, toy_recipe
 
 VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
 NAME = f"python{VERSION.replace('.', '')}.dll"
+mingw = pytest.mark.skipif(
+    shutil.which("x86_64-w64-mingw32-gcc") is None and os.environ.get("OPENPANTO_INTEROP") != "required",
+    reason="needs mingw-w64",
+)
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs Linux")
 
 
@@ -179,7 +184,14 @@ def test_a_runtime_without_a_loader_is_refused(monkeypatch, tmp_path):
         build(toy_recipe(), tmp_path, runtime=runtime())
 
 
-@pytest.mark.skipif(shutil.which("x86_64-w64-mingw32-gcc") is None, reason="needs mingw-w64")
+@linux
+@pytest.mark.parametrize(("brought", "needs"), [(None, "true"), (runtime, "false")])
+def test_only_an_fmu_without_a_python_of_its_own_needs_a_tool(tmp_path, brought, needs):
+    with zipfile.ZipFile(build(toy_recipe(), tmp_path, runtime=brought and brought())) as file:
+        assert f'needsExecutionTool="{needs}"' in file.read("modelDescription.xml").decode()
+
+
+@mingw
 def test_the_loader_for_windows_has_every_function_of_fmi_for_co_simulation(tmp_path):
     stock = "binaries/win64/X.dll"
     made = with_windows_loader({stock: b"pythonfmu's"}, "X")
@@ -195,7 +207,7 @@ def test_the_loader_for_windows_has_every_function_of_fmi_for_co_simulation(tmp_
     assert len(found) == 34
 
 
-@pytest.mark.skipif(shutil.which("x86_64-w64-mingw32-gcc") is None, reason="needs mingw-w64")
+@mingw
 def test_an_fmu_with_a_windows_python_has_the_loader_there(tmp_path):
     fmu = build(toy_recipe(), tmp_path, runtime=runtime(platform="win64"))
     with zipfile.ZipFile(fmu) as file:

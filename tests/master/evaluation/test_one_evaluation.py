@@ -115,7 +115,7 @@ def test_without_an_interval_figures_begin_after_the_raising(toy, toy_text, tmp_
     assert (band["x0"], band["x1"]) == pytest.approx((quality.start, quality.end))
 
 
-def made_up(bump=0.05, where=(50.0, 100.0, 150.0), moment=0.3):
+def made_up(bump=0.05, where=(50.0, 100.0, 150.0), moment=0.3, slack=None):
     """A run at 50 m/s over 4 s; support 1 rises most while the strip is raised, before the interval of 90 to 160 m."""
     time = np.arange(4001) * 1e-3
     x, force = 50.0 * time, 150.0 + 20.0 * np.sin(2 * np.pi * 2.0 * time)
@@ -125,6 +125,10 @@ def made_up(bump=0.05, where=(50.0, 100.0, 150.0), moment=0.3):
     dropper = np.where(np.abs(time - 2.4) < 0.05, 0.0, 60.0)
     names = [f"catenary.support[{i}].uplift" for i in (1, 2, 3)] + ["catenary.dropper[1].force"]
     slow = Recording(time[::5], tuple(names), ("m", "m", "m", "N"), np.column_stack((*rises, dropper))[::5])
+    if slack is not None:
+        told = np.where(np.abs(time - slack) < 0.05, 1.0, 0.0)[::5, None]
+        names, units = (*names, "catenary.dropper[1].slack"), ("m", "m", "m", "N", "1")
+        slow = Recording(slow.time, tuple(names), units, np.hstack((slow.values, told)))
     geometry = {f"support[{i}].x": x for i, x in enumerate(where, 1)} | {"dropper[1].x": 120.0}
     settings = {"start": 0.0, "interval": {"start": 90.0, "end": 160.0}}
     summary = {"status": "complete", "contacts": [dataclasses.asdict(CONTACT)], "settings": settings}
@@ -142,6 +146,17 @@ def test_run_study_and_verification_tell_the_same_uplift_and_slack():
     assert rows["slack droppers at passage [%]"] == "100"
     assert (entry.slack, told[1]) == (1.0, 100.0)
     assert max(u.maximum for u in done.uplifts) == pytest.approx(0.09, rel=1e-3)
+
+
+@pytest.mark.parametrize(("slack", "share"), [(None, 1.0), (2.4, 1.0), (3.9, 0.0)])
+def test_droppers_are_slack_when_the_line_says_so(slack, share):
+    """The force vanishes at 2.4 s, at the passage; 3.9 s are long after. Without the line's word the force counts."""
+    done = made_up(slack=slack)
+    (entry,) = entries("one", done, Interval(name="i", start=90.0, end=160.0))
+    told = [QUANTITIES[name].measure(done, choice).values[0] for name, choice in (
+        ("slack", Choice()), ("slack_share", Choice(within=5.0)),
+    )]  # fmt: skip
+    assert (entry.slack, *told) == (share, 100.0 * share, 100.0 * share)
 
 
 def test_the_verdict_on_uplift_is_that_of_the_interval():

@@ -52,6 +52,19 @@ def made_up():
 
 
 @pytest.fixture
+def told_slack():
+    """Function that returns a run in which the line says that a dropper is slack all the time."""
+
+    def with_slack(run, number):
+        fast, slow = run.recordings
+        names, units = (*slow.names, f"catenary.dropper[{number}].slack"), (*slow.units, "1")
+        told = Recording(slow.time, names, units, np.column_stack((slow.values, np.ones(len(slow.time)))))
+        return dataclasses.replace(run, recordings=(fast, told))
+
+    return with_slack
+
+
+@pytest.fixture
 def line_geometry():
     """Calculated parameters of its catenary."""
     return dict(GEOMETRY)

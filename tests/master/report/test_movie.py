@@ -42,6 +42,13 @@ def test_slack_droppers_are_known_per_frame(movie):
     assert slack[movie.time > 1.01, 1].all()
 
 
+def test_droppers_are_drawn_slack_when_the_line_says_so(made_up, told_slack):
+    run = told_slack(made_up(), 3)
+    section = make_movie(run, run.signals).sections[0]
+    assert section.slack.any(axis=0).tolist() == [False, True, True, False]  # the second by its force
+    assert section.slack[:, 2].all()
+
+
 def test_json_holds_whole_frames(movie):
     data = json.loads(json.dumps(as_json(movie)))
     (section,) = data["sections"]

@@ -93,6 +93,12 @@ def test_slack_droppers_are_marked(made_up):
     assert slack["text"] == ["slack 49.9 % of the time"]
 
 
+def test_droppers_are_marked_slack_when_the_line_says_so(made_up, told_slack):
+    slack = traces_of(charts_of(told_slack(made_up(), 3))["droppers_catenary"])["slack"]
+    assert unpacked(slack["x"]).tolist() == [80.0, 105.0]
+    assert slack["text"] == ["slack 49.9 % of the time", "slack 100.0 % of the time"]
+
+
 def test_uplift_bars_are_in_millimetres_at_their_supports(made_up):
     (bars,) = charts_of(made_up())["uplift"].figure["data"]
     assert unpacked(bars["x"]).tolist() == [50.0, 100.0, 150.0]

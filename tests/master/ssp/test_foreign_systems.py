@@ -4,28 +4,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import fmpy
 import numpy as np
 import pytest
 
 from master.algorithm import make_algorithm
 from master.cli import main
-from master.errors import RequestError, ScenarioError, SlaveError
+from master.errors import RequestError, SlaveError
 from master.fmu.typed_values import TEXTS
 from master.isolation import Isolation
-from master.run import Manner, loaded, run
-from master.scenario import Overrides, open_scenario
+from master.run import Manner, loaded
 from master.simulation import TimeGrid, simulate
 from tests.foreign_fmus import (
     binding,
-    compile_library,
     component,
     connector,
     connectors,
     description,
+    opened,
     parameters,
+    problems,
+    ran,
     ssd,
     system,
     values,
@@ -36,47 +35,6 @@ from tests.foreign_fmus import (
 U, K, Y = connector("u", "input"), connector("k", "parameter"), connector("y", "output")
 T, X = connector("t", "output"), connector("x", "output")
 BASE = '<ssc:Unit name="{}"><ssc:BaseUnit {}/></ssc:Unit>'
-
-
-@pytest.fixture(scope="session")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compile_library(tmp_path_factory.mktemp("foreign"))
-
-
-@pytest.fixture
-def scenario(tmp_path, library):
-    """Function that writes a scenario; keywords are other FMUs than ``panel``, by name."""
-
-    def write(text, files=None, **others):
-        folder = tmp_path / "foreign.ssp"
-        for name, told in {"panel": description(), **others}.items():
-            write_fmu(folder / f"resources/{name}.fmu", library, told)
-        for name, content in (files or {}).items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_text(content)
-        (folder / "SystemStructure.ssd").write_text(text)
-        return folder
-
-    return write
-
-
-def opened(folder, **overrides):
-    with open_scenario(folder, Overrides(**overrides), build=False) as found:
-        return found.system
-
-
-def problems(folder, **overrides):
-    with pytest.raises(ScenarioError) as caught:
-        opened(folder, **overrides)
-    return [str(p) for p in caught.value.problems]
-
-
-def ran(folder, tmp_path, manner=None, **overrides):
-    """The recording of a run, by name the values at all times."""
-    with open_scenario(folder, Overrides(**overrides), build=False) as found:
-        done = run(found.system, tmp_path / "out", manner=manner or Manner())
-    recording = done.recordings[0]
-    return {name: recording[name] for name in recording.names}
 
 
 def exchanged(system):

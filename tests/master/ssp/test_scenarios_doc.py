@@ -68,6 +68,7 @@ HONOURED = {
     "percent-encoded sources": (of(component("a", Y, source="resources/pan%65l.fmu")), {"a": {}}),
     "names of SSP 2.0": (of(A.replace("Real", "Float64") + B.replace("Real", "Float64"), AB, version="2.0"), [("a.y", "b.u")]),
 }  # fmt: skip
+HONOURED["annotations of other tools"] = (of(A + B, AB).replace("</ssd:System>", '<ssd:Annotations><ssc:Annotation type="other"/></ssd:Annotations></ssd:System>'), [("a.y", "b.u")])
 TWICE = binding(("k", 'Real value="2"')) + binding(("k", 'Real value="3"'))
 HONOURED["parameter bindings"] = (of(component("a", Y, bindings=f"<ssd:ParameterBindings>{TWICE}</ssd:ParameterBindings>")), {"a": {"k": 3.0}})
 
@@ -84,6 +85,10 @@ REFUSED = {
     "variables of different types connected": (of(component("a", connector("i_out", "output", "Integer")) + B, wire("a.i_out", "b.u")), "only variables of the same type"),
     "enumerations with other items connected": (of(component("a", '<ssd:Connector name="e_out" kind="output"/>') + component("b", '<ssd:Connector name="e_in" kind="input"/>', source="resources/other.fmu"), wire("a.e_out", "b.e_in")), "connected enumerations must have the same ones"),
     "a unit with two meanings": (ssd(system(A), f"<ssd:Units>{KN.format(1)}</ssd:Units>"), "everywhere else it has factor 1000"),
+    "connectors of systems of another type": (of(A, wire("a.y", ".o"), connectors(connector("o", "output", "Integer"))), "only variables of the same type"),
+    "parameters that no variable takes": (of(component("a", Y, bindings=values(("nix", 'Real value="1"')))), "the FMU resources/panel.fmu has no such variable"),
+    "two contents of a binding": (of(component("a", Y, bindings=values(("k", 'Real value="1"')).replace("<ssd:ParameterBinding>", '<ssd:ParameterBinding source="p.ssv">'))), "has a source, 'p.ssv', and content as well"),
+    "two names of one variable": (of(component("a", Y, source="resources/alias.fmu", bindings=values(("k", 'Real value="1"'), ("k2", 'Real value="2"')))), "are one variable in the FMU"),
     "force and strip of a pantograph left open": (of(FORCE), "pantograph and line need each other"),
     "files outside the scenario": (of(component("a", Y, source="../panel.fmu")), "does not lie inside the scenario"),
     "types that SSP 2.0 added": (of(A.replace("Real", "Float32"), version="2.0"), "ssc:Float32"),
@@ -108,6 +113,7 @@ def folder(tmp_path, library):
         "panel": own,
         "other": description(items=(("off", 0), ("low", 1), ("high", 2))),
         "calculated": own.replace('name="k" valueReference="1" causality="parameter"', 'name="c" valueReference="1" causality="calculatedParameter" initial="exact"'),
+        "alias": own.replace('<ScalarVariable name="y"', '<ScalarVariable name="k2" valueReference="1" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable><ScalarVariable name="y"'),
         "pantograph": own.replace('name="u"', 'name="contact.force"').replace('name="y"', 'name="A.z"'),
     }  # fmt: skip
     for name, text in fmus.items():

@@ -18,7 +18,8 @@ def variable(name, causality, unit="", kind="Real", minimum=None, maximum=None, 
 
 
 def fmu(*variables):
-    return Fmu(Path("x.fmu"), "", "", {v.name: v for v in variables}, True, "", "")
+    found = {v.name: dataclasses.replace(v, reference=i) for i, v in enumerate(variables)}
+    return Fmu(Path("x.fmu"), "", "", found, True, "", "")
 
 
 def component(name, connectors, parameters=(), prefix=""):

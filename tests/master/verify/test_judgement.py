@@ -71,6 +71,17 @@ def test_the_worst_of_several_counts():
     assert "worst at 2 m" in judged.remark
 
 
+@pytest.mark.parametrize("kind", ["report", "must hold", "indicative"])
+def test_outside_its_band_a_row_fails_of_whatever_kind(kind):
+    row = _row(value=38.9, tolerance_percent=8, band=[33, 40], kind=kind)
+    inside, beside = ("agrees", "departs") if kind == "report" else ("holds", "fails")
+    assert [_verdict(row, v)[0] for v in (38.0, 34.0, 33.0)] == [inside, beside, beside]
+    assert [_verdict(row, v)[0] for v in (32.9, 40.1, 41.0, math.nan)] == ["fails"] * 4
+    told = decide(row, QUANTITIES["sigma"], Measured((41.0,)), {}).remark
+    assert told == "outside the band: untuned readings span 33 to 40 N"
+    assert decide(row, QUANTITIES["sigma"], Measured((38.0,)), {}).remark == "untuned readings span 33 to 40 N"
+
+
 def test_reported_rows_never_fail():
     row = _row("slack_share", within=5, minimum=100, kind="report")
     assert _verdict(row, 100.0)[0] == "agrees"

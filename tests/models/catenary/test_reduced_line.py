@@ -174,7 +174,7 @@ def test_a_constant_force_at_a_dropper_lifts_the_line_as_far(line_maker, kernel)
         for _ in range(1500):
             model.push(state, 0.01, [(0, at, 60.0)])
         node = np.abs(model.mesh.points[:, 0] - at).argmin()
-        rise.append((model.dropper_force(state), model.displacement(state)[node, 2]))
+        rise.append((model.spring_force(state), model.displacement(state)[node, 2]))
     (forces, whole), (found, lifted) = rise
     assert whole > 5e-3
     assert lifted == pytest.approx(whole, rel=1e-9)

@@ -208,6 +208,19 @@ def test_bump_stop_pushes_only_beyond_its_length():
     assert far[1, 2] < 0.0
 
 
+@pytest.mark.parametrize(("height", "stored"), [(0.0, 0.5 * 1e4 * 0.2**2), (1.0, 0.0), (4.0, 0.5 * 1e4 * 2.3**2)])
+def test_bump_stop_stores_the_work_that_is_done_on_it(height, stored):
+    """Too short by 0.2 m, between its lengths, too long by 2.3 m; its power is what the stored energy changes by."""
+    stop = {"stiffness": (1e4, "N/m"), "shortest": (0.5, "m"), "longest": (2.0, "m")}
+    m, s, _ = loads_on_box(line_force("bump_stop", **stop), (0.1, 0.2, height), velocity=(0.0, 0.0, 0.7))
+    y = m.join(s.r, np.array([[1.0, 0.0, 0.0, 0.0]] * 2), s.v, s.w)  # upright: the far point is 0.3 m above
+    moved = [m.kinematics(m.shifted(y, t * s.v, t * s.w)) for t in (-1e-6, 0.0, 1e-6)]
+    energy = [m.forces.energy(m.pool.evaluate(kinematics)) for kinematics in moved]
+    assert energy[1] == pytest.approx(stored)
+    upright = m.loads(y, m.kinematics(y), Inputs())
+    assert upright[1, 2] * 0.7 == pytest.approx(-(energy[2] - energy[0]) / 2e-6, rel=1e-6)
+
+
 def test_joint_friction_stops_a_pendulum():
     data = pendulum_data((0.0, 0.4, 0.0))
     data["force"]["rub"] = {

@@ -32,7 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         code: int | None = options.run(options)
-        sys.stdout.flush()  # here, where an error can still be told
+        if sys.stdout is not None:  # closed by the caller
+            sys.stdout.flush()  # here, where an error can still be told
     except (UnknownFmuError, BuildError) as error:
         return _fail(str(error))
     except BrokenPipeError:  # whoever read the output had enough of it
@@ -40,6 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except OSError as error:
         return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
+    except MemoryError:
+        return _fail("there is not enough memory; end other programs, or raise the limit (ulimit -v)")
     except KeyboardInterrupt:
         return _fail("interrupted")
     return code or 0

@@ -1,13 +1,18 @@
-"""What the FMUs of a run warn of, when initialization and the first step are over, and values that cannot be."""
+"""What the FMUs of a run warn of, and values that cannot be.
+
+An FMU is asked when initialization and the first step are over, and once more at the end.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from master.errors import MasterError
 from master.instance import Cautious
 from master.network import Network
 
@@ -46,7 +51,7 @@ class Excess(Caution):
 
 
 class CautionObserver:
-    """Observer that asks the FMUs after initialization, and once more after the first step, and looks at all values.
+    """Observer that asks the FMUs after initialization, after the first step and at the end, and looks at all values.
 
     Parameters
     ----------
@@ -62,11 +67,13 @@ class CautionObserver:
     def __init__(self, tell: Callable[[Caution], None] = lambda _: None) -> None:
         self._tell = tell
         self._has_stepped = False
+        self._network: Network | None = None
         self._seen: set[str] = set()
         self.warnings: list[Caution] = []
 
     def begin(self, start: float, network: Network) -> None:
         """Initialization is over."""
+        self._network = network
         self._look(network)
         self._weigh(start, network)
 
@@ -79,7 +86,10 @@ class CautionObserver:
             self._look(network)
 
     def finish(self) -> None:
-        """Nothing to finish."""
+        """Ask for what was said since the first step; one that cannot answer any more has said why it failed."""
+        if self._network is not None:
+            with suppress(MasterError):
+                self._look(self._network)
 
     def add(self, found: Caution) -> None:
         """Take a warning that comes from elsewhere."""

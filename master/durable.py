@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,6 +19,8 @@ PART: Final = ".part"
 _ELSEWHERE: Final = "another folder with --out"
 #: How a cell begins that a spreadsheet computes, behind what keeps it from doing so.
 _FORMULA: Final = re.compile(r"'*[=+\-@\t\r]")
+#: Bytes that are read at once.
+_PIECE: Final = 1 << 20
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -45,6 +48,9 @@ def whole_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
     MasterError
         If it cannot be written; the old one is still there then.
     """
+    # A device, such as /dev/null, would be replaced by a file for all users of the computer.
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise MasterError(f"{path} is no file, and is left alone; choose {elsewhere}")
     # Hidden, so that no archive takes it along, and each process has its own: two writers do not mix.
     temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     try:
@@ -113,9 +119,12 @@ class LineFile:
     def __init__(self, path: Path, keep: int = 0) -> None:
         self.path = path
         self._size = keep
+        self._sum = 0
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
             os.ftruncate(self._file, keep)
+            if keep:
+                self._sum = _check_sum(path)
             os.lseek(self._file, keep, os.SEEK_SET)
         except OSError as error:
             raise cannot_write(path, error) from error
@@ -130,7 +139,15 @@ class LineFile:
         except OSError as error:
             self._cut(lines[:done])
             raise cannot_write(self.path, error) from error
-        self._size += done
+        self._count(lines)
+
+    @property
+    def is_as_written(self) -> bool:
+        """Whether the file of this name holds what was kept and written here, and nothing else."""
+        try:
+            return self.path.stat().st_size == self._size and _check_sum(self.path) == self._sum
+        except OSError:
+            return False
 
     def sync(self) -> None:
         """Wait until what was written is on the disk."""
@@ -146,6 +163,18 @@ class LineFile:
             os.close(self._file)
 
     def _cut(self, written: bytes) -> None:
-        self._size += written.rfind(b"\n") + 1
+        self._count(written[: written.rfind(b"\n") + 1])
         os.ftruncate(self._file, self._size)
         os.lseek(self._file, self._size, os.SEEK_SET)
+
+    def _count(self, written: bytes) -> None:
+        self._size += len(written)
+        self._sum = zlib.crc32(written, self._sum)
+
+
+def _check_sum(path: Path) -> int:
+    found = 0
+    with path.open("rb") as file:
+        while piece := file.read(_PIECE):
+            found = zlib.crc32(piece, found)
+    return found

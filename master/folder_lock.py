@@ -88,8 +88,9 @@ def claimed(folder: Path, remedy: str = "choose another with --out") -> Iterator
     finally:
         del _held[key]
         with suppress(OSError):  # the folder is gone, or (Windows) the file is open
-            (folder / OWNER).unlink()
-            (folder / LOCK).unlink()
+            if os.path.samestat(os.fstat(lock), (folder / LOCK).stat()):  # not another's, in a folder made anew
+                (folder / OWNER).unlink()
+                (folder / LOCK).unlink()
         os.close(lock)
 
 

@@ -160,6 +160,11 @@ class Recorder:
         """How many rows the file must have: those kept and those recorded."""
         return self._rows
 
+    @property
+    def is_as_written(self) -> bool:
+        """Whether the file holds to the last byte what was kept and recorded."""
+        return self._file.is_as_written
+
     def sync(self) -> None:
         """Write what is waiting and wait until it is on the disk."""
         self._write()

@@ -431,6 +431,8 @@ class _Session:
             if outcome.status == "complete" and len(recording.time) != recorder.rows:
                 found = f"has {len(recording.time)} rows, {recorder.rows} were written"
                 raise ForeignResultsError(f"{recorder.path} {found}: it was changed {advice}")
+            if outcome.status == "complete" and not recorder.is_as_written:
+                raise ForeignResultsError(f"{recorder.path} is not what was written: it was changed {advice}")
         return recordings
 
     def checked(self, outcome: Outcome, recording: Recording) -> Outcome:

@@ -8,6 +8,7 @@ Without ``fork`` (Windows), and for those who call the package from their own pr
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import select
@@ -39,6 +40,7 @@ def supervised(work: Callable[[], int]) -> int:
     Returns in both processes: the caller is to end with the code that it gets.
     """
     global _reports
+    _fill_standard_streams()
     if not hasattr(os, "fork"):
         return work()
     reports, _reports = os.pipe()
@@ -53,6 +55,16 @@ def supervised(work: Callable[[], int]) -> int:
         return _worked(work)
     os.close(_reports)
     return _Supervisor(child, reports).wait()
+
+
+def _fill_standard_streams() -> None:
+    """Open what the caller has closed (``>&-``): else the next file would be it, and take what FMUs print."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(descriptor, True)
+    os.close(descriptor)
+    for descriptor, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, io.TextIOWrapper(io.FileIO(descriptor, "w", closefd=False), encoding="utf-8"))
 
 
 def die_with(parent: int) -> None:
@@ -102,6 +114,8 @@ def _worked(work: Callable[[], int]) -> int:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
         print("error: interrupted", file=sys.stderr)
+    except MemoryError:
+        print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
     except BaseException:
         traceback.print_exc()
     with suppress(OSError, ValueError):

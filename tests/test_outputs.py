@@ -97,7 +97,7 @@ def test_an_fmu_that_cannot_be_written_is_named(tmp_path, monkeypatch):
 
 def test_a_pack_that_does_not_fit_leaves_the_old_one(tmp_path, monkeypatch):
     (tmp_path / "s.ssp").mkdir()
-    (tmp_path / "s.ssp" / "SystemStructure.ssd").write_text("x" * 1000)
+    (tmp_path / "s.ssp" / "SystemStructure.ssd").write_text(f"<a>{'x' * 1000}</a>")
     archive = tmp_path / "out.ssp"
     archive.write_text("old")
     monkeypatch.setattr(durable.os, "fsync", full)
@@ -147,3 +147,17 @@ def test_a_full_standard_output_is_named(monkeypatch, capsys):
     monkeypatch.setattr("sys.stdout", Full())
     assert main(["list"]) == 1
     assert capsys.readouterr().err == "error: standard output: No space left on device\n"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
+@pytest.mark.parametrize(
+    ("write", "raised"), [(durable.write_whole, MasterError), (output_files.write_whole, OSError)]
+)
+def test_what_is_no_file_is_not_replaced(tmp_path, write, raised):
+    """Such as /dev/null, for everybody, when it is root who writes."""
+    path = tmp_path / "device"
+    os.mkfifo(path)
+    with pytest.raises(raised, match="is no file, and is left alone"):
+        write(path, b"new")
+    assert path.is_fifo()
+    assert [p.name for p in tmp_path.iterdir()] == ["device"]

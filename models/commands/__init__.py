@@ -37,13 +37,17 @@ def main(argv: Sequence[str]) -> int:
     arguments = parser.parse_args(argv)
     try:
         code = int(arguments.run(arguments))
-        sys.stdout.flush()  # here, where an error can still be told
+        if sys.stdout is not None:  # closed by the caller
+            sys.stdout.flush()  # here, where an error can still be told
     except OSError as error:
         text = f"{error.filename or 'standard output'}: {error.strerror or error}"
         print(f"error: {printable(text)}", file=sys.stderr)
         return 1
     except _USER_ERRORS as error:
         print(f"error: {printable(str(error))}", file=sys.stderr)
+        return 1
+    except MemoryError:
+        print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 from collections.abc import Sequence
@@ -26,7 +27,10 @@ def write_whole(path: Path, data: bytes) -> None:
     OSError
         That names the file, if it cannot be written; the old one is still there then.
     """
-    temporary = path.with_name(path.name + _PART)
+    # A device, such as /dev/null, would be replaced by a file for all users of the computer.
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EEXIST, "this is no file, and is left alone; choose another", str(path))
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART}")  # two commands do not mix
     try:
         with temporary.open("wb") as file:
             file.write(data)

@@ -59,7 +59,7 @@ def expected(function, kind):
     if kind == "hang":
         return rf"{WHO} did not finish {re.escape(doing)} within \d+ s.*; its process was ended"
     if function == "fmi2SerializedFMUstateSize" and kind == "claim":
-        return rf"{WHO} claims a state of {2**40} bytes, of which at most {2**30} are taken"
+        return rf"{WHO} claims a state of {2**40} bytes, more than the {2**30} that are read"
     if loading:
         return r"component 'bad': Hostile\.fmu cannot be loaded" + ("" if kind != "claim" else r".*: x+ \.\.\.")
     if freeing:

@@ -28,9 +28,10 @@ class ToyCatenary(Fmi2Slave):
         self.fail_at = 1e9
         self.nan_at = 1e9
         self.warn = 0.0
+        self.warn_at = 1e9
         self.values = {}
         self.time = 0.0
-        for name in ("stiffness", "height", "fail_at", "nan_at", "warn"):
+        for name in ("stiffness", "height", "fail_at", "nan_at", "warn", "warn_at"):
             self.register_variable(Real(name, causality=C.parameter, variability=V.tunable))
         for end in "AB":
             for kind in ("", "v"):
@@ -75,6 +76,8 @@ class ToyCatenary(Fmi2Slave):
         if time >= self.fail_at:
             raise RuntimeError("the wire broke at 100 percent load")
         self._contact()
+        if time >= self.warn_at:
+            self.log(f"the wire is hot after {self.warn_at:g} s", Fmi2Status.warning)
         if time >= self.nan_at:
             self.values["pantograph[1].contact.force"] = float("nan")
         return True

@@ -79,6 +79,16 @@ def test_a_run_shows_and_keeps_them(toy, tmp_path, capfd, how):
     assert "catenary warns: the wire [sags]" in (folder / "report.html").read_text()
 
 
+@pytest.mark.parametrize("how", [[], ["--isolate"]])
+def test_what_is_said_long_after_the_first_step_is_shown_once(toy, tmp_path, capfd, how):
+    folder = tmp_path / "r"
+    command = ["run", str(toy), "--no-build", "--no-report", "--stop", "0.05", "--out", str(folder), *how]
+    assert main([*command, "--set", "catenary.warn_at=0.02"]) == 0
+    assert capfd.readouterr().err.count("warning: component 'catenary' says: the wire is hot after 0.02 s\n") == 1
+    said = json.loads((folder / "summary.json").read_text())["warnings"]
+    assert said == [{"component": "catenary", "text": "the wire is hot after 0.02 s"}]
+
+
 def test_a_quiet_run_keeps_them_in_its_summary(toy, tmp_path, capfd):
     folder = tmp_path / "r"
     command = ["run", str(toy), "--no-build", "--no-report", "--quiet", "--stop", "0.05", "--out", str(folder)]

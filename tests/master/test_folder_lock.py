@@ -209,6 +209,35 @@ def test_rows_are_counted_before_a_run_is_complete(toy, tmp_path, capsys, monkey
     assert "quality" not in summary
 
 
+def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsys, monkeypatch):
+    """As if somebody had put another table, of as many rows and bytes, in its place meanwhile."""
+    folder = tmp_path / "out"
+
+    def replaced(path):
+        if path.name == "timeseries.csv":
+            text = path.read_text().rstrip("\n")
+            path.write_text(f"{text[:-1]}{'1' if text[-1] != '1' else '2'}\n")
+        return load(path)
+
+    monkeypatch.setattr("master.recorder.load", replaced)
+    assert go(toy, folder, "--stop", "0.1") == 1
+    assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == "failed"
+    assert "quality" not in summary
+
+
+def test_a_folder_made_anew_keeps_its_lock_when_the_first_owner_ends(tmp_path, holder):
+    folder = tmp_path / "held"
+    folder.mkdir()
+    with claimed(folder):
+        folder.rename(tmp_path / "moved")
+        process = holder(folder)
+    assert json.loads((folder / OWNER).read_text())["process"] == process.pid
+    with pytest.raises(FolderInUseError, match=f"process {process.pid} on"), claimed(folder):
+        pass
+
+
 def test_study_and_verification_are_alone_in_their_folders(toy, tmp_path, capsys, holder):
     (toy / "study.toml").write_text('title = "a"\n[[interval]]\nname = "whole"\nstart = 10.0\nend = 45.0\n')
     (toy / "variants.csv").write_text("variant,catenary.stiffness\nsoft,4000\n")

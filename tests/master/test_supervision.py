@@ -40,6 +40,7 @@ def go(work, *arguments, **options):
         ("sys.exit(2)", 2, ""),
         ("os._exit(0)", 1, "error: the process ended itself with exit code 0 before it had finished"),
         ("os._exit(7)", 1, "error: the process ended itself with exit code 7 before it had finished"),
+        ("raise MemoryError", 1, "error: there is not enough memory; end other programs"),
         ("os.abort()", 1, "error: the process was ended by signal SIGABRT (Aborted) before it had finished"),
         ("os.kill(os.getpid(), signal.SIGKILL)", 1, "error: the process was ended by signal SIGKILL (Killed)"),
         ("os.kill(os.getppid(), signal.SIGHUP); time.sleep(30)", 1, "error: interrupted"),
@@ -114,3 +115,18 @@ def test_nothing_that_is_only_in_unix_is_needed_to_import_the_master():
     command = [sys.executable, "-c", textwrap.dedent(code)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (3, "")
+
+
+def test_what_the_caller_has_closed_takes_no_output_of_others(tmp_path):
+    """Else the first table that is opened is descriptor 1, and native code prints into it."""
+    table = tmp_path / "table.csv"
+    work = """
+        table = open(sys.argv[1], "w")
+        os.write(1, b"printed by an FMU")
+        print("and by us")
+        table.write("row")
+        return 0
+    """
+    command = [sys.executable, "-c", script(work), str(table)]
+    done = subprocess.run(["sh", "-c", 'exec "$@" >&- 2>&-', "sh", *command], cwd=ROOT, timeout=60)
+    assert (done.returncode, table.read_text()) == (0, "row")

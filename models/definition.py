@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from models.units import to_si
+from models.units import shown, to_si
 
 #: Longest message told in full [characters]: a value may be megabytes of nested lists; and most of them told.
 _LONGEST: Final = 400
@@ -397,9 +397,9 @@ class Table:
     ) -> None:
         for value in values:
             if positive and value < SMALLEST:
-                self.problem(name, f"{value:g} {unit} must be greater than 0")
+                self.problem(name, f"{shown(value, unit)} must be greater than 0")
             elif not minimum <= value <= maximum:
-                text = f"{value:g} {unit} is outside {minimum:g} ... {maximum:g} {unit}"
+                text = f"{shown(value, unit)} is outside {minimum:g} ... {shown(maximum, unit)}"
                 self.problem(name, text + in_its_unit(unit))
 
     def _report_unknown(self) -> None:

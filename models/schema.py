@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from models.definition import SMALLEST, Quantity, Table, beyond_all, in_its_unit
 from models.part import Parameter, ParameterError
+from models.units import shown
 
 _META = "openpanto"
 T = TypeVar("T")
@@ -169,9 +170,9 @@ def _check(name: str, value: float, spec: _Spec) -> None:
     if spec.integer and not float(value).is_integer():
         raise ParameterError(f"parameter '{name}': {value:g} is not a whole number")
     if spec.positive and value < SMALLEST:
-        raise ParameterError(f"parameter '{name}': {value:g} {spec.unit} must be greater than 0")
+        raise ParameterError(f"parameter '{name}': {shown(value, spec.unit)} must be greater than 0")
     if not spec.minimum <= value <= spec.maximum:
         raise ParameterError(
-            f"parameter '{name}': {value:g} {spec.unit} is outside {spec.minimum:g} ... {spec.maximum:g} {spec.unit}"
-            f"{in_its_unit(spec.unit)}"
+            f"parameter '{name}': {shown(value, spec.unit)} is outside {spec.minimum:g} ... "
+            f"{shown(spec.maximum, spec.unit)}{in_its_unit(spec.unit)}"
         )

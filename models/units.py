@@ -64,3 +64,14 @@ def to_si(value: float, unit: str, wanted: str) -> float:
     if si != wanted:
         raise ValueError(f"unit '{unit}' where a unit of '{wanted}' is needed")
     return value * factor
+
+
+def shown(value: float, unit: str) -> str:
+    """Return a value with its unit as a message says it; a plain number has none.
+
+    Examples
+    --------
+    >>> shown(12.0, "kN"), shown(0.5, "1")
+    ('12 kN', '0.5')
+    """
+    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"

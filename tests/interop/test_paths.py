@@ -251,9 +251,11 @@ def test_a_missing_package_is_named(host, pair, tmp_path):
 
 def test_an_initialisation_that_fails_is_an_error(host, pair, tmp_path):
     part = unpack(pair[0], tmp_path)
-    reference = part.references["contact_wire.tension"]
     orders = order("fmu", part.library, part.guid, _uri(part.folder / "resources"))
-    orders += f"\nparameter 0 {reference} 1.0\n"
+    # Each within its range, but together they sag too far.
+    for name, value in (("contact_wire.tension", 500.0), ("contact_wire.mass", 20.0)):
+        orders += f"\nparameter 0 {part.references[name]} {value}"
+    orders += "\n"
     done = run_host(host, orders + "run 2 0.001\n", OPENPANTO_PYTHON=sys.executable)
     assert done.returncode == 1
     assert "no static equilibrium of the wanted shape" in done.stderr

@@ -167,7 +167,8 @@ def test_energy_added_by_the_coupling_is_reported_and_falls_with_the_step(origin
 @pytest.mark.parametrize("scheme", ["jacobi", "gauss-seidel", "iterative"])
 def test_energy_is_kept_by_the_parts_and_nearly_by_their_coupling(original, tmp_path, expected, scheme):
     """Also where steps are repeated from saved states; and watching changes no figure."""
-    with open_scenario(original, Overrides(STOP, scheme=scheme, energy=True, may_stop_early=True), build=False) as opened:
+    watched = Overrides(STOP, scheme=scheme, energy=True, may_stop_early=True)
+    with open_scenario(original, watched, build=False) as opened:
         done = run(opened.system, tmp_path / "watched")
     parts = {b["what"]: b for b in done.summary["energy"]}
     assert set(parts) == {"catenary", "pantograph", "pantograph - catenary"}
@@ -179,7 +180,8 @@ def test_energy_is_kept_by_the_parts_and_nearly_by_their_coupling(original, tmp_
 
 def test_inputs_that_are_held_are_found_to_add_energy(original, tmp_path):
     held = {f"{part}.extrapolation_order": "0" for part in ("catenary", "pantograph")}
-    with open_scenario(original, Overrides(1.0, parameters=held, energy=True, may_stop_early=True), build=False) as opened:
+    watched = Overrides(1.0, parameters=held, energy=True, may_stop_early=True)
+    with open_scenario(original, watched, build=False) as opened:
         done = run(opened.system, tmp_path / "held")
     (event,) = (e for e in done.events if e.kind == DRIFT)
     assert event.what == "pantograph - catenary"

@@ -15,10 +15,10 @@ from models.pantograph.identify import (
     RESPONSE_KINDS,
     IdentifiedModel,
     Response,
-    chain_stiffness,
     identify,
     read_response,
 )
+from models.pantograph.lumped_characteristics import chain_stiffness
 from models.part import ParameterError
 
 

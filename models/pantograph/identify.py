@@ -19,13 +19,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from models.definition import LARGEST, SMALLEST, DefinitionError, Problem
+from models.pantograph.lumped_characteristics import ComplexArray, chain_stiffness
 from models.part import FloatArray
-
-ComplexArray = npt.NDArray[np.complex128]
 
 #: What a response file may hold: displacement per force [m/N], force per acceleration [kg], per displacement [N/m].
 RESPONSE_KINDS: Final = ("receptance", "apparent_mass", "dynamic_stiffness")
@@ -77,28 +75,6 @@ class IdentifiedModel:
     stiffnesses: FloatArray
     deviations: dict[str, float]
     misfit: float
-
-
-def chain_stiffness(
-    frequency: FloatArray, masses: FloatArray, dampings: FloatArray, stiffnesses: FloatArray
-) -> ComplexArray:
-    """Return the dynamic stiffness at the top of a chain of masses on fixed ground, shape (f,) [N/m].
-
-    Parameters
-    ----------
-    frequency : ndarray, shape (f,)
-        [Hz]
-    masses, dampings, stiffnesses : ndarray, shape (n,)
-        Bottom to top; damper and spring i connect mass i to the one below.
-    """
-    s = 2j * np.pi * np.asarray(frequency)
-    total: ComplexArray | None = None
-    for m, c, k in zip(masses, dampings, stiffnesses, strict=True):
-        link = k + s * c
-        total = s**2 * m + (link if total is None else link * total / (link + total))
-    if total is None:
-        raise ValueError("a chain needs at least one stage")
-    return total
 
 
 def read_response(path: Path, kind: str = "receptance") -> Response:

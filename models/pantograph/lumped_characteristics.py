@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.pantograph.identify import chain_stiffness
 from models.pantograph.lumped import LumpedModel
 from models.pantograph.parameters import LumpedDefinition
 from models.part import FloatArray
+
+ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,28 @@ class LumpedMode:
 
     frequency: float
     damping: float
+
+
+def chain_stiffness(
+    frequency: FloatArray, masses: FloatArray, dampings: FloatArray, stiffnesses: FloatArray
+) -> ComplexArray:
+    """Return the dynamic stiffness at the top of a chain of masses on fixed ground, shape (f,) [N/m].
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (f,)
+        [Hz]
+    masses, dampings, stiffnesses : ndarray, shape (n,)
+        Bottom to top; damper and spring i connect mass i to the one below.
+    """
+    s = 2j * np.pi * np.asarray(frequency)
+    total: ComplexArray | None = None
+    for m, c, k in zip(masses, dampings, stiffnesses, strict=True):
+        link = k + s * c
+        total = s**2 * m + (link if total is None else link * total / (link + total))
+    if total is None:
+        raise ValueError("a chain needs at least one stage")
+    return total
 
 
 def contact_force_over_height(definition: LumpedDefinition, heights: FloatArray) -> FloatArray:
@@ -61,7 +84,7 @@ def modes(definition: LumpedDefinition) -> tuple[LumpedMode, ...]:
     return tuple(sorted(found, key=lambda mode: mode.frequency))
 
 
-def apparent_mass(definition: LumpedDefinition, frequency: FloatArray) -> npt.NDArray[np.complex128]:
+def apparent_mass(definition: LumpedDefinition, frequency: FloatArray) -> ComplexArray:
     """Return force over acceleration of the strip, shape (f,) [kg], at ``frequency`` [Hz], greater than 0."""
     stages = definition.stage
     stiffness = chain_stiffness(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+import zipfile
 from pathlib import Path
 
 import pytest
 
-from fmus.build import ROOTS
+from fmus.build import ROOTS, build, recipe
 from fmus.bundle import BundleError, Module, check_rewritten, collect, rewrite
 
 HERE = {"models": Path(), "fmus": Path()}
@@ -77,3 +79,15 @@ def test_the_adapter_can_be_packed():
     assert not {"fmus.build", "pythonfmu.builder"} & modules.keys()
     for module in modules.values():
         check_rewritten(rewrite(module, "private", ROOTS), module.name, ROOTS)
+
+
+@pytest.mark.parametrize("name", ["Catenary_LN2", "Pantograph_CX", "Pantograph_generic_multibody"])
+def test_an_fmu_needs_little_of_scipy(name, tmp_path):
+    """What an FMU imports travels along in a standalone one: scipy.optimize alone would double its 20 MB."""
+    with zipfile.ZipFile(build(recipe(name), tmp_path)) as archive:
+        sources = {n: archive.read(n).decode() for n in archive.namelist() if n.endswith(".py") and "/models/" in n}
+    assert len(sources) > 10
+    found = set(re.findall(r"^\s*(?:from|import) (scipy[\w.]*)", "\n".join(sources.values()), re.M))
+    linear = {"scipy.linalg", "scipy.linalg.lapack"}
+    sparse = {"scipy.sparse", "scipy.sparse._sparsetools", "scipy.sparse.linalg"}
+    assert found <= {"scipy", *linear, *sparse}, found

@@ -257,12 +257,12 @@ def test_one_calibration_at_a_time_stores_its_value(toy, capsys, holder):
     end(process)
     owner = (toy / OWNER).read_text()
     before = (toy / "parameters.ssv").read_text()
-    running = start(*command)
-    wait_for(lambda: (toy / OWNER).read_text() not in ("", owner))
-    time.sleep(0.5)  # it is reading
+    running = start(*command[:-1], "120")  # which takes a second run
+    first = next(line for line in running.stderr if "mean force" in line)  # what is written was read before
+    assert (toy / OWNER).read_text() not in ("", owner)
     (toy / "parameters.ssv").write_text(before + " ")
     _, text = running.communicate(timeout=120)
-    assert running.returncode == 1
+    assert running.returncode == 1, first + text
     assert "parameters.ssv was changed during the calibration: nothing is stored" in " ".join(text.split())
     assert (toy / "parameters.ssv").read_text() == before + " "
 

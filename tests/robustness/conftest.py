@@ -60,6 +60,7 @@ def _outside(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     os.chdir(before)
 
 
+@pytest.hookimpl(trylast=True)  # pytest itself brings tests that share a parametrized fixture together
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the sum of all inputs behind the inputs."""
     items.sort(key=lambda item: item.name == "test_at_least_5000_inputs_were_tried")

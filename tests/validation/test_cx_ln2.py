@@ -62,7 +62,7 @@ def sources_form(simulate):
     The tolerances of the table were set for this one.
     """
     given = load_case(CASES / "ln2_readings.toml").runs["supports_source"]
-    return simulate(given.scenario, *(f"--set={name}={value!r}" for name, value in given.set.items()))
+    return simulate(given.scenario, *(f"--set={name}={value:.12g}" for name, value in given.set.items()))
 
 
 def _uplift(run, x):

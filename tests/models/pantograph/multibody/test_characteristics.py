@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.pantograph.identify import chain_stiffness
+from models.pantograph.lumped_characteristics import chain_stiffness
 from models.pantograph.multibody.characteristics import Rig
 from tests.models.pantograph.multibody.mechanisms import library
 

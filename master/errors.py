@@ -20,6 +20,8 @@ def one_line(text: str) -> str:
     --------
     >>> print(one_line("soon\n\x1b[2J"))
     soon\n\x1b[2J
+    >>> print(one_line("a column named '\N{NO-BREAK SPACE}'"))
+    a column named '\xa0'
     """
     if len(text) > _LONGEST:
         half = _LONGEST // 2
@@ -38,11 +40,11 @@ def printable(text: str) -> str:
     >>> printable("8\N{NO-BREAK SPACE}%") == "8\N{NO-BREAK SPACE}%"
     True
     """
-    return text if text.isprintable() else "".join(c if c == "\n" else _shown(c) for c in text)
+    return text if text.isprintable() else "".join(c if c in "\n\N{NO-BREAK SPACE}" else _shown(c) for c in text)
 
 
 def _shown(c: str) -> str:
-    return c if c.isprintable() or c == "\N{NO-BREAK SPACE}" else c.encode("unicode_escape").decode("ascii")
+    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 import sys
 
 from models.commands import main
+from models.commands.interruption import watch_interruptions
 
 if __name__ == "__main__":
+    watch_interruptions()
     sys.exit(main(sys.argv[1:]))

@@ -18,6 +18,7 @@ from tests.interop.support import ROOT
 VERSIONS = ("3.11", "3.12", "3.13")
 #: Largest difference of a contact force between versions [N].
 TOLERANCE = 1e-9
+RUNNER = ROOT / "tests" / "interop" / "tools" / "run_ours.py"
 _WHEEL = "import sys; from setuptools.build_meta import build_wheel; print(build_wheel(sys.argv[1]))"
 
 
@@ -125,12 +126,13 @@ def test_fmus_of_every_version_run_on_every_version(interpreters, tmp_path):
         scenario = tmp_path / builder / "cx_ln2.ssp"
         shutil.copytree(ROOT / "ssp_scenarios" / "cx_ln2.ssp", scenario, ignore=shutil.ignore_patterns("resources"))
         shutil.rmtree(scenario / "resources", ignore_errors=True)
-        _python(interpreters[builder], "-m", "master", "pack", scenario, "--out", tmp_path / "x.ssp", cwd=tmp_path)
+        words = ["-m", "master", "pack", scenario, "--out", _packed(tmp_path, builder)]
+        _python(interpreters[builder], *words, cwd=tmp_path)
     for builder, runner in product(interpreters, interpreters):
-        out = tmp_path / f"{builder}-{runner}"
-        words = ["-m", "master", tmp_path / builder / "cx_ln2.ssp", "--no-build", "--stop", "0.5", "--out", out]
-        _python(interpreters[runner], *words, "--quiet", "--no-report", cwd=tmp_path)
-        forces[builder, runner] = _forces(out / "timeseries.csv")
+        out = tmp_path / f"{builder}-{runner}.csv"
+        # With all digits: those of a recording end at the tenth, 1e-7 N.
+        _python(interpreters[runner], RUNNER, _packed(tmp_path, builder), "0.5", "0.001", out, cwd=tmp_path)
+        forces[builder, runner] = _forces(out)
     first = next(iter(forces.values()))
     assert max(first) > 50.0
     for pair, values in forces.items():
@@ -141,6 +143,8 @@ def test_fmus_of_every_version_run_on_every_version(interpreters, tmp_path):
 
 def _forces(path):
     with path.open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    column = next(name for name in rows[0] if "contact.force" in name)
-    return [float(row[column]) for row in rows]
+        return [float(row["force"]) for row in csv.DictReader(file)]
+
+
+def _packed(folder, builder):
+    return folder / f"built_on_{builder}.ssp"

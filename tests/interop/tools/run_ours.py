@@ -28,7 +28,8 @@ class Collector:
 
 
 collector = Collector()
-with open_scenario(Path(archive), Overrides(count * step, step, "jacobi"), build=False) as scenario:
+overrides = Overrides(count * step, step, "jacobi", may_stop_early=True)
+with open_scenario(Path(archive), overrides, build=False) as scenario:
     watch = common.Watch()
     with loaded(scenario.system) as network:
         outcome = simulate(network, Jacobi(), TimeGrid(0.0, step, count), [collector])

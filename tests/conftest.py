@@ -11,12 +11,14 @@ from tests.effort import IS_LONG
 ROBUSTNESS = Path(__file__).parent / "robustness"
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Keep the robustness tests, which add up their inputs, in one process of pytest-xdist."""
+    if item.path.is_relative_to(ROBUSTNESS):
+        item.add_marker(pytest.mark.xdist_group("robustness"))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave the long checks out unless asked for; keep the robustness tests, which add up their inputs, together."""
-    for item in items:
-        if item.path.is_relative_to(ROBUSTNESS):
-            item.add_marker(pytest.mark.xdist_group("robustness"))
+    """Leave the long checks out unless asked for."""
     if not IS_LONG:
         left_out = [item for item in items if item.get_closest_marker("long")]
         items[:] = [item for item in items if not item.get_closest_marker("long")]

@@ -83,5 +83,6 @@ def test_a_command_that_heeds_the_first_signal_ends_by_itself():
 def test_the_watching_process_goes_with_the_command():
     """What it prints ends with the command: nobody waits for the other process."""
     code = BUSY.format(work="", grace=1000.0)
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=30, check=True)
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=30, check=True)
     assert (done.stdout, done.stderr) == ("ready\ndone\n", "")

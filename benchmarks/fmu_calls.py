@@ -9,7 +9,7 @@ from pathlib import Path
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from fmus.build import build, recipe
+from fmus.builder.fmu_build import build, recipe
 
 STEP = 1e-3
 

@@ -18,9 +18,9 @@ from collections.abc import Callable
 from lines import long_line
 from timing import by_turns, memory, on_one_thread, table
 
-from master.results import peak_memory
-from models.catenary.model import CatenaryModel
-from models.coupled import CoupledModel
+from master.results.run_results import peak_memory
+from models.catenary.line_model import CatenaryModel
+from models.coupled.monolithic import CoupledModel
 from models.library import load_lumped
 
 STEP = 1e-3

@@ -14,14 +14,16 @@ from clocks import Clocks, Parts
 from fmu_calls import stepped
 from timing import by_turns, on_one_thread, table
 
-from models.catenary import local_response
-from models.catenary.model import CatenaryModel
-from models.coupled import CoupledModel
+from models.catenary.contact_and_slack import local_problem
+from models.catenary.line_model import CatenaryModel
+from models.coupled.monolithic import CoupledModel
 from models.library import load_line, load_lumped
-from models.pantograph.lumped import LumpedModel
+from models.pantograph.lumped.lumped_model import LumpedModel
 
 STEP = 1e-3
 STEPS = 200
+
+
 def main(name: str) -> None:
     on_one_thread()
     begin = time.process_time()
@@ -54,7 +56,7 @@ def parts(model: CatenaryModel) -> Parts:
         f"products ({stepper.__name__})": (stepper, ("begin", "finish")),
         f"band solution ({stepper.__name__})": (stepper, ("solve",)),
         "finding the contact": (CatenaryModel, ("_open_contacts",)),
-        "contact force and slack droppers": (local_response.LocalProblem, ("solve",)),
+        "contact force and slack droppers": (local_problem.LocalProblem, ("solve",)),
         "pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of")),
         "rest of the line": (CatenaryModel, ("step",)),
     }

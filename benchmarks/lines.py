@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import tomllib
 
-from models.catenary.parameters import CatenaryDefinition, read
-from models.definition import Table
+from models.catenary.definition.line_definition import CatenaryDefinition, read
+from models.definition_files.toml_reader import Table
 from models.library import line_path
 
 #: Length of a span [m].

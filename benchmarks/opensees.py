@@ -27,11 +27,11 @@ import numpy as np
 from opensees_line import Formulation, OpenSeesLine, Solver
 from timing import by_turns, on_one_thread, rounds_of, table
 
-from models.catenary import assembly
-from models.catenary.model import CatenaryModel
-from models.catenary.statics import elasticity, positions_in_span
+from models.catenary.line_model import CatenaryModel
+from models.catenary.shape import line_matrices
+from models.catenary.statics.elasticity import elasticity, positions_in_span
+from models.definition_files.parameter import FloatArray
 from models.library import load_line
-from models.part import FloatArray
 
 STEP = 1e-3
 #: Steps to a round, and rounds, of a timing.
@@ -330,7 +330,7 @@ def chord_stiffness() -> Iterator[None]:
             K[:, i, j] = K[:, j, i] = -tension / length
         return K
 
-    with mock.patch.object(assembly, "beam_geometric_stiffness", chord):
+    with mock.patch.object(line_matrices, "beam_geometric_stiffness", chord):
         yield
 
 

@@ -28,11 +28,11 @@ from pathlib import Path
 import numpy as np
 import openseespy.opensees as ops
 
-from models.catenary.assembly import beam_properties, compression_ratio, dropper_stiffness
-from models.catenary.elements import NODE_DOFS, frames, hermite_rows
-from models.catenary.model import CatenaryModel
-from models.catenary.parameters import COMPONENTS, SHEAR_RATIO
-from models.part import FloatArray, IntArray
+from models.catenary.definition.line_definition import COMPONENTS, SHEAR_RATIO
+from models.catenary.line_model import CatenaryModel
+from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
+from models.catenary.shape.line_matrices import beam_properties, compression_ratio, dropper_stiffness
+from models.definition_files.parameter import FloatArray, IntArray
 
 #: Tags: one load pattern holds the weight, one a static force, those from the third on a moving force's histories.
 _WEIGHT, _POINT, _MOVING = 1, 2, 3
@@ -385,4 +385,4 @@ def _check(model: CatenaryModel) -> None:
         raise NotImplementedError("lines whose beams are damped differently are not translated for OpenSees")
     hung = [item for item in (definition.dropper, definition.hanger) if item is not None]
     if any(item.slack_law != "elastic_only" for item in hung) and definition.damping.of("dropper").alpha > 0.0:
-        raise NotImplementedError("slack droppers keep their dampers in OpenSees: take slack_law = \"elastic_only\"")
+        raise NotImplementedError('slack droppers keep their dampers in OpenSees: take slack_law = "elastic_only"')

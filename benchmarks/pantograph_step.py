@@ -13,9 +13,9 @@ from fmu_calls import stepped
 from timing import by_turns, on_one_thread, table
 
 from models.library import load_pantograph, pantograph_names
-from models.pantograph.lumped import LumpedPantographPart
-from models.pantograph.multibody.definition import MechanismDefinition
-from models.pantograph.multibody.part import MultibodyPantographPart
+from models.pantograph.lumped.lumped_model import LumpedPantographPart
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 
 STEP = 1e-3
 STEPS = 500

@@ -22,9 +22,9 @@ from timing import by_turns, on_one_thread, table
 
 from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter, low_pass
-from models.catenary.model import CatenaryModel
-from models.catenary.parameters import CatenaryDefinition
-from models.coupled import CoupledModel, CoupledRecord
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.line_model import CatenaryModel
+from models.coupled.monolithic import CoupledModel, CoupledRecord
 from models.library import load_line, load_lumped
 
 CUTS = (1000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0, 20.0)

@@ -16,12 +16,12 @@ from lines import SPAN, long_line, ring
 from timing import on_one_thread, table
 
 from master.evaluation.filters import ForceFilter, low_pass
-from models.catenary.model import CatenaryModel
-from models.catenary.parameters import CatenaryDefinition
-from models.coupled import CoupledModel
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.line_model import CatenaryModel
+from models.coupled.monolithic import CoupledModel
+from models.definition_files.parameter import FloatArray
 from models.library import load_lumped
-from models.pantograph.parameters import LumpedDefinition
-from models.part import FloatArray
+from models.pantograph.lumped.lumped_definition import LumpedDefinition
 
 STEP = 1e-3
 #: Where the pantograph starts [m]; how far it runs at least before it is looked at, in spans; what is looked at.

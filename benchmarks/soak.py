@@ -27,15 +27,15 @@ import numpy as np
 from lines import SPAN, long_line, ring
 from timing import memory, on_one_thread, table
 
-from models.catenary.model import CatenaryModel
-from models.catenary.parameters import CatenaryDefinition
-from models.catenary.part import CatenaryPart
-from models.coupled import CoupledModel
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_part import CatenaryPart
+from models.coupled.monolithic import CoupledModel
+from models.definition_files.parameter import FloatArray
 from models.library import load_pantograph
-from models.pantograph.multibody.definition import MechanismDefinition
-from models.pantograph.multibody.part import MultibodyPantographPart
-from models.pantograph.parameters import LumpedDefinition
-from models.part import FloatArray
+from models.pantograph.lumped.lumped_definition import LumpedDefinition
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 
 STEP = 1e-3
 #: Where the pantograph starts, and how far from the end it stops [m].

@@ -85,7 +85,7 @@ def model_phases(spans: int) -> dict[str, float]:
     begin = time.process_time()
     from clocks import Clocks
 
-    import models.catenary.model as line
+    import models.catenary.line_model as line
     from models.library import load_line
 
     phases.durations["model: import"] = time.process_time() - begin
@@ -109,7 +109,7 @@ def fmu_phases(spans: int) -> dict[str, float]:
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 
-    from fmus.build import build, recipe
+    from fmus.builder.fmu_build import build, recipe
 
     phases = Phases()
     with tempfile.TemporaryDirectory() as name:

@@ -8,8 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fmus import doctor
-from fmus.build import (
+from fmus.builder.fmu_build import (
     MAX_PORTS,
     BuildError,
     Recipe,
@@ -21,8 +20,9 @@ from fmus.build import (
     why_no_loader,
 )
 from fmus.builder.standalone import bundled_platform, runtime_of, write_runtime
+from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
-from models.definition import printable
+from models.definition_files.toml_reader import printable
 
 DEFAULT_FOLDER = Path("build/fmus")
 

@@ -2,12 +2,12 @@
 
 import sys
 
-from master.supervision import supervised
+from master.commands.supervision import supervised
 
 
 def _main() -> int:
     # Here, and so in the child alone: the parent waits and needs nothing.
-    from master.cli import main
+    from master.commands.main import main
 
     return main()
 

@@ -11,11 +11,23 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from master import results
-from master.algorithm import make_algorithm
-from master.caution import Caution, CautionObserver
-from master.checkpoint import NAME as CHECKPOINT
-from master.checkpoint import (
+from master.commands.supervision import phase, unfinished
+from master.coupling.contact_loss_stop import ContactWatch
+from master.coupling.coupling_power import PowerObserver
+from master.coupling.coupling_schemes import make_algorithm
+from master.coupling.fmu_warnings import Caution, CautionObserver
+from master.coupling.interruption import heeded_at_once, interruptible
+from master.coupling.macro_steps import Observer, Outcome, TimeGrid, simulate
+from master.coupling.network import Network
+from master.coupling.real_time import Pacer
+from master.coupling.track_watch import TrackWatch
+from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
+from master.evaluation.interval_coverage import never_touched, shortfall
+from master.evaluation.line_geometry import GeometryObserver
+from master.fmu.instance import Instance, Recordable
+from master.fmu.isolation import IsolatedInstance, Isolation
+from master.recording.checkpoint import NAME as CHECKPOINT
+from master.recording.checkpoint import (
     Checkpoint,
     CheckpointObserver,
     Continuation,
@@ -25,24 +37,12 @@ from master.checkpoint import (
     steps_between,
     take,
 )
-from master.contacts import find_contacts
-from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
-from master.evaluation.interval_coverage import never_touched, shortfall
-from master.instance import Instance, Recordable
-from master.interface import PowerObserver
-from master.interruption import heeded_at_once, interruptible
-from master.isolation import IsolatedInstance, Isolation
-from master.line import GeometryObserver
-from master.network import Network
-from master.realtime import Pacer
-from master.recorder import Recorder, Recording, Source
-from master.results import Results
-from master.rounding import adjustments, is_recordable, record_of, steps_in
-from master.simulation import Observer, Outcome, TimeGrid, simulate
-from master.supervision import phase, unfinished
-from master.system import Component, System, Variable
-from master.track_watch import TrackWatch
-from master.watch import ContactWatch
+from master.recording.recorder import Recorder, Recording, Source
+from master.results import run_results
+from master.results.run_results import Results
+from master.scenario.step_rounding import adjustments, is_recordable, record_of, steps_in
+from master.system.components import Component, System, Variable
+from master.system.contacts import find_contacts
 
 
 @dataclass(frozen=True)
@@ -122,10 +122,12 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
-    with results.claimed(folder):
+    with run_results.claimed(folder):
         identity = _take_folder(system, folder, manner.continuation)
-        with unfinished(folder / results.SUMMARY, identity):
-            results.write_json(folder / results.SUMMARY, {**_description(system, identity), "status": "running"})
+        with unfinished(folder / run_results.SUMMARY, identity):
+            run_results.write_json(
+                folder / run_results.SUMMARY, {**_description(system, identity), "status": "running"}
+            )
             return _run(system, folder, observers, manner, occasions, identity)
 
 
@@ -180,11 +182,11 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
     if continuation is not None:
         continuation.check(system)
         if continuation.is_same_run:
-            known = results.identity(folder)
+            known = run_results.identity(folder)
             if not known or known != continuation.checkpoint.run:
                 raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
-    results.prepare(folder, None if continuation is None else Path(continuation.file))
+    run_results.prepare(folder, None if continuation is None else Path(continuation.file))
     return uuid.uuid4().hex
 
 
@@ -199,7 +201,7 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
         cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
         outcome = Outcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
         if _is_still(folder, identity):
-            results.write_json(folder / results.SUMMARY, {**_description(system, identity), **_ending(outcome)})
+            run_results.write_json(folder / run_results.SUMMARY, {**_description(system, identity), **_ending(outcome)})
         if is_interrupted:
             raise InterruptedRunError(_what_happened(outcome, folder)) from error
         raise
@@ -262,7 +264,7 @@ def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caut
 def _is_still(folder: Path, identity: str) -> bool:
     """Whether it is the run of this identity whose results lie in the folder."""
     with suppress(MasterError):
-        return results.identity(folder) == identity
+        return run_results.identity(folder) == identity
     return False
 
 
@@ -293,7 +295,7 @@ def _steps_between_rows(component: Component, variable: Variable, system: System
 
 def recording_name(plan: Plan, step: float) -> str:
     """Return the name of a plan's file."""
-    return results.TIMESERIES if plan.every == 1 else f"timeseries_{1e3 * plan.every * step:g}ms.csv"
+    return run_results.TIMESERIES if plan.every == 1 else f"timeseries_{1e3 * plan.every * step:g}ms.csv"
 
 
 class Stopwatch:
@@ -337,7 +339,7 @@ class _Session:
         self.algorithm = make_algorithm(system.settings.coupling)
         whole = TimeGrid(system.start, system.step, system.step_count)
         self.grid = whole if manner.continuation is None else manner.continuation.grid(system)
-        self._geometry = GeometryObserver(system, lambda g: results.write_json(folder / results.GEOMETRY, g))
+        self._geometry = GeometryObserver(system, lambda g: run_results.write_json(folder / run_results.GEOMETRY, g))
         self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
         self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
@@ -394,7 +396,7 @@ class _Session:
         summary = {
             **description,
             **_origin(self._manner.continuation),
-            **results.figures(done),
+            **run_results.figures(done),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
@@ -402,15 +404,15 @@ class _Session:
             "warnings": [{"component": w.component, "text": w.text} for w in self._cautions.warnings],
             "scenario_warnings": list(self._system.warnings),
         }
-        results.write_forces(done)
-        results.write_json(self._folder / results.SUMMARY, summary)
+        run_results.write_forces(done)
+        run_results.write_json(self._folder / run_results.SUMMARY, summary)
         return replace(done, summary=summary)
 
     def disown(self, error: ForeignResultsError) -> None:
         """Mark results that are not what was written, if they are this run's at all."""
         if _is_still(self._folder, self._identity):
             data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
-            results.write_json(self._folder / results.SUMMARY, data)
+            run_results.write_json(self._folder / run_results.SUMMARY, data)
 
     def recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
         """Read what was recorded.
@@ -483,7 +485,7 @@ def _performance(timing: Timing, simulated: float) -> dict[str, float]:
         "initialisation_time": timing.initialisation,
         "wall_time": timing.stepping,
         "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
-        "peak_memory": results.peak_memory(),
+        "peak_memory": run_results.peak_memory(),
     }
 
 
@@ -519,12 +521,12 @@ def _exchanged(system: System, network: Network) -> Source:
 
 def _description(system: System, identity: str) -> dict[str, Any]:
     return {
-        "generator": results.GENERATOR,
-        "format": results.FORMAT,
+        "generator": run_results.GENERATOR,
+        "format": run_results.FORMAT,
         "run": identity,
         "scenario": system.name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": results.versions(),
+        "versions": run_results.versions(),
         "settings": {
             "start": system.start,
             "stop": system.stop,

@@ -3,7 +3,7 @@
 import sys
 
 from models.commands import main
-from models.commands.interruption import watch_interruptions
+from models.commands.physics_interruption import watch_interruptions
 
 if __name__ == "__main__":
     watch_interruptions()

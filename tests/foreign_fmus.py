@@ -15,7 +15,7 @@ import pytest
 
 from master.errors import ScenarioError
 from master.run import Manner, run
-from master.scenario import Overrides, open_scenario
+from master.scenario.open_scenario import Overrides, open_scenario
 
 SOURCE = r"""
 #include <stdlib.h>

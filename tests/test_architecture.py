@@ -15,7 +15,7 @@ FORBIDDEN = {
 OUTSIDE_FMU = {"commands", "__main__.py"}
 STANDARD = {"numpy", "scipy", "models"}
 #: The one module that is only loaded where numba is installed.
-KERNELS = ROOT / "models" / "catenary" / "kernels.py"
+KERNELS = ROOT / "models" / "catenary" / "step" / "step_kernels.py"
 
 
 #: The physics' own command ``couple`` evaluates a record with the master's functions: those that need numpy alone.

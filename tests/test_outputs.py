@@ -12,30 +12,36 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from fmus import build as building
-from fmus.build import BuildError
-from master import durable
-from master.calibrate import store_value
-from master.durable import PART, whole_file, write_whole
+from fmus.builder import fmu_build as building
+from fmus.builder.fmu_build import BuildError
+from master.batch.calibration import store_value
 from master.errors import MasterError
+from master.recording import safe_files
+from master.recording.safe_files import PART, whole_file, write_whole
 from master.ssp.pack import pack
-from models.commands import output_files
-from models.part import ParameterError
+from models.commands import physics_files
+from models.definition_files.parameter import ParameterError
 
 ROOT = Path(__file__).parents[1]
 #: Calls that write to a file by its name.
 WRITES = {"write_text", "write_bytes", "savefig", "savetxt", "write_table", "saving", "save", "savez", "to_csv"}
 #: Functions that may: they write beside the file's place, into memory, or into a temporary folder of their own.
 WHOLE = {
-    "master/folder_lock.py": {"_sign"}, "master/results.py": {"write_forces"},
-    "master/durable.py": {"write_whole"}, "master/report/__init__.py": {"write"}, "master/export.py": {"_write"},
-    "master/report/film.py": {"write_film"}, "master/verify/page.py": {"_picture"}, "master/ssp/pack.py": {"pack"},
-    "models/commands/output_files.py": {"write_whole", "write_csv", "write_figure"},
-    "models/numerics/kernel_cache.py": None, "fmus/build.py": {"_describe", "_zipped", "_write_whole"},
+    "master/results/folder_lock.py": {"_sign"},
+    "master/results/run_results.py": {"write_forces"},
+    "master/recording/safe_files.py": {"write_whole"},
+    "master/report/__init__.py": {"write"},
+    "master/results/parquet_export.py": {"_write"},
+    "master/report/film_file.py": {"write_film"},
+    "master/batch/verification/verification_page.py": {"_picture"},
+    "master/ssp/pack.py": {"pack"},
+    "models/commands/physics_files.py": {"write_whole", "write_csv", "write_figure"},
+    "models/numerics/kernel_cache.py": None,
+    "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_whole"},
     "fmus/loader/runtime.py": {"_archive", "_replace"},
-}  # fmt: skip
+}
 #: Functions that are called ``write_text`` and ``save`` and are no writing by a file's name.
-HARMLESS = {"results.write_text", "slave.save", "self.save", "self._instance.save"}
+HARMLESS = {"run_results.write_text", "slave.save", "self.save", "self._instance.save"}
 
 
 def writing_calls(path: Path):
@@ -68,9 +74,9 @@ def full(*_):
     ("write", "raised"),
     [
         (lambda p: write_whole(p, b"new"), MasterError),
-        (lambda p: output_files.write_text(p, "new"), OSError),
-        (lambda p: output_files.write_csv(p, ["a"], [np.zeros(3)]), OSError),
-        (lambda p: output_files.write_figure(p, Figure(), 50), OSError),
+        (lambda p: physics_files.write_text(p, "new"), OSError),
+        (lambda p: physics_files.write_csv(p, ["a"], [np.zeros(3)]), OSError),
+        (lambda p: physics_files.write_figure(p, Figure(), 50), OSError),
         (lambda p: building._write_whole(p, b"new"), OSError),
     ],
 )
@@ -100,7 +106,7 @@ def test_a_pack_that_does_not_fit_leaves_the_old_one(tmp_path, monkeypatch):
     (tmp_path / "s.ssp" / "SystemStructure.ssd").write_text(f"<a>{'x' * 1000}</a>")
     archive = tmp_path / "out.ssp"
     archive.write_text("old")
-    monkeypatch.setattr(durable.os, "fsync", full)
+    monkeypatch.setattr(safe_files.os, "fsync", full)
     with pytest.raises(MasterError, match=r"out\.ssp cannot be written \(No space left on device\); make room"):
         pack(tmp_path / "s.ssp", archive)
     assert archive.read_text() == "old"
@@ -111,7 +117,7 @@ def test_a_calibrated_value_that_does_not_fit_leaves_the_scenario(tmp_path, monk
     path = tmp_path / "p.ssv"
     old = '<ssv:Parameter name="f"><ssv:Real value="1"/></ssv:Parameter>'
     path.write_text(old)
-    monkeypatch.setattr(durable.os, "fsync", full)
+    monkeypatch.setattr(safe_files.os, "fsync", full)
     with pytest.raises(MasterError, match=r"p\.ssv cannot be written"):
         store_value(path, "f", 2.0, "found")
     assert path.read_text() == old
@@ -134,7 +140,7 @@ def _interrupted(path):
 
 def test_a_figure_of_no_known_format_is_told(tmp_path):
     with pytest.raises(ParameterError, match=r"x\.abc: a figure must be named \.png or \.svg"):
-        output_files.write_figure(tmp_path / "x.abc", Figure(), 50)
+        physics_files.write_figure(tmp_path / "x.abc", Figure(), 50)
 
 
 def test_a_full_standard_output_is_named(monkeypatch, capsys):
@@ -151,7 +157,7 @@ def test_a_full_standard_output_is_named(monkeypatch, capsys):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
 @pytest.mark.parametrize(
-    ("write", "raised"), [(durable.write_whole, MasterError), (output_files.write_whole, OSError)]
+    ("write", "raised"), [(safe_files.write_whole, MasterError), (physics_files.write_whole, OSError)]
 )
 def test_what_is_no_file_is_not_replaced(tmp_path, write, raised):
     """Such as /dev/null, for everybody, when it is root who writes."""

@@ -12,25 +12,27 @@ import numpy as np
 import pytest
 
 from fmus.__main__ import _parser as fmus_parser
-from fmus.description import _DERIVED
-from master import algorithm, cli
-from master.algorithm import ALGORITHMS, make_algorithm
+from fmus.slave.model_description import _DERIVED
+from master.batch.verification.quantities import QUANTITIES
+from master.commands import main
+from master.coupling import coupling_schemes
+from master.coupling.coupling_schemes import ALGORITHMS, make_algorithm
+from master.coupling.network import Network
 from master.errors import RunError
-from master.network import Network
-from master.report import charts
-from master.report.inputs import scheme_options
-from master.ssp.annotation import OPTIONS, SCHEMES, Coupling
-from master.ssp.units import COMMON
-from master.verify.quantities import QUANTITIES
-from models import commands, contact
-from models.catenary.parameters import Contact
-from models.contact import CONTACT_LAWS, ContactLawError, NormalForce, continuous_contact, register_contact_law
-from models.pantograph.multibody import definition, joints
-from models.pantograph.multibody.assembly import assemble
-from models.pantograph.multibody.definition import FORCE_KINDS, JOINT_KINDS
-from models.pantograph.multibody.forces import KNOWN_KINDS, ForceElements
+from master.report.charts import run_charts
+from master.report.run_inputs import scheme_options
+from master.ssp.run_settings import OPTIONS, SCHEMES, Coupling
+from master.ssp.ssp_units import COMMON
+from models import commands, contact_law
+from models.catenary.definition.line_definition import Contact
+from models.contact_law import CONTACT_LAWS, ContactLawError, NormalForce, continuous_contact, register_contact_law
+from models.definition_files.si_units import SI, to_si
+from models.pantograph.multibody import mechanism_definition
+from models.pantograph.multibody.elements import joints
+from models.pantograph.multibody.elements.force_elements import KNOWN_KINDS, ForceElements
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
-from models.units import SI, to_si
+from models.pantograph.multibody.mechanism_assembly import assemble
+from models.pantograph.multibody.mechanism_definition import FORCE_KINDS, JOINT_KINDS
 from tests.master.conftest import FakeSlave
 from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism_data, q
 
@@ -62,7 +64,7 @@ def test_a_scheme_that_nobody_makes_is_no_other():
 def test_every_scheme_steps(name):
     slaves = [FakeSlave(n, (), ("y",), np.zeros(1), lambda s, u, t, h: np.array([t + h])) for n in "ab"]
     network = Network(slaves, [])
-    algorithm.initialise(network, 0.0, 1.0)
+    coupling_schemes.initialise(network, 0.0, 1.0)
     make_algorithm(Coupling.model_validate({"scheme": name})).step(network, 0.0, 0.1)
     assert network.outputs.tolist() == pytest.approx([0.1, 0.1])
 
@@ -127,9 +129,9 @@ def test_a_law_that_no_step_can_be_solved_with_is_not_registered(law, said):
 
 
 def test_a_sound_law_is_registered_once(monkeypatch):
-    monkeypatch.setattr(contact, "_laws", {})
+    monkeypatch.setattr(contact_law, "_laws", {})
     register_contact_law("mine", continuous_contact)
-    assert contact._laws == {"mine": continuous_contact}
+    assert contact_law._laws == {"mine": continuous_contact}
     with pytest.raises(ContactLawError, match="there is a contact law 'mine' already"):
         register_contact_law("mine", continuous_contact)
 
@@ -147,14 +149,14 @@ def test_every_kind_of_joint_holds_something(kind):
     rod = body(2.0, (0.1, 0.2, 0.2), (1.0, 0.0, 0.0))
     data = mechanism_data({"rod": rod}, {"it": joint(kind, "base", "rod", **POINTS, **axes)})
     data["joint"]["it"] = {k: v for k, v in data["joint"]["it"].items() if _wanted(kind, k)}
-    assert len(Mechanism(definition.from_dict(data)).rows) >= 1
+    assert len(Mechanism(mechanism_definition.from_dict(data)).rows) >= 1
 
 
 def _wanted(kind, key):
     if key.startswith("point"):
-        return kind in definition._WITH_POINTS
+        return kind in mechanism_definition._WITH_POINTS
     if key.startswith("axis"):
-        return kind in (definition._WITH_AXIS_I if key == "axis_i" else definition._WITH_AXIS_J)
+        return kind in (mechanism_definition._WITH_AXIS_I if key == "axis_i" else mechanism_definition._WITH_AXIS_J)
     return True
 
 
@@ -163,8 +165,8 @@ def test_kinds_of_joints_are_those_that_have_rows():
 
 
 def test_a_kind_of_joint_without_rows_is_no_free_joint():
-    with pytest.raises(definition.DefinitionError, match="is none of"):
-        definition.from_dict(mechanism_data({}, {"it": joint("glued", "base", "base")}))
+    with pytest.raises(mechanism_definition.DefinitionError, match="is none of"):
+        mechanism_definition.from_dict(mechanism_data({}, {"it": joint("glued", "base", "base")}))
 
 
 #: Values with which each kind of force pushes on a rod that moves.
@@ -189,7 +191,7 @@ def pushed(kind):
     hinge = joint("revolute", "base", "rod", point_i=(0, 0, 0), point_j=(-0.5, 0, 0), **axes)
     rod = body(2.0, (0.01, 0.2, 0.2), (0.5, 0.0, 0.0))
     data = mechanism_data({"rod": rod}, {"hinge": hinge}, {"it": {"kind": kind, **given}})
-    mechanism = Mechanism(definition.from_dict({**data, "gravity": q(0.0, "m/s2")}))
+    mechanism = Mechanism(mechanism_definition.from_dict({**data, "gravity": q(0.0, "m/s2")}))
     y = assemble(mechanism)
     r, p, v, w = mechanism.split(y)
     w = w.copy()
@@ -207,13 +209,13 @@ def test_every_kind_of_force_pushes(kind):
 
 def test_kinds_of_forces_are_the_same_in_every_list():
     assert set(FORCE_KINDS) == KNOWN_KINDS == set(GIVEN)
-    reader = definition._Reader(definition.Table.from_dict({}))
+    reader = mechanism_definition._Reader(mechanism_definition.Table.from_dict({}))
     assert set(reader._force_readers) == set(FORCE_KINDS) - {"joint_friction"}
 
 
 def test_a_kind_of_force_that_nobody_computes_is_refused():
     with pytest.raises(ValueError, match="force 'it': nothing is known of its kind 'magnet'"):
-        ForceElements([definition.Force("it", "magnet")], {}, np.zeros((0, 3, 3)), None)
+        ForceElements([mechanism_definition.Force("it", "magnet")], {}, np.zeros((0, 3, 3)), None)
 
 
 # Quantities, charts, verbs, units
@@ -229,7 +231,7 @@ def test_every_quantity_measures_something_else_and_has_a_unit_that_is_known():
 
 def test_every_chart_is_in_a_report():
     """A function of the module that makes a chart is asked by one that makes all, itself or through another."""
-    tree = ast.parse(Path(charts.__file__).read_text(encoding="utf-8"))
+    tree = ast.parse(Path(run_charts.__file__).read_text(encoding="utf-8"))
     functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
     makers = {n for n, f in functions.items() if f.returns is not None and "Chart" in ast.unparse(f.returns)}
     asked, left = set(), ["run_charts"]
@@ -248,8 +250,8 @@ def verbs(parser):
 
 def test_every_verb_of_the_master_is_one_and_does_something():
     """One that is missing from `VERBS` would be taken for a scenario's name."""
-    known = verbs(cli._parser())
-    assert tuple(sorted(known)) == tuple(sorted(cli.VERBS))
+    known = verbs(main._parser())
+    assert tuple(sorted(known)) == tuple(sorted(main.VERBS))
     assert all(callable(parser.get_default("verb")) for parser in known.values())
 
 

@@ -134,9 +134,7 @@ def _read(root: Path, packages: Mapping[str, Path]) -> Installation:
             f"{_HERE}, the version that builds the FMU, is installed in"
         )
     library = _linux_library(root)
-    return Installation(
-        root, "linux64", _version(library), library, modules, modules / "lib-dynload", packages
-    )
+    return Installation(root, "linux64", _version(library), library, modules, modules / "lib-dynload", packages)
 
 
 def _linux_library(root: Path) -> Path:
@@ -162,9 +160,7 @@ def _windows(root: Path, packages: Mapping[str, Path]) -> Installation:
 
 
 def _version(library: Path) -> str:
-    found = re.search(
-        rb"(?<![\w.])" + re.escape(_HERE.encode()) + rb"\.\d+(?:rc\d+)?\+?(?=\0)", library.read_bytes()
-    )
+    found = re.search(rb"(?<![\w.])" + re.escape(_HERE.encode()) + rb"\.\d+(?:rc\d+)?\+?(?=\0)", library.read_bytes())
     if found is None:
         raise InstallationError(f"{library} does not state its version; is it the library of a Python {_HERE}?")
     return found[0].decode()

@@ -105,9 +105,7 @@ def rehearse(
     command = [sys.executable, "-I", "-B", "-c", _SCRIPT, *settings, *map(str, resources)]
     # A runtime is without numba: what the plain step loads is what counts.
     environment = {**os.environ, "OPENPANTO_KERNEL": "numpy", "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=_SECONDS, check=False, env=environment
-    )
+    done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False, env=environment)
     if done.returncode != 0:
         said = done.stderr.strip().splitlines() or ["no reason given"]
         raise RehearsalError(said[-1])

@@ -10,13 +10,23 @@ from typing import Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.contacts import Contact, leading_first, running_position
 from master.evaluation.contact_quality import Quality, early_warning, figures_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, settling_of
 from master.evaluation.en50367_limits import HEIGHT_RANGE, UPLIFT, Criterion, judge
 from master.evaluation.filters import evaluated, stands_in
-from master.line import Geometry, Slackness, Uplift, indexed, met, passages, period_of, slackness, support_uplifts
-from master.recorder import Recording
+from master.evaluation.line_geometry import (
+    Geometry,
+    Slackness,
+    Uplift,
+    indexed,
+    met,
+    passages,
+    period_of,
+    slackness,
+    support_uplifts,
+)
+from master.recording.recorder import Recording
+from master.system.contacts import Contact, leading_first, running_position
 
 #: A pantograph's effect on a dropper begins this long before it passes, and is followed this long after [s].
 _BEFORE: Final = 0.2

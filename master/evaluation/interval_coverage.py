@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from master.arrays import FloatArray
-from master.contacts import Contact, strip_centre, track_position
-from master.recorder import Recording
+from master.recording.recorder import Recording
+from master.system.contacts import Contact, strip_centre, track_position
 
 Interval = tuple[float | None, float | None]
 

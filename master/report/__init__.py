@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from master import plots, results
-from master.durable import whole_file, write_whole
-from master.report.measured import Comparison, comparison_rows
-from master.report.output_charts import has_contacts, output_plots, outputs_table
-from master.report.page import page
-from master.report.tables import (
+from master.recording.safe_files import whole_file, write_whole
+from master.report.charts import static_charts
+from master.report.charts.measured_charts import Comparison, comparison_rows
+from master.report.charts.output_charts import has_contacts, output_plots, outputs_table
+from master.report.result_tables import (
     FILTER_HEADS,
     calibration_line,
     figure_rows,
@@ -20,7 +19,9 @@ from master.report.tables import (
     uplift_line,
     verdict_table,
 )
-from master.results import Results
+from master.report.run_page import page
+from master.results import run_results
+from master.results.run_results import Results
 
 __all__ = [
     "FILTER_HEADS",
@@ -42,9 +43,9 @@ __all__ = [
 
 def write(done: Results, measured: Comparison | None = None) -> Path:
     """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
-    path = done.folder / results.REPORT
+    path = done.folder / run_results.REPORT
     write_whole(path, page(done, measured).encode())
-    figures = plots.all_plots(done) if has_contacts(done) else output_plots(done)
+    figures = static_charts.all_plots(done) if has_contacts(done) else output_plots(done)
     for name, figure in figures.items():
         with whole_file(done.folder / f"{name}.svg") as temporary:
             figure.savefig(temporary, format="svg", metadata={"Date": None})

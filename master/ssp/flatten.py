@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from master.ssp.elements import Binding, Component, Connection, Connector, Feed, Joint, Leg, Stop, SystemNode
-from master.ssp.xml import Reader
+from master.ssp.ssd_elements import Binding, Component, Connection, Connector, Feed, Joint, Leg, Stop, SystemNode
+from master.ssp.ssp_xml import Reader
 
 #: Owner (its path, empty for the whole) and connector.
 _Place = tuple[str, str]
@@ -157,9 +157,7 @@ def _connector(path: str, element: str, name: str, systems: dict[str, SystemNode
     return next((x for x in connectors if x.name == name), None)
 
 
-def _followed(
-    edges: list[_Edge], systems: dict[str, SystemNode]
-) -> tuple[list[Connection], tuple[Feed, ...]]:
+def _followed(edges: list[_Edge], systems: dict[str, SystemNode]) -> tuple[list[Connection], tuple[Feed, ...]]:
     """Return a connection for every connector of a component that others reach through systems, and what leads there.
 
     A way that begins at a connector of a system, which nothing feeds, makes no connection: its values hold.

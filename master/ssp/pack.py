@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from master.durable import cannot_write, whole_file
 from master.errors import MasterError
+from master.recording.safe_files import cannot_write, whole_file
 from master.ssp.archive import SSD_NAME, Sources
-from master.ssp.xml import XmlError, safe_root
+from master.ssp.ssp_xml import XmlError, safe_root
 
 #: Time stamp of every member: the earliest that zip can express.
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)

@@ -8,15 +8,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from master.ssp.annotation import Annotations, RunSettings, check_places, parse_annotations
 from master.ssp.archive import SSD_NAME, Sources
-from master.ssp.elements import NO_SYSTEM, Binding, Component, Connection, Connector, Feed, Joint, SystemNode
-from master.ssp.enumerations import Items, parse_enumerations
 from master.ssp.flatten import flatten
+from master.ssp.run_settings import Annotations, RunSettings, check_places, parse_annotations
+from master.ssp.ssd_elements import NO_SYSTEM, Binding, Component, Connection, Connector, Feed, Joint, SystemNode
 from master.ssp.ssm import Entry, apply, parse_mapping, parse_transformation, read_mapping_file
+from master.ssp.ssp_enumerations import Items, parse_enumerations
+from master.ssp.ssp_units import Unit, parse_units
+from master.ssp.ssp_xml import SSC, SSD, SSM, SSV, VERSIONS, Reader, child, children, elements, tag
 from master.ssp.ssv import Parameter, ParameterSet, parse_parameter_set, read_parameter_file
-from master.ssp.units import Unit, parse_units
-from master.ssp.xml import SSC, SSD, SSM, SSV, VERSIONS, Reader, child, children, elements, tag
 
 FMU_TYPES: Final = ("application/x-fmu-sharedlibrary",)
 SET_TYPE: Final = "application/x-ssp-parameter-set"

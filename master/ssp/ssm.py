@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+from master.ssp.ssp_units import Conversion
+from master.ssp.ssp_xml import SSC, SSM, Reader, child, children
 from master.ssp.ssv import Parameter, ParameterSet
-from master.ssp.units import Conversion
-from master.ssp.xml import SSC, SSM, Reader, child, children
 
 #: Rule of what is only worth knowing: it is no problem of a strict check either.
 NOTE: Final = "note"

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from master.ssp.enumerations import Items, parse_enumerations, whole
-from master.ssp.units import Conversion, Unit, parse_units
-from master.ssp.xml import SSV, Reader, child, children, elements, tag
+from master.ssp.ssp_enumerations import Items, parse_enumerations, whole
+from master.ssp.ssp_units import Conversion, Unit, parse_units
+from master.ssp.ssp_xml import SSV, Reader, child, children, elements, tag
 
 Value = float | int | bool | str
 

@@ -6,16 +6,16 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from models.catenary.compiled import KernelError
-from models.catenary.equilibrium import EquilibriumError
-from models.catenary.local_response import LocalSolutionError
-from models.commands import couple, identify, pantograph, statics
-from models.definition import DefinitionError, printable
+from models.catenary.contact_and_slack.local_problem import LocalSolutionError
+from models.catenary.shape.form_finding import EquilibriumError
+from models.catenary.step.numba_engine import KernelError
+from models.commands import couple_command, identify_command, pantograph_command, statics_command
+from models.definition_files.parameter import ParameterError
+from models.definition_files.toml_reader import DefinitionError, printable
 from models.library import UnknownNameError
 from models.pantograph.multibody.mechanism import MechanismError
-from models.part import ParameterError
 
-_VERBS = (couple, statics, pantograph, identify)
+_VERBS = (couple_command, statics_command, pantograph_command, identify_command)
 #: What a user can cause; everything else is a defect and keeps its traceback.
 _USER_ERRORS = (
     DefinitionError,

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from models.catenary.parameters import Span
-from models.catenary.statics import Droppers, Elasticity, Profile, within
+from models.catenary.definition.line_definition import Span
+from models.catenary.statics.elasticity import Droppers, Elasticity, Profile, within
 
 _COLOURS: Final = {
     "contact_wire": "#c2571a",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from models.catenary.parameters import CatenaryDefinition
-from models.catenary.parameters import load as load_line_file
-from models.definition import Table
-from models.pantograph.multibody.definition import MechanismDefinition
-from models.pantograph.multibody.definition import parse as read_multibody
-from models.pantograph.parameters import LumpedDefinition, read_lumped
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_definition import load as load_line_file
+from models.definition_files.toml_reader import Table
+from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.multibody.mechanism_definition import parse as read_multibody
 
 _HERE = Path(__file__).parent
 

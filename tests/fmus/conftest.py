@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build
+from fmus.builder.fmu_build import build
 from tests.fmus.support import Instance, toy_recipe
 
 

@@ -18,7 +18,7 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-from fmus.build import ROOTS, Recipe
+from fmus.builder.fmu_build import ROOTS, Recipe
 from models.library import line_path
 
 TOY = Path(__file__).parent / "toy"
@@ -157,4 +157,6 @@ def short_line_recipe(folder: Path, lengths: str = "", pantographs: int = 1) -> 
         text = text.replace("[spans.droppers]\n", f'[spans.droppers]\nlengths = [{lengths}, "m", "test"]\n')
     (folder / "Short.toml").write_text(text, encoding="utf-8")
     settings = {"pantographs": pantographs}
-    return Recipe("Catenary_Short", "short", "fmus.catenary", "CatenarySlave", folder / "Short.toml", settings)
+    return Recipe(
+        "Catenary_Short", "short", "fmus.slave.catenary_slave", "CatenarySlave", folder / "Short.toml", settings
+    )

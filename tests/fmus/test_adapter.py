@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from fmus.build import build
+from fmus.builder.fmu_build import build
 from tests.fmus.support import Instance, refused, toy_recipe
 
 NAMES = ["mass[1].z", "mass[2].z", "spring[1].force", "rest"]
@@ -224,9 +224,7 @@ def test_failure_in_a_step_is_told_and_survived(instantiate, capfd):
     instance.initialise()
     instance["force"] = 2e6
     text = failed_step(instance)
-    assert text.startswith(
-        "the mass slipped by 3 percent of its way: 100 percent (ValueError in part.py, line "
-    )
+    assert text.startswith("the mass slipped by 3 percent of its way: 100 percent (ValueError in part.py, line ")
     assert "Toy (line): the mass slipped" in capfd.readouterr().err
     assert all(math.isnan(v) for v in instance.get(NAMES))
     instance["force"] = 0.0

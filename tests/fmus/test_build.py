@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fmus.__main__ import main
-from fmus.build import REPOSITORY, BuildError, archive, build, fingerprint
+from fmus.builder.fmu_build import REPOSITORY, BuildError, archive, build, fingerprint
 from tests.fmus.support import Instance, toy_recipe, toy_variant
 
 _BUILD_ELSEWHERE = """
@@ -20,7 +20,7 @@ import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from tests.fmus.support import toy_recipe
-from fmus.build import build
+from fmus.builder.fmu_build import build
 build(toy_recipe(), Path(sys.argv[2]))
 """
 
@@ -101,8 +101,8 @@ def test_archive_holds_what_is_needed_and_no_more(toy_fmu, instantiate):
         definition = package.read("resources/definition.toml")
     private = {n.removeprefix(f"resources/openpanto_{guid}/") for n in names if f"openpanto_{guid}/" in n}
     assert definition == (Path(__file__).parent / "toy" / "toy.toml").read_bytes()
-    assert {"__init__.py", "models/schema.py", "toy/law.py", "fmus/adapter.py"} <= private
-    assert not {"models/contact.py", "fmus/build.py", "pythonfmu/builder.py", "conftest.py"} & private
+    assert {"__init__.py", "models/definition_files/field_schema.py", "toy/law.py", "fmus/slave/adapter.py"} <= private
+    assert not {"models/contact_law.py", "fmus/builder/fmu_build.py", "pythonfmu/builder.py", "conftest.py"} & private
     assert {"binaries/linux64/Toy.so", "binaries/win64/Toy.dll"} <= names
     assert not any("__pycache__" in n for n in names)
 

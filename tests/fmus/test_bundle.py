@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import ROOTS, build, recipe
-from fmus.bundle import BundleError, Module, check_rewritten, collect, rewrite
+from fmus.builder.fmu_build import ROOTS, build, recipe
+from fmus.builder.source_bundle import BundleError, Module, check_rewritten, collect, rewrite
 
 HERE = {"models": Path(), "fmus": Path()}
 
@@ -38,9 +38,7 @@ def test_every_form_of_import_is_moved(source, expected):
 
 
 def test_only_the_imports_change():
-    source = (
-        'def f():\n    """See ``from models import x``."""\n    from models.a import (\n        b,\n    )\n'
-    )
+    source = 'def f():\n    """See ``from models import x``."""\n    from models.a import (\n        b,\n    )\n'
     assert moved(source) == source.replace("    from models.a", "    from private.models.a")
 
 
@@ -51,8 +49,8 @@ def test_imports_that_cannot_be_moved_are_refused(call):
 
 
 def test_an_import_that_was_forgotten_is_noticed():
-    with pytest.raises(BundleError, match=r"models\.units"):
-        check_rewritten("def f():\n    from models.units import SI\n", "m.py", HERE)
+    with pytest.raises(BundleError, match=r"models\.definition_files\.si_units"):
+        check_rewritten("def f():\n    from models.definition_files.si_units import SI\n", "m.py", HERE)
 
 
 def test_relative_imports_are_followed(tmp_path):
@@ -74,9 +72,9 @@ def test_what_an_fmu_does_not_carry_is_named(tmp_path):
 
 
 def test_the_adapter_can_be_packed():
-    modules = collect("fmus.adapter", ROOTS, frozenset({"pythonfmu"}))
-    assert {"models.part", "fmus.state", "pythonfmu.fmi2slave"} <= modules.keys()
-    assert not {"fmus.build", "pythonfmu.builder"} & modules.keys()
+    modules = collect("fmus.slave.adapter", ROOTS, frozenset({"pythonfmu"}))
+    assert {"models.definition_files.parameter", "fmus.slave.saved_state", "pythonfmu.fmi2slave"} <= modules.keys()
+    assert not {"fmus.builder.fmu_build", "pythonfmu.builder"} & modules.keys()
     for module in modules.values():
         check_rewritten(rewrite(module, "private", ROOTS), module.name, ROOTS)
 

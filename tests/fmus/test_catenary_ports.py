@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from fmus.build import build, recipe
-from models.catenary.parameters import load
-from models.catenary.part import CatenaryPart
+from fmus.builder.fmu_build import build, recipe
+from models.catenary.definition.line_definition import load
+from models.catenary.line_part import CatenaryPart
 from tests.fmus.support import Instance, names_of, refused, run, short_line_recipe
 
-pytest.importorskip("models.catenary.part")
+pytest.importorskip("models.catenary.line_part")
 
 
 @pytest.fixture(scope="module")
@@ -33,10 +33,7 @@ def instance(fmu: Path) -> Iterator[Instance]:
 def test_has_the_ports_of_two_pantographs(fmu, instance):
     assert fmu.name == "Catenary_LN2_P2.fmu"
     assert names_of(instance, "input") == [
-        f"pantograph[{p}].{end}.{axis}"
-        for p in (1, 2)
-        for end in "AB"
-        for axis in ("x", "y", "z", "vx", "vy", "vz")
+        f"pantograph[{p}].{end}.{axis}" for p in (1, 2) for end in "AB" for axis in ("x", "y", "z", "vx", "vy", "vz")
     ]
     outputs = names_of(instance, "output")
     assert outputs[:2] == ["pantograph[1].contact.force", "pantograph[2].contact.force"]

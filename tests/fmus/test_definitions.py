@@ -8,8 +8,8 @@ import zipfile
 import pytest
 
 from fmus.__main__ import main
-from fmus.build import MARK, BuildError, build, content_hash, fingerprint, recipe
-from master import store
+from fmus.builder.fmu_build import MARK, BuildError, build, content_hash, fingerprint, recipe
+from master.fmu import fmu_provision
 from models.library import line_path, pantograph_path
 from tests.fmus.support import Instance
 
@@ -43,9 +43,9 @@ def test_a_line_gets_as_many_ports_as_wanted(own, tmp_path, capsys):
     assert capsys.readouterr().out.strip() == str(path)
     assert main(["fingerprint", "--pantographs", "2", str(own / "Mine.toml")]) == 0
     guid = capsys.readouterr().out.strip()
-    mark = store.read_mark(path)
+    mark = fmu_provision.read_mark(path)
     assert (mark["guid"], mark["definition"], mark["pantographs"]) == (guid, "my definitions/Mine.toml", "2")
-    assert store.why_not_ours(path) == ""
+    assert fmu_provision.why_not_ours(path) == ""
 
 
 def test_the_guid_follows_the_file_and_not_its_place(own, tmp_path):
@@ -60,13 +60,13 @@ def test_the_guid_follows_the_file_and_not_its_place(own, tmp_path):
 
 def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
     path, told = build(recipe(str(own / "Light.toml")), tmp_path), []
-    assert store.ensure(path, told.append) == path
+    assert fmu_provision.ensure(path, told.append) == path
     assert told == []
     (own / "Light.toml").write_text((own / "Light.toml").read_text().replace("168", "170"))
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     assert told == ["building Pantograph_Light.fmu again: its sources have changed"]
-    assert store.stored_guid(path) == fingerprint(recipe(str(own / "Light.toml")))
-    store.ensure(path, told.append)
+    assert fmu_provision.stored_guid(path) == fingerprint(recipe(str(own / "Light.toml")))
+    fmu_provision.ensure(path, told.append)
     assert len(told) == 1
 
 

@@ -10,8 +10,8 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.description import base_unit
-from models.units import SI
+from fmus.slave.model_description import base_unit
+from models.definition_files.si_units import SI
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus import doctor
 from fmus.__main__ import main
+from fmus.loader import doctor
 from fmus.loader.loader_build import INNER_SUFFIX, PROBE
 
 

@@ -10,10 +10,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-from fmus.build import archive, recipe
-from fmus.documentation import rows
-from fmus.icon import SIZE, icon
-from fmus.ports import Signal
+from fmus.builder.fmu_build import archive, recipe
+from fmus.builder.fmu_page import rows
+from fmus.builder.icon import SIZE, icon
+from fmus.slave.ports import Signal
 from tests.fmus.support import toy_recipe
 
 
@@ -59,7 +59,7 @@ def test_page_names_every_port_and_parameter_with_its_unit_and_source(fmu):
 
 
 def test_definition_requirements_and_licences_are_there(fmu):
-    assert b'source' in fmu.read("resources/definition.toml") or b"Source" in fmu.read("resources/definition.toml")
+    assert b"source" in fmu.read("resources/definition.toml") or b"Source" in fmu.read("resources/definition.toml")
     assert fmu.read("resources/requirements.txt").split() == [b"numpy>=1.26", b"scipy>=1.11"]
     assert b"MIT" in fmu.read("documentation/licenses/openpanto.txt")
     assert "documentation/licenses/pythonfmu.txt" in fmu.namelist()

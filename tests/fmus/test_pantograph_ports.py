@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build, recipe
+from fmus.builder.fmu_build import build, recipe
 from tests.fmus.support import Instance, names_of
 
 

@@ -10,10 +10,10 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.build import build, fingerprint, known_names, recipe
+from fmus.builder.fmu_build import build, fingerprint, known_names, recipe
 from tests.fmus.support import Instance, names_of, run
 
-READY = [name for name in known_names() if "Catenary" not in name or find_spec("models.catenary.part")]
+READY = [name for name in known_names() if "Catenary" not in name or find_spec("models.catenary.line_part")]
 
 
 @pytest.fixture(scope="module")

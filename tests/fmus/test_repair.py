@@ -9,8 +9,8 @@ import zipfile
 
 import pytest
 
-from fmus.build import PYTHONFMU, REPOSITORY
-from fmus.repair import repaired
+from fmus.builder.fmu_build import PYTHONFMU, REPOSITORY
+from fmus.loader.pythonfmu_repair import repaired
 
 LIBRARY = PYTHONFMU / "resources" / "binaries" / "linux64" / "libpythonfmu-export.so"
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the repair is one of the Linux library")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from fmus.state import StateError, pack, unpack
+from fmus.slave.saved_state import StateError, pack, unpack
 
 ARRAYS = st.dictionaries(
     st.text(min_size=1, max_size=8),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from fmus.build import build, recipe
-from models.catenary.limits import slack_warning
-from models.catenary.part import CatenaryPart
+from fmus.builder.fmu_build import build, recipe
+from models.catenary.line_advice import slack_warning
+from models.catenary.line_part import CatenaryPart
 from models.library import line_names, load_line
 from tests.fmus.support import Instance, refused, short_line_recipe
 

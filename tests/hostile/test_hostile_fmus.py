@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from master.cli import main
+from master.commands.main import main
 from tests.effort import IS_LONG
 
 ROOT = Path(__file__).parents[2]
@@ -174,7 +174,7 @@ def test_a_second_signal_ends_a_step_at_once(pair, tmp_path, started):
 
 GIL_HOLDER = """
 import ctypes, sys
-from master.supervision import phase, supervised
+from master.commands.supervision import phase, supervised
 def work():
     with phase("loading"):
         ctypes.PyDLL(sys.argv[1]).fmi2Instantiate(b"a", 1, b"", sys.argv[2].encode(), None, 0, 0)
@@ -227,7 +227,7 @@ def test_what_an_isolated_fmu_has_started_ends_with_it(pair, tmp_path, monkeypat
 
 def test_its_group_ends_with_it_where_processes_cannot_be_looked_through(pair, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("master.isolation.process.marked_processes", lambda _: ())
+    monkeypatch.setattr("master.fmu.isolation.child_process.marked_processes", lambda _: ())
     assert main([str(pair("fmi2DoStep", "fork", 0.05)), *options(tmp_path / "out"), "--isolate"]) == 0
     time.sleep(0.2)
     assert alive(str(tmp_path)) == []

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from master.fmu_file import read_fmu
-from master.instance import Instance
-from master.system import Component
+from master.fmu.fmu_description import read_fmu
+from master.fmu.instance import Instance
+from master.system.components import Component
 
 
 def main(path: str, count: int, warm_up: int) -> None:

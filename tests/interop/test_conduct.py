@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.build import build
+from fmus.builder.fmu_build import build
 from tests.fmus.support import toy_recipe
 from tests.interop.test_host import linux, order, run_host, unpack
 

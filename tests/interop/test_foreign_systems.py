@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from master.run import run
-from master.scenario import open_scenario
+from master.scenario.open_scenario import open_scenario
 from master.ssp.pack import pack
 from tests.foreign_fmus import (
     compile_library,

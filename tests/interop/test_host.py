@@ -14,10 +14,10 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.build import build, recipe
+from fmus.builder.fmu_build import build, recipe
 from fmus.loader.loader_build import INNER_SUFFIX
 from master.run import loaded
-from master.scenario import open_scenario
+from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 from tests.interop.support import STEP
 

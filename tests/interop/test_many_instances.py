@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build, recipe
-from master.fmu_file import read_fmu
-from master.instance import Instance
-from master.system import Component
-from master.unpacked import Unpacked
+from fmus.builder.fmu_build import build, recipe
+from master.fmu.extraction import Unpacked
+from master.fmu.fmu_description import read_fmu
+from master.fmu.instance import Instance
+from master.system.components import Component
 from tests.fmus.support import short_line_recipe
 from tests.interop.support import ROOT
 

@@ -8,14 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from master import checkpoint
-from master.checkpoint import Continuation
-from master.energy import DRIFT
-from master.recorder import load
+from master.evaluation.energy_balance import DRIFT
+from master.recording import checkpoint
+from master.recording.checkpoint import Continuation
+from master.recording.recorder import load
 from master.run import Manner, run
-from master.scenario import Overrides, open_scenario
+from master.scenario.open_scenario import Overrides, open_scenario
 from master.ssp.archive import extract
-from master.ssp.units import Conversion
+from master.ssp.ssp_units import Conversion
 
 STOP = 0.4
 ANNOTATION = '<panto:Coupling scheme="jacobi"/>'

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from fmus.__main__ import main
-from fmus.build import build, recipe
+from fmus.builder.fmu_build import build, recipe
 from fmus.builder.standalone import bundled_platform, runtime_of, write_runtime
-from master.scenario import open_scenario
+from master.scenario.open_scenario import open_scenario
 from tests.effort import IS_LONG, count
 from tests.interop.support import ROOT, STEP
 from tests.interop.test_host import linux, numbers, plan, run_host, unpack

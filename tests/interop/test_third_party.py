@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from pythonfmu.builder import FmuBuilder
 
-from master.cli import main
-from master.contacts import find_contacts
-from master.recorder import load
-from master.scenario import open_scenario
+from master.commands.main import main
+from master.recording.recorder import load
+from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
+from master.system.contacts import find_contacts
 from tests.interop.support import ROOT
 
 PAGE = (ROOT / "docs" / "third-party-pantograph.md").read_text(encoding="utf-8")

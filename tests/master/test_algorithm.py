@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from master.algorithm import GaussSeidel, Iterative, Jacobi, initialise, make_algorithm
+from master.coupling.coupling_schemes import GaussSeidel, Iterative, Jacobi, initialise, make_algorithm
+from master.coupling.network import Network
 from master.errors import RunError
-from master.network import Network
-from master.ssp.annotation import Coupling
-from master.ssp.units import Conversion
-from master.system import Connection
+from master.ssp.run_settings import Coupling
+from master.ssp.ssp_units import Conversion
+from master.system.components import Connection
 
 OMEGA = 2.0
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from master.calibrate import MAX_RUNS, find_value, find_values, store_value
+from master.batch.calibration import MAX_RUNS, find_value, find_values, store_value
 from master.errors import MasterError
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from master import fmi_log
-from master.caution import Caution, CautionObserver
-from master.cli import main
-from master.network import Network
-from master.report.page import _head
-from master.results import Results
+from master.commands.main import main
+from master.coupling.fmu_warnings import Caution, CautionObserver
+from master.coupling.network import Network
+from master.fmu import fmi_log
+from master.report.run_page import _head
+from master.results.run_results import Results
 
 
 @pytest.fixture

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from master import checkpoint
-from master.algorithm import Iterative, Jacobi
-from master.checkpoint import Continuation, index_at, pack, unpack
-from master.cli import main
+from master.commands.main import main
+from master.coupling.coupling_schemes import Iterative, Jacobi
 from master.errors import MasterError, RequestError, RunError
-from master.recorder import load
+from master.recording import checkpoint
+from master.recording.checkpoint import Continuation, index_at, pack, unpack
+from master.recording.recorder import load
 from master.run import loaded
-from master.scenario import Overrides, open_scenario
+from master.scenario.open_scenario import Overrides, open_scenario
 
 
 def go(scenario, folder, *options):

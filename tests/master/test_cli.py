@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from master import cli, results
-from master.cli import main
+from master.commands import main as cli
+from master.commands.main import main
+from master.results import run_results
 
 ROOT = Path(__file__).parents[2]
 SCENARIOS = ROOT / "ssp_scenarios"
@@ -90,7 +91,7 @@ def test_overrides_are_honoured(toy, in_folder):
         "pantograph.static_force=90",
     ]
     assert main([str(toy), *options, "--quiet", "--no-report", "--no-build"]) == 0
-    summary = results.read(in_folder / "results/toy").summary
+    summary = run_results.read(in_folder / "results/toy").summary
     assert summary["steps"] == 300
     assert summary["settings"]["coupling"]["scheme"] == "gauss-seidel"
     assert summary["components"][1]["parameters"]["static_force"] == 90.0
@@ -320,7 +321,7 @@ def test_calibrate_stores_what_it_finds(toy, in_folder, capsys):
     assert "<!-- kept as it is -->" in after
     assert "<!-- calibrated: mean force 1" in after
     assert main([str(toy), "--quiet", "--no-report", "--no-build", "--out", "r"]) == 0
-    assert results.read(in_folder / "r").assessments()[0].quality.mean == pytest.approx(120.0, abs=0.1)
+    assert run_results.read(in_folder / "r").assessments()[0].quality.mean == pytest.approx(120.0, abs=0.1)
 
 
 def test_calibrate_without_a_target(toy, capsys):

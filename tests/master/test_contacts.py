@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from master.contacts import Contact, find_contacts, lateral_position
-from master.interface import PowerObserver, power_residual
-from master.line import indexed, support_uplifts
-from master.network import Network
-from master.recorder import Recording
-from master.system import Connection
+from master.coupling.coupling_power import PowerObserver, power_residual
+from master.coupling.network import Network
+from master.evaluation.line_geometry import indexed, support_uplifts
+from master.recording.recorder import Recording
+from master.system.components import Connection
+from master.system.contacts import Contact, find_contacts, lateral_position
 
 
 def test_contacts_are_found_by_their_connections_in_the_order_of_the_ports():

@@ -17,12 +17,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from master import checkpoint, durable, results
-from master.checkpoint import Occasions
-from master.cli import main
-from master.durable import LineFile, write_whole
+from master.commands.main import main
 from master.errors import MasterError
-from master.recorder import LONGEST_UNWRITTEN, Recorder, Source, load
+from master.recording import checkpoint, safe_files
+from master.recording.checkpoint import Occasions
+from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source, load
+from master.recording.safe_files import LineFile, write_whole
+from master.results import run_results
 
 ROOT = Path(__file__).parents[2]
 SERIES = ("timeseries.csv", "timeseries_5ms.csv")
@@ -63,9 +64,7 @@ def check_readable(folder):
 def finish(toy, folder, *options):
     """Finish a run, or run it again if it was ended before its first checkpoint."""
     if (folder / checkpoint.NAME).exists():
-        return main(
-            [str(toy), "--no-build", "--quiet", "--no-report", "--resume", str(folder), *options]
-        )
+        return main([str(toy), "--no-build", "--quiet", "--no-report", "--resume", str(folder), *options])
     return go(toy, folder, *options)
 
 
@@ -80,9 +79,9 @@ def test_a_run_killed_again_and_again_ends_like_one_that_was_not(toy, tmp_path, 
     for _ in range(3):
         kill(process, folder, 0, chance.uniform(0.0, 0.4))
         check_readable(folder)
-        if results.read(folder).summary["status"] == "complete":
+        if run_results.read(folder).summary["status"] == "complete":
             break  # it was too fast for this kill
-        assert results.read(folder).summary["status"] == "running"
+        assert run_results.read(folder).summary["status"] == "running"
         resume = ["--resume", str(folder)] if (folder / checkpoint.NAME).exists() else []
         process = started(toy, folder, *options, "--checkpoint-every", every, *resume)
     kill(process, folder, 0, 0.0)
@@ -176,7 +175,7 @@ def test_a_killed_run_can_be_reported_on(toy, tmp_path):
     assert main(["report", str(folder)]) == 0
     page = (folder / "report.html").read_text()
     assert "Incomplete" in page
-    summary = results.read(folder).summary
+    summary = run_results.read(folder).summary
     assert summary["status"] == "running"
     assert summary["quality"][0]["mean"] > 0.0
     assert (folder / "geometry.json").exists()
@@ -197,7 +196,7 @@ def test_a_full_disk_ends_the_run_with_one_sentence(toy, tmp_path):
     assert said.startswith(f"error: {folder}/timeseries.csv cannot be written (File too large); make room there")
     check_readable(folder)
     assert limit - 1000 < (folder / SERIES[0]).stat().st_size <= limit
-    assert results.read(folder).summary["status"] == "failed"
+    assert run_results.read(folder).summary["status"] == "failed"
 
 
 @pytest.mark.parametrize(
@@ -212,7 +211,7 @@ def test_a_folder_that_takes_nothing_is_told_before_the_run(toy, tmp_path, monke
     def refuse(*_):
         raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(durable.os, "fsync", refuse)
+    monkeypatch.setattr(safe_files.os, "fsync", refuse)
     assert go(toy, tmp_path / "out") == 1
     assert " ".join(capsys.readouterr().err.split()).startswith(f"error: {tmp_path / 'out'}/{text}")
     assert list((tmp_path / "out").iterdir()) == []
@@ -229,14 +228,14 @@ def test_a_folder_of_a_run_killed_at_once_is_taken_over(toy, tmp_path):
 
 
 def test_no_room_for_the_summary_leaves_the_rows(toy, tmp_path, monkeypatch, capsys):
-    folder, write = tmp_path / "out", results.write_whole
+    folder, write = tmp_path / "out", run_results.write_whole
 
     def full(path, data):
         if b'"quality"' in data:
-            raise durable.cannot_write(path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+            raise safe_files.cannot_write(path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
         write(path, data)
 
-    monkeypatch.setattr(results, "write_whole", full)
+    monkeypatch.setattr(run_results, "write_whole", full)
     assert go(toy, folder, "--stop", "0.2") == 1
     assert "What was written before is in" in " ".join(capsys.readouterr().err.split())
     assert len(load(folder / SERIES[0]).time) == 201
@@ -255,7 +254,7 @@ class TestLineFile:
             room[0] -= done
             return done
 
-        monkeypatch.setattr(durable.os, "write", little)
+        monkeypatch.setattr(safe_files.os, "write", little)
         with pytest.raises(MasterError, match="No space left on device"):
             file.write(b"second\nthird\nfourth\n")
         monkeypatch.undo()
@@ -280,7 +279,7 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(durable.os, "fsync", full)
+    monkeypatch.setattr(safe_files.os, "fsync", full)
     with pytest.raises(MasterError, match="a cannot be written"):
         write_whole(path, b"new")
     assert path.read_bytes() == b"old"
@@ -311,7 +310,7 @@ def test_every_write_is_of_whole_lines(tmp_path, monkeypatch):
         written.append(bytes(data))
         return write(descriptor, data)
 
-    monkeypatch.setattr(durable.os, "write", note)
+    monkeypatch.setattr(safe_files.os, "write", note)
     recorder = Recorder(tmp_path / "a.csv", [Source(["t"], np.zeros(1))], {})
     recorder.begin(0.0, None)
     for n in range(1, 2000):

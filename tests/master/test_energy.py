@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from master.cli import main
-from master.contacts import Contact
-from master.energy import COUPLING_LIMIT, DRIFT, PART_LIMIT, drift_events, find_balances
-from master.recorder import Recording
-from master.report.inputs import quality_rows
+from master.commands.main import main
+from master.evaluation.energy_balance import COUPLING_LIMIT, DRIFT, PART_LIMIT, drift_events, find_balances
+from master.recording.recorder import Recording
+from master.report.run_inputs import quality_rows
+from master.system.contacts import Contact
 
 CONTACT = Contact(1, "line", "pan", "line.pantograph[1].contact")
 WORK = "line.pantograph[1].contact.work"

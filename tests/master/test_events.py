@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from master.cli import main
-from master.contacts import Contact
-from master.events import AT_END, LOST, SLACK, Event, find_events
-from master.recorder import Recording
+from master.commands.main import main
+from master.evaluation.run_events import AT_END, LOST, SLACK, Event, find_events
+from master.recording.recorder import Recording
+from master.system.contacts import Contact
 
 CONTACT = Contact(1, "line", "pan", "line.pantograph[1].contact")
 GEOMETRY = {"line": {"dropper[2].x": 31.5, "support[1].x": 0.0}}

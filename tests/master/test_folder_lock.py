@@ -13,16 +13,17 @@ from pathlib import Path
 
 import pytest
 
-from master import checkpoint, folder_lock, results
-from master.cli import main
-from master.folder_lock import LOCK, OWNER, FolderInUseError, claimed
-from master.recorder import load
+from master.commands.main import main
+from master.recording import checkpoint
+from master.recording.recorder import load
+from master.results import folder_lock, run_results
+from master.results.folder_lock import LOCK, OWNER, FolderInUseError, claimed
 
 ROOT = Path(__file__).parents[2]
 HOLDER = """
 import sys, time
 from pathlib import Path
-from master.folder_lock import claimed
+from master.results.folder_lock import claimed
 with claimed(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -138,7 +139,7 @@ def test_a_second_run_is_refused_and_the_first_is_not_disturbed(toy, tmp_path, c
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     assert (folder / "timeseries.csv").read_bytes().startswith(before)
-    done = results.read(folder)
+    done = run_results.read(folder)
     assert done.summary["status"] == "interrupted"
     assert len(done.recordings[0].time) == done.summary["steps"] + 1
 
@@ -201,7 +202,7 @@ def test_rows_are_counted_before_a_run_is_complete(toy, tmp_path, capsys, monkey
             path.write_text("".join(lines[:-1] if rows < 0 else lines + more))
         return load(path)
 
-    monkeypatch.setattr("master.recorder.load", changed)
+    monkeypatch.setattr("master.recording.recorder.load", changed)
     assert go(toy, folder, "--stop", "0.1") == 1
     assert f"timeseries.csv has {101 + rows} rows, 101 were written: it was changed" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())
@@ -219,7 +220,7 @@ def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsy
             path.write_text(f"{text[:-1]}{'1' if text[-1] != '1' else '2'}\n")
         return load(path)
 
-    monkeypatch.setattr("master.recorder.load", replaced)
+    monkeypatch.setattr("master.recording.recorder.load", replaced)
     assert go(toy, folder, "--stop", "0.1") == 1
     assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())

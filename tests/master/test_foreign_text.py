@@ -9,18 +9,18 @@ import json
 import numpy as np
 import pytest
 
-from master import fmi_log
-from master.caution import LARGEST, CautionObserver
-from master.cli import main
-from master.durable import plain_cell, safe_cell
+from master.commands.main import main
+from master.coupling.fmu_warnings import LARGEST, CautionObserver
+from master.coupling.network import Network
 from master.errors import MasterError, SlaveError
-from master.fmu_file import read_fmu
-from master.instance import LONGEST_STATE, Instance
-from master.network import Network
-from master.recorder import Recorder, Source, load
-from master.report.tables import figures_table, plain_table
-from master.report.terminal import Terminal, printable_json
-from master.system import Component
+from master.fmu import fmi_log
+from master.fmu.fmu_description import read_fmu
+from master.fmu.instance import LONGEST_STATE, Instance
+from master.recording.recorder import Recorder, Source, load
+from master.recording.safe_files import plain_cell, safe_cell
+from master.report.result_tables import figures_table, plain_table
+from master.report.terminal_summary import Terminal, printable_json
+from master.system.components import Component
 
 #: Clear the screen; a title; the one-byte form of a control sequence; text that runs backwards; a bell.
 NASTY = ("\x1b[2J", "\x1b]0;owned\x07", "\x9b31m", "\u202egnp.exe", "\x1b[1A\x1b[2Kpassed")

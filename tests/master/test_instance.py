@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from master.errors import SlaveError
-from master.fmu_file import read_fmu
-from master.instance import Instance
-from master.system import Component
+from master.fmu.fmu_description import read_fmu
+from master.fmu.instance import Instance
+from master.system.components import Component
 
 INPUTS = ("contact.force",)
 OUTPUTS = ("A.z", "A.vz", "A.x")

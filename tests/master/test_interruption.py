@@ -7,10 +7,10 @@ import signal
 
 import pytest
 
-from master import interruption
-from master.cli import main
-from master.instance import Instance
-from master.interruption import end_signals, heeded_at_once, interruptible
+from master.commands.main import main
+from master.coupling import interruption
+from master.coupling.interruption import end_signals, heeded_at_once, interruptible
+from master.fmu.instance import Instance
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 

@@ -6,18 +6,18 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from master.cli import main
-from master.contacts import Contact
+from master.batch.study.family import load_family
+from master.batch.study.study_session import study
+from master.batch.study.variants import Runner
+from master.commands.main import main
 from master.errors import RequestError
 from master.evaluation.en50367_limits import LimitChoice
 from master.evaluation.interval_coverage import never_touched, shortfall
-from master.recorder import Recording
-from master.report.markup import verdict
-from master.results import Results, figures, read
-from master.scenario import Overrides, open_scenario
-from master.study.family import load_family
-from master.study.session import study
-from master.study.variants import Runner
+from master.recording.recorder import Recording
+from master.report.html_markup import verdict
+from master.results.run_results import Results, figures, read
+from master.scenario.open_scenario import Overrides, open_scenario
+from master.system.contacts import Contact
 from tests.master.study.conftest import STUDY
 
 CONTACT = Contact(1, "line", "train", "c")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from master.cli import main
-from master.limits import warnings
-from master.ssp.annotation import RunSettings
-from master.system import Component, Connection, Fmu, System, Variable
+from master.commands.main import main
+from master.scenario.scenario_advice import warnings
+from master.ssp.run_settings import RunSettings
+from master.system.components import Component, Connection, Fmu, System, Variable
 
 
 def component(name, **values):
@@ -58,7 +58,7 @@ def test_nothing_is_said_of_fmus_without_these_parameters():
 
 
 def test_validate_tells_them_and_a_run_leaves_them_to_the_fmus(toy, monkeypatch, tmp_path, capfd):
-    monkeypatch.setattr("master.limits.warnings", lambda _: iter(["too fast :100:"]))
+    monkeypatch.setattr("master.scenario.scenario_advice.warnings", lambda _: iter(["too fast :100:"]))
     assert main(["validate", str(toy), "--no-build"]) == 0
     assert capfd.readouterr().err == "warning: too fast :100:\n"
     assert main(["run", str(toy), "--no-build", "--no-report", "--stop", "0.01", "--out", str(tmp_path / "r")]) == 0

@@ -8,12 +8,12 @@ import json
 import numpy as np
 import pytest
 
-from master.algorithm import Jacobi
-from master.cli import main
-from master.network import Network
-from master.realtime import Pacer
-from master.simulation import TimeGrid, simulate
-from master.system import Connection
+from master.commands.main import main
+from master.coupling.coupling_schemes import Jacobi
+from master.coupling.macro_steps import TimeGrid, simulate
+from master.coupling.network import Network
+from master.coupling.real_time import Pacer
+from master.system.components import Connection
 
 
 class Clock:

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from master.algorithm import Jacobi
+from master.coupling.coupling_schemes import Jacobi
+from master.coupling.macro_steps import TimeGrid, simulate
+from master.coupling.network import Network
 from master.errors import MasterError
-from master.network import Network
-from master.pattern import matcher
-from master.recorder import Recorder, Source, header, load
-from master.simulation import TimeGrid, simulate
-from master.system import Connection
+from master.recording.recorder import Recorder, Source, header, load
+from master.system.components import Connection
+from master.system.variable_names import matcher
 
 NAME = "clock.pantograph[1].contact.force"
 

@@ -6,11 +6,11 @@ import json
 
 import pytest
 
-from master.checkpoint import scheme_options
-from master.cli import main
-from master.rounding import adjustments, steps_in
-from master.ssp.annotation import Coupling, Record, RunSettings
-from master.system import System
+from master.commands.main import main
+from master.recording.checkpoint import scheme_options
+from master.scenario.step_rounding import adjustments, steps_in
+from master.ssp.run_settings import Coupling, Record, RunSettings
+from master.system.components import System
 from tests.master.test_limits import LINE
 
 

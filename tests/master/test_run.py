@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from master import results
-from master.contacts import strip_centre, track_position
 from master.errors import MasterError, RunError
-from master.recorder import load
+from master.recording.recorder import load
+from master.results import run_results
 from master.run import run
-from master.scenario import Overrides, open_scenario
+from master.scenario.open_scenario import Overrides, open_scenario
+from master.system.contacts import strip_centre, track_position
 
 ROOT = Path(__file__).parents[2]
 FORCE = "catenary.pantograph[1].contact.force"
@@ -77,7 +77,7 @@ def test_summary_says_what_was_run(done):
 
 
 def test_reading_back_gives_the_same_figures(done):
-    again = results.read(done.folder)
+    again = run_results.read(done.folder)
     first, second = done.assessments()[0].quality, again.assessments()[0].quality
     assert second.mean == pytest.approx(first.mean, rel=1e-8)
     assert second.sigma == pytest.approx(first.sigma, rel=1e-7)
@@ -142,7 +142,7 @@ def test_a_failing_fmu_leaves_what_was_computed(toy, tmp_path):
     text = str(caught.value)
     assert "component 'catenary' (ToyCatenary.fmu) failed in a step at t = 0.5 s" in text
     assert "the wire broke at 100 percent load" in text
-    left = results.read(tmp_path / "out")
+    left = run_results.read(tmp_path / "out")
     assert left.summary["status"] == "failed"
     assert "the wire broke" in left.summary["reason"]
     assert left.recordings[0].time[-1] == pytest.approx(0.5)
@@ -153,7 +153,7 @@ def test_a_failing_fmu_leaves_what_was_computed(toy, tmp_path):
 def test_nan_stops_the_run_with_its_name_time_and_last_good_value(toy, tmp_path):
     with pytest.raises(RunError) as caught:
         go(toy, tmp_path / "out", parameters={"catenary.nan_at": "0.25"})
-    left = results.read(tmp_path / "out")
+    left = run_results.read(tmp_path / "out")
     last = left.recordings[0][FORCE][-1]
     assert f"'{FORCE}' became nan at t = 0.251 s" in str(caught.value)
     assert f"its last good value was {last:.6g}" in str(caught.value)
@@ -183,7 +183,7 @@ def test_an_interrupted_run_loses_nothing(toy, tmp_path, number):
     assert process.returncode == 1
     assert "interrupted" in said
     assert "Traceback" not in said
-    left = results.read(tmp_path / "out")
+    left = run_results.read(tmp_path / "out")
     assert left.summary["status"] == "interrupted"
     assert "<b>Incomplete.</b> This run is interrupted" in (tmp_path / "out" / "report.html").read_text()
     assert left.recordings[0].time[-1] == pytest.approx(left.summary["time_reached"])
@@ -209,7 +209,7 @@ def test_a_killed_run_is_readable_up_to_its_last_rows(toy, tmp_path):
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGKILL)
     process.wait(timeout=60)
-    left = results.read(tmp_path / "out")
+    left = run_results.read(tmp_path / "out")
     assert left.summary["status"] == "running"
     assert len(left.recordings[0].time) >= 500
 

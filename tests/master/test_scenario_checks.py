@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from master.scenario_checks import (
+from master.scenario.scenario_checks import (
     empty_cells,
     final_position,
     half_empty_rows,
@@ -12,8 +12,8 @@ from master.scenario_checks import (
     problems,
     stop_after_interval,
 )
-from master.ssp.annotation import Interval, RunSettings
-from master.system import Component, Connection, Fmu, System, Variable
+from master.ssp.run_settings import Interval, RunSettings
+from master.system.components import Component, Connection, Fmu, System, Variable
 
 
 def parameter(name, start, unit="m", causality="parameter", kind="Real"):

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from master.errors import RequestError
-from master.scenario import with_values
-from master.ssp.units import COMMON, Unit, split_quantity
-from master.system import Component, Fmu, Variable
-from models.units import SI
+from master.scenario.open_scenario import with_values
+from master.ssp.ssp_units import COMMON, Unit, split_quantity
+from master.system.components import Component, Fmu, Variable
+from models.definition_files.si_units import SI
 
 BASES = {"N": "tension", "m/s": "speed", "Pa": "modulus", "m2": "area", "panto": "own", "": "plain", "lost": "odd"}
 

@@ -6,13 +6,13 @@ import signal
 import numpy as np
 import pytest
 
-from master.algorithm import Jacobi
+from master.coupling.coupling_schemes import Jacobi
+from master.coupling.interruption import interruptible
+from master.coupling.macro_steps import TimeGrid, simulate
+from master.coupling.network import Network
 from master.errors import MasterError, SlaveError
-from master.interruption import interruptible
-from master.network import Network
-from master.simulation import TimeGrid, simulate
-from master.ssp.units import Conversion
-from master.system import Connection
+from master.ssp.ssp_units import Conversion
+from master.system.components import Connection
 
 
 def counter(fake_slave, flow=lambda s, u, t, h: s + 1.0):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from master import store
+from master.fmu import fmu_provision
 
 
 def write_fmu(path, guid, **mark):
@@ -15,7 +15,7 @@ def write_fmu(path, guid, **mark):
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("modelDescription.xml", f'<fmiModelDescription guid="{{{guid}}}"/>')
     with zipfile.ZipFile(path) as file:
-        mark = {"format": 1, "guid": guid, "content": store._content_hash(file), **mark}
+        mark = {"format": 1, "guid": guid, "content": fmu_provision._content_hash(file), **mark}
     with zipfile.ZipFile(path, "a") as file:
         file.writestr("resources/openpanto.txt", "".join(f"{key}={value}\n" for key, value in mark.items()))
 
@@ -42,28 +42,28 @@ class Builder:
 @pytest.fixture
 def builder(monkeypatch):
     made = Builder()
-    monkeypatch.setattr(store, "_fmus", lambda *a, seconds: made(*a, seconds=seconds))
-    monkeypatch.setattr(store, "has_builder", lambda: True)
+    monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: made(*a, seconds=seconds))
+    monkeypatch.setattr(fmu_provision, "has_builder", lambda: True)
     return made
 
 
 def test_missing_then_fresh_then_stale(builder, tmp_path):
     path, told = tmp_path / "X.fmu", []
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     assert builder.asked == ["fingerprint", "build"]
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     assert builder.asked[-2:] == ["fingerprint", "build"]
     assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
-    assert store.stored_guid(path) == "{cd-34}"
+    assert fmu_provision.stored_guid(path) == "{cd-34}"
 
 
 def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
     builder.fingerprint = ""  # what it says of a name that it does not know
     (tmp_path / "X.fmu").write_text("foreign")
-    store.ensure(tmp_path / "X.fmu", print)
+    fmu_provision.ensure(tmp_path / "X.fmu", print)
     assert builder.asked == ["fingerprint"]
     assert (tmp_path / "X.fmu").read_text() == "foreign"
 
@@ -79,7 +79,7 @@ def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
 )
 def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, change, why):
     path, told = tmp_path / "X.fmu", []
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     with zipfile.ZipFile(path) as file:
         members = {name: file.read(name) for name in file.namelist()} | change
     with zipfile.ZipFile(path, "w") as file:
@@ -88,7 +88,7 @@ def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, 
                 file.writestr(name, data)
     before = path.read_bytes()
     builder.fingerprint = "CD-34"
-    assert store.ensure(path, told.append) == path
+    assert fmu_provision.ensure(path, told.append) == path
     assert path.read_bytes() == before
     assert told[1:] == [f"X.fmu is used as it is: {why}; to have it built anew, remove it"]
 
@@ -101,7 +101,7 @@ def test_older_builds_are_known_by_the_name_of_their_script(builder, tmp_path, s
         file.writestr("resources/slavemodule.txt", script)
         file.writestr(f"resources/{script}.py", "")
     builder.fingerprint = "CD-34"
-    store.ensure(path, lambda _: None)
+    fmu_provision.ensure(path, lambda _: None)
     assert builder.asked == (["fingerprint", "build"] if is_ours else ["fingerprint"])
 
 
@@ -111,16 +111,16 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     path, told = tmp_path / "Mine.fmu", []
     write_fmu(path, "ab-12", definition="lines/Mine.toml", pantographs="2")
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     assert told == []
     ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
     assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     assert told == ["building Mine.fmu again: its sources have changed"]
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
-    store.ensure(path, told.append)
+    fmu_provision.ensure(path, told.append)
     assert "which it was built from, is not there" in told[-1]
     assert len(builder.asked) == 3
 
@@ -128,7 +128,7 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
 def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    assert store.ensure(tmp_path / "X.fmu", lambda _: None, scratch) == scratch / "X.fmu"
+    assert fmu_provision.ensure(tmp_path / "X.fmu", lambda _: None, scratch) == scratch / "X.fmu"
     assert not (tmp_path / "X.fmu").exists()
 
 
@@ -136,35 +136,35 @@ def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypa
     (tmp_path / "slavemodule.txt").write_text("x")
     (tmp_path / "pythonfmu").mkdir()
     (tmp_path / "pythonfmu" / "__init__.py").write_text("raise ImportError('of another FMU')")
-    before = store.fingerprint("Pantograph_CX")
+    before = fmu_provision.fingerprint("Pantograph_CX")
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert store.fingerprint("Pantograph_CX") == before
+    assert fmu_provision.fingerprint("Pantograph_CX") == before
 
 
 def test_the_builders_words_are_passed_on(builder, tmp_path):
     builder.code, builder.said = 1, "warning\nerror: X: tension is negative"
     with pytest.raises(ValueError, match="cannot be built: X: tension is negative"):
-        store.ensure(tmp_path / "X.fmu", print)
+        fmu_provision.ensure(tmp_path / "X.fmu", print)
     builder.code = 0
     with pytest.raises(ValueError, match="could not be built: X: tension is negative"):
-        store.ensure(tmp_path / "X.fmu", lambda _: None)
+        fmu_provision.ensure(tmp_path / "X.fmu", lambda _: None)
 
 
 def test_without_fmus_nothing_is_asked(monkeypatch, tmp_path):
-    monkeypatch.setattr(store.importlib.util, "find_spec", lambda name: None)
-    assert not store.has_builder()
-    monkeypatch.setattr(store, "_fmus", lambda *a, seconds: pytest.fail("asked"))
-    store.ensure(tmp_path / "X.fmu", print)
+    monkeypatch.setattr(fmu_provision.importlib.util, "find_spec", lambda name: None)
+    assert not fmu_provision.has_builder()
+    monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: pytest.fail("asked"))
+    fmu_provision.ensure(tmp_path / "X.fmu", print)
 
 
 def test_a_name_that_looks_like_an_option_is_a_name():
-    assert store.fingerprint("--help") is None
+    assert fmu_provision.fingerprint("--help") is None
 
 
 @pytest.mark.parametrize("data", [b"", b"not a zip"])
 def test_a_broken_fmu_has_no_guid(tmp_path, data):
     (tmp_path / "X.fmu").write_bytes(data)
-    assert store.stored_guid(tmp_path / "X.fmu") == ""
+    assert fmu_provision.stored_guid(tmp_path / "X.fmu") == ""
 
 
 def stored(path, **changes):
@@ -188,6 +188,6 @@ def stored(path, **changes):
 )
 def test_an_fmu_whose_archive_cannot_be_unpacked_has_no_guid(tmp_path, changes):
     stored(tmp_path / "X.fmu")
-    assert store.stored_guid(tmp_path / "X.fmu") == "ab"
+    assert fmu_provision.stored_guid(tmp_path / "X.fmu") == "ab"
     stored(tmp_path / "X.fmu", **changes)
-    assert store.stored_guid(tmp_path / "X.fmu") == ""
+    assert fmu_provision.stored_guid(tmp_path / "X.fmu") == ""

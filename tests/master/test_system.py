@@ -2,8 +2,8 @@
 
 import pytest
 
-from master.ssp.annotation import RunSettings
-from master.system import System
+from master.ssp.run_settings import RunSettings
+from master.system.components import System
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from master.contacts import Contact
+from master.coupling.network import Network
+from master.coupling.track_watch import TrackWatch
 from master.errors import RunError
-from master.network import Network
-from master.track_watch import TrackWatch
+from master.system.contacts import Contact
 from tests.master.test_scenario_checks import pantograph, system
 
 CONTACT = Contact(1, "line", "train", "line.contact")

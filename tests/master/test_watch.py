@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from master.contacts import Contact
+from master.coupling.contact_loss_stop import ContactWatch
+from master.coupling.network import Network
 from master.errors import RunError
-from master.network import Network
-from master.watch import ContactWatch
+from master.system.contacts import Contact
 
 CONTACT = Contact(1, "line", "pan", "line.contact")
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 import models
-from models.catenary.parameters import CatenaryDefinition, read
-from models.definition import Table
+from models.catenary.definition.line_definition import CatenaryDefinition, read
+from models.definition_files.toml_reader import Table
 from models.library import load_line, load_lumped
-from models.pantograph.parameters import LumpedDefinition
+from models.pantograph.lumped.lumped_definition import LumpedDefinition
 
 LIBRARY = Path(models.__file__).parent / "library"
 

@@ -3,9 +3,9 @@
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.assembly import dropper_rows, element_dofs
-from models.catenary.contact_wire import height_polynomials
-from models.catenary.elements import NODE_DOFS
+from models.catenary.contact_and_slack.contact_wire import height_polynomials
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.line_matrices import dropper_rows, element_dofs
 
 
 def pendulum_stiffness(model):
@@ -82,4 +82,3 @@ class NodalLine:
         inside = dofs[element] >= 0
         row[dofs[element][inside]] = (powers @ rows[element])[inside]
         return row, float(powers @ static[element])
-

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from models.catenary.mesh import build_mesh
-from models.catenary.parameters import COMPONENTS
+from models.catenary.definition.line_definition import COMPONENTS
+from models.catenary.shape.line_mesh import build_mesh
 
 GRAVITY = 9.81
 _SETTLED = 1e-9  # [m]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.parameters import Contact
-from models.catenary.stepping import local_motion
-from models.contact import continuous_contact, crossing
+from models.catenary.definition.line_definition import Contact
+from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.step.numpy_engine import local_motion
+from models.contact_law import continuous_contact, crossing
 
 
 def _strip(x, z, y=0.0, half=0.7, vz=0.0, skew=0.0):

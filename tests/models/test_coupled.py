@@ -5,12 +5,12 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from models.catenary.model import CatenaryModel
-from models.catenary.part import CatenaryPart
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_part import CatenaryPart
 from models.commands import main
-from models.coupled import CoupledModel
-from models.pantograph.lumped import LumpedModel, LumpedPantographPart
-from models.time_integration import Newmark
+from models.coupled.monolithic import CoupledModel
+from models.numerics.newmark import Newmark
+from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
 from tests.models.nodal_line import NodalLine
 
 START, STOP = 60.0, 1.2

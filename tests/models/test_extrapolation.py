@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.extrapolation import ForceExtrapolation, StripExtrapolation, lead_of
+from models.numerics.extrapolation import ForceExtrapolation, StripExtrapolation, lead_of
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

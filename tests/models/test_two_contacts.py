@@ -7,13 +7,13 @@ from scipy.sparse.linalg import spsolve
 
 from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter
-from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.part import CatenaryPart
-from models.contact import application_point, engagement
-from models.coupled import CoupledModel
+from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_part import CatenaryPart
+from models.contact_law import application_point, engagement
+from models.coupled.monolithic import CoupledModel
 from models.library import load_pantograph
-from models.pantograph.lumped import LumpedModel, LumpedPantographPart
-from models.time_integration import Newmark
+from models.numerics.newmark import Newmark
+from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
 from tests.models.nodal_line import NodalLine
 
 START = 70.0

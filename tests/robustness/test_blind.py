@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 from hypothesis import given, settings
 
-from master.cli import main
-from master.scenario import open_scenario
+from master.commands.main import main
+from master.scenario.open_scenario import open_scenario
 from tests.master.conftest import SSV, ssd_text
 from tests.master.ssp.test_nested import BINDING
 from tests.master.ssp.test_nested import MAPPED as MAPPED_BINDING

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmus.__main__ import main as fmus
-from master.cli import main as master
+from master.commands.main import main as master
 from models.commands import main as models
 from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_quick, assert_refused
 

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.catenary.parameters import read
+from models.catenary.definition.line_definition import read
 from models.commands import main
-from models.definition import DefinitionError, Table
+from models.definition_files.toml_reader import DefinitionError, Table
 from models.library import line_path, load_line, load_pantograph, pantograph_path
 from tests.robustness.mutation import changes
 from tests.robustness.support import ANSWER_SECONDS, PROFILE, TRIED, ask, assert_quick, assert_worded
@@ -63,13 +63,13 @@ def with_line(lines: list[str], index: int, *new: str) -> str:
 def wrong_values(text: str) -> Iterator[Case]:
     for i, lines, m in places(text):
         for bad in NO_NUMBERS:
-            yield Case(with_line(lines, i, f"{m['key']} = [{bad}, \"{m['unit']}\", {m['source']}]"), ("broken.toml",))
+            yield Case(with_line(lines, i, f'{m["key"]} = [{bad}, "{m["unit"]}", {m["source"]}]'), ("broken.toml",))
 
 
 def wrong_units(text: str) -> Iterator[Case]:
     for i, lines, m in places(text):
         for bad in NO_UNITS:
-            new = f"{m['key']} = [{m['value']}, \"{bad}\", {m['source']}]"
+            new = f'{m["key"]} = [{m["value"]}, "{bad}", {m["source"]}]'
             yield Case(with_line(lines, i, new), (m["key"], "unit"))
 
 
@@ -137,7 +137,7 @@ def test_negative_values_of_what_has_none(tmp_path, kind):
     for i, lines, m in places(text):
         if m["key"] not in SIGNED and "[" not in m["value"]:
             TRIED["definition, negative value"] += 1
-            new = f"{m['key']} = [-{m['value']}, \"{m['unit']}\", {m['source']}]"
+            new = f'{m["key"]} = [-{m["value"]}, "{m["unit"]}", {m["source"]}]'
             if float(m["value"]) != 0.0:
                 assert m["key"] in refusal(kind, tmp_path / "broken.toml", with_line(lines, i, new))
 
@@ -164,7 +164,7 @@ def test_a_value_changed_within_its_limits_is_there(tmp_path, kind):
         p = parameters[full]
         factor = 0.97 if p.minimum is None or 0.97 * p.value >= p.minimum else 1.03
         TRIED["definition, sound change"] += 1
-        new = f"{m['key']} = [{float(m['value']) * factor!r}, \"{m['unit']}\", {m['source']}]"
+        new = f'{m["key"]} = [{float(m["value"]) * factor!r}, "{m["unit"]}", {m["source"]}]'
         path.write_text(with_line(lines, i, new), encoding="utf-8")
         after = {p.name: p.value for p in load(kind, path).parameters()}
         assert [n for n in parameters if after[n] != parameters[n].value] == [full]

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from fmus.__main__ import main as fmus
-from master.cli import main
+from master.commands.main import main
 from master.errors import ScenarioError
-from master.fmu_file import read_fmu
+from master.fmu.fmu_description import read_fmu
 from master.ssp import archive
 from master.ssp.archive import extract
 from tests.master.conftest import SSV, ssd_text
@@ -73,8 +73,9 @@ def asked(scenario, tmp_path, kind, more):
     with zipfile.ZipFile(scenario / "resources" / "ToyPantograph.fmu") as file:
         inside = [(n, file.read(n)) for n in file.namelist()]
     members = [(n, d) for n, d in sound_members(scenario) if "ToyPantograph" not in n]
-    path = pack(tmp_path / "x.ssp", [*members, ("resources/ToyPantograph.fmu", pack(fmu, [*inside,
-        *more]).read_bytes())])
+    path = pack(
+        tmp_path / "x.ssp", [*members, ("resources/ToyPantograph.fmu", pack(fmu, [*inside, *more]).read_bytes())]
+    )
     return ask(main, "validate", path, "--no-build"), "ToyPantograph.fmu"
 
 
@@ -103,8 +104,13 @@ def test_unsafe_members(scenario, tmp_path, kind, more, said):
 
 @pytest.mark.parametrize("kind", ["ssp", "fmu"])
 def test_more_of_the_same_is_no_harm(scenario, tmp_path, kind):
-    more = [("documentation/index.html", b"x"), ("documentation/Index.txt", b"x"), ("a..b", b""), (".x", b""), ("e/",
-        b"")]
+    more = [
+        ("documentation/index.html", b"x"),
+        ("documentation/Index.txt", b"x"),
+        ("a..b", b""),
+        (".x", b""),
+        ("e/", b""),
+    ]
     answer, _ = asked(scenario, tmp_path, kind, more)
     assert_accepted(answer, "x: valid")
 
@@ -159,8 +165,9 @@ def test_an_archive_in_an_archive_is_no_component(scenario, tmp_path):
     """SSP allows packages as components; they are refused, and not opened."""
     members = dict(sound_members(scenario))
     inner = pack(tmp_path / "inner.ssp", list(members.items()))
-    text = ssd_text().replace('source="resources/ToyCatenary.fmu"',
-        'source="inner.ssp" type="application/x-ssp-package"')
+    text = ssd_text().replace(
+        'source="resources/ToyCatenary.fmu"', 'source="inner.ssp" type="application/x-ssp-package"'
+    )
     path = pack(tmp_path / "x.ssp", [*{**members, SSD: text.encode(), "inner.ssp": inner.read_bytes()}.items()])
     TRIED["hostile ssp"] += 1
     assert_refused(ask(main, "validate", path, "--no-build"), "only FMUs")
@@ -299,14 +306,16 @@ def test_descriptions_of_fmus_that_cannot_be(scenario, tmp_path, kind):
         text = file.read("modelDescription.xml").decode()
     assert old in text
     members = dict(sound_members(scenario))
-    members["resources/ToyPantograph.fmu"] = pack(path, [("modelDescription.xml", text.replace(old, new,
-        1))]).read_bytes()
+    members["resources/ToyPantograph.fmu"] = pack(
+        path, [("modelDescription.xml", text.replace(old, new, 1))]
+    ).read_bytes()
     answer = ask(main, "validate", pack(tmp_path / "x.ssp", list(members.items())), "--no-build")
     assert_refused(answer, "ToyPantograph.fmu", said)
 
 
-@pytest.mark.parametrize("data", [b"", b"PK\x05\x06" + bytes(18), b"PK\x03\x04", b"\x00" * 100, b"<xml/>"],
-    ids=range(5))
+@pytest.mark.parametrize(
+    "data", [b"", b"PK\x05\x06" + bytes(18), b"PK\x03\x04", b"\x00" * 100, b"<xml/>"], ids=range(5)
+)
 def test_files_that_are_no_fmu(tmp_path, data):
     TRIED["FMU, by hand"] += 1
     path = tmp_path / "x.fmu"
@@ -329,8 +338,9 @@ GUARDED = {
     "models/numerics/kernel_cache.py": ["pickle"],
     "fmus/loader/runtime.py": ["marshal", "compile"],
 }
-SOURCES_OF_THE_PACKAGES = [p for package in ("models", "fmus",
-    "master") for p in sorted((ROOT / package).rglob("*.py"))]
+SOURCES_OF_THE_PACKAGES = [
+    p for package in ("models", "fmus", "master") for p in sorted((ROOT / package).rglob("*.py"))
+]
 
 
 def dangers(tree):
@@ -368,9 +378,15 @@ def test_nothing_that_is_read_is_run(path):
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("import pickle", "pickle"), ("from marshal import loads", "marshal"), ("import yaml as y", "yaml"),
-        ("eval('1')", "eval"), ("exec(x)", "exec"), ("__import__('os')", "__import__"), ("os.system('x')", "os.system"),
-        ("np.load(x, allow_pickle=True)", "np.load"), ("subprocess.run(x, shell=True)", "shell=True"),
+        ("import pickle", "pickle"),
+        ("from marshal import loads", "marshal"),
+        ("import yaml as y", "yaml"),
+        ("eval('1')", "eval"),
+        ("exec(x)", "exec"),
+        ("__import__('os')", "__import__"),
+        ("os.system('x')", "os.system"),
+        ("np.load(x, allow_pickle=True)", "np.load"),
+        ("subprocess.run(x, shell=True)", "shell=True"),
     ],
 )
 def test_the_check_would_find_it(text, found):

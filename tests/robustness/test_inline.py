@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from master.cli import main
-from master.scenario import open_scenario
+from master.commands.main import main
+from master.scenario.open_scenario import open_scenario
 from tests.effort import count
 from tests.master.conftest import SSV, ssd_text
 from tests.robustness.mutation import changes
@@ -71,9 +71,7 @@ def test_the_sound_set_is_taken_in_newtons(scenario):
 def told(data):
     """The values of an inline set in newtons, by another parser: values, units and their factors."""
     root = ElementTree.fromstring(data)
-    factors = {
-        n.get("name"): float(n[0].get("factor", "1")) for n in root.iter() if n.tag.endswith("}Unit") and len(n)
-    }
+    factors = {n.get("name"): float(n[0].get("factor", "1")) for n in root.iter() if n.tag.endswith("}Unit") and len(n)}
     found = {}
     for n in (n for n in root.iter() if n.tag.endswith("}Parameter")):
         found[n.get("name")] = float(n[0].get("value")) * factors.get(n[0].get("unit", "N"), 1.0)

@@ -104,9 +104,7 @@ def test_masses_and_inertias_of_another_machine(tmp_path_factory, factors, name)
     """Sound ones: a pantograph of other masses has figures."""
     TRIED["mechanism, other masses"] += 1
     turn = iter(factors * 100)
-    text = re.sub(
-        r"(?m)^mass = \[([\d.]+),", lambda m: f"mass = [{float(m[1]) * next(turn)!r},", TEXTS[name]
-    )
+    text = re.sub(r"(?m)^mass = \[([\d.]+),", lambda m: f"mass = [{float(m[1]) * next(turn)!r},", TEXTS[name])
     answer = analysed(tmp_path_factory.getbasetemp() / "sound.toml", text)
     assert answer.code == 0, answer
     assert "Modes, strip free" in answer.out

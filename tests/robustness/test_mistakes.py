@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build, recipe
-from master.cli import main as master
+from fmus.builder.fmu_build import build, recipe
+from master.commands.main import main as master
 from models.commands import main as models
 from tests.robustness.support import TRIED, ask, assert_lines
 

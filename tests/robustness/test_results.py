@@ -10,11 +10,11 @@ import warnings
 import pytest
 from hypothesis import given, settings
 
-from master import results
 from master.errors import MasterError
-from master.report.comparison import comparison_page
-from master.report.page import page
-from master.summary_schema import read_geometry, read_summary
+from master.report.comparison_page import comparison_page
+from master.report.run_page import page
+from master.results import run_results
+from master.results.summary_schema import read_geometry, read_summary
 from tests.effort import count
 from tests.robustness.mutation import changes
 from tests.robustness.support import PROFILE, TRIED, assert_lines, assert_worded
@@ -149,7 +149,7 @@ def put(data, place, value):
 def reported(folder):
     """Make the pages that `report` and `compare` write; whether the results were accepted."""
     try:
-        done = results.read(folder)
+        done = run_results.read(folder)
     except MasterError as error:
         assert_worded(error, str(folder))
         return False

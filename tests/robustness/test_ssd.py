@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from lxml import etree
 
-from master.cli import main
-from master.scenario import open_scenario
+from master.commands.main import main
+from master.scenario.open_scenario import open_scenario
 from tests.master.conftest import SSV, ssd_text
 from tests.robustness.support import TRIED, ask, assert_accepted, assert_refused
 

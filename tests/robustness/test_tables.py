@@ -13,21 +13,36 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from master.cli import main as master
-from master.durable import plain_cell, safe_cell
+from master.batch.study.family import STUDY, VARIANTS, load_family
+from master.commands.main import main as master
 from master.errors import MasterError
-from master.report.measured import read_measured
-from master.study.family import STUDY, VARIANTS, load_family
+from master.recording.safe_files import plain_cell, safe_cell
+from master.report.charts.measured_charts import read_measured
 from models.commands import main as models
-from models.definition import DefinitionError
-from models.pantograph.identify import read_response
+from models.definition_files.toml_reader import DefinitionError
+from models.pantograph.identification import read_response
 from tests.effort import count
 from tests.robustness.mutation import changes
 from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_lines, assert_refused, assert_worded
 
 SCENARIOS = Path(__file__).parents[2] / "ssp_scenarios"
-BAD_CELLS = ("", " ", "nan", "inf", "-inf", "1e999", "1e300", "x", "1_000", "1,5", "0x10", "--1", "1 2", "9" * 5000,
-    "٣")
+BAD_CELLS = (
+    "",
+    " ",
+    "nan",
+    "inf",
+    "-inf",
+    "1e999",
+    "1e300",
+    "x",
+    "1_000",
+    "1,5",
+    "0x10",
+    "--1",
+    "1 2",
+    "9" * 5000,
+    "٣",
+)
 ROWS = 12
 
 numbers = st.floats(-1e6, 1e6).map(lambda v: round(v, 6))
@@ -283,7 +298,7 @@ def test_variants_that_cannot_be(tmp_path, text, said):
 
 @pytest.mark.parametrize("name", ["..", ".", "../../x", "/etc/passwd", "a/../../b", "\\..\\x", "con\x00"])
 def test_no_variant_climbs_out_of_the_results(tmp_path, name):
-    from master.study.family import folder_name
+    from master.batch.study.family import folder_name
 
     TRIED["study, by hand"] += 1
     place = (tmp_path / folder_name(name)).resolve()

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from master.batch.verification.case import CASES, load_case
 from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter
-from master.verify.case import CASES, load_case
-from models.catenary.model import CatenaryModel
-from models.coupled import CoupledModel
+from models.catenary.line_model import CatenaryModel
+from models.coupled.monolithic import CoupledModel
 from models.library import load_line, load_lumped
 
 pytestmark = pytest.mark.slow

@@ -12,12 +12,18 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.pantograph.multibody.bodies import euler_parameters, euler_rates, rotation_matrices, skew, turned
-from models.pantograph.multibody.definition import Joint, MechanismDefinition
-from models.pantograph.multibody.forces import ForceElements, gravity_loads
-from models.pantograph.multibody.joints import JOINT_ROWS, Constraints, ConstraintValues, GapRow, Pair, Row
-from models.pantograph.multibody.vectors import Kinematics, MovingVectors, VectorPool
-from models.part import FloatArray
+from models.definition_files.parameter import FloatArray
+from models.pantograph.multibody.elements.force_elements import ForceElements, gravity_loads
+from models.pantograph.multibody.elements.joints import JOINT_ROWS, Constraints, ConstraintValues, GapRow, Pair, Row
+from models.pantograph.multibody.elements.moving_vectors import Kinematics, MovingVectors, VectorPool
+from models.pantograph.multibody.elements.rotations import (
+    euler_parameters,
+    euler_rates,
+    rotation_matrices,
+    skew,
+    turned,
+)
+from models.pantograph.multibody.mechanism_definition import Joint, MechanismDefinition
 
 #: Baumgarte's a and b [1/s] [2.35]: critically damped, slow against the step and fast against the motion.
 BAUMGARTE: Final = 50.0

@@ -13,8 +13,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus import build as builder
-from fmus.build import archive, build, fingerprint, recipe
+from fmus.builder import fmu_build as builder
+from fmus.builder.fmu_build import archive, build, fingerprint, recipe
 from fmus.loader import loader_build
 from fmus.loader.fmu_opening import forget, problem
 from tests.fmus.support import toy_recipe
@@ -42,11 +42,13 @@ def test_versions_are_compared_as_numbers():
 
 def test_the_guid_covers_the_sources_and_not_the_compiled_bytes(monkeypatch):
     before = fingerprint(toy_recipe())
-    monkeypatch.setattr("fmus.build.with_loader", lambda files, _: {**files, "binaries/linux64/Toy.so": b"other"})
+    monkeypatch.setattr(
+        "fmus.builder.fmu_build.with_loader", lambda files, _: {**files, "binaries/linux64/Toy.so": b"other"}
+    )
     assert b"other" in archive(toy_recipe())
     assert fingerprint(toy_recipe()) == before
     changed = {**loader_build.sources(), "loader.c": b"int main(void) {}"}
-    monkeypatch.setattr("fmus.build.sources", lambda: changed)
+    monkeypatch.setattr("fmus.builder.fmu_build.sources", lambda: changed)
     assert fingerprint(toy_recipe()) != before
 
 

@@ -15,7 +15,7 @@ import pytest
 import scipy
 
 from fmus.__main__ import main
-from fmus.build import BuildError, build
+from fmus.builder.fmu_build import BuildError, build
 from fmus.builder.standalone import write_runtime
 from fmus.loader import fmu_opening, loader_build
 from fmus.loader.elf import ElfError, is_aligned, needed, soname

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-import models.units as units
+import models.definition_files.si_units as units
 import toy.law
-from models import schema
-from models.definition import Quantity, Table
-from models.part import FloatArray, Parameter, Snapshot
-from models.schema import count, quantity
+from models.definition_files import field_schema
+from models.definition_files.field_schema import count, quantity
+from models.definition_files.parameter import FloatArray, Parameter, Snapshot
+from models.definition_files.toml_reader import Quantity, Table
 
 assert units.SI["m"] == ("m", 1.0)
 
@@ -28,15 +28,15 @@ class ToyDefinition:
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
 
     def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(schema.parameters(self, self.provenance))
+        return tuple(field_schema.parameters(self, self.provenance))
 
     def with_values(self, values: Mapping[str, float]) -> ToyDefinition:
-        return schema.with_values(self, values)
+        return field_schema.with_values(self, values)
 
 
 def load(path: Path) -> ToyDefinition:
     table = Table.load(path)
-    definition = schema.read(ToyDefinition, table, name=table.text("name"))
+    definition = field_schema.read(ToyDefinition, table, name=table.text("name"))
     definition = replace(definition, provenance=table.provenance)
     table.finish()
     return definition

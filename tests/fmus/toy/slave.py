@@ -5,9 +5,9 @@ from __future__ import annotations
 from operator import attrgetter
 from pathlib import Path
 
-from fmus.adapter import Adapter
-from fmus.ports import Port, Ports, Signal
-from models.part import FloatArray
+from fmus.slave.adapter import Adapter
+from fmus.slave.ports import Port, Ports, Signal
+from models.definition_files.parameter import FloatArray
 from toy.part import ToyDefinition, ToyPart, load
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import common
 from cofmupy import Coordinator, wrappers
 
-from master.algorithm import initialise
+from master.coupling.coupling_schemes import initialise
 from master.run import loaded
-from master.scenario import open_scenario
+from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 
 archive, step, count, out = common.arguments()

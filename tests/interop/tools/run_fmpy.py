@@ -6,7 +6,7 @@ from pathlib import Path
 import common
 from fmpy.ssp.simulation import simulate_ssp
 
-from master.scenario import open_scenario
+from master.scenario.open_scenario import open_scenario
 
 archive, step, count, out = common.arguments()
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import common
 
-from master.algorithm import Jacobi
+from master.coupling.coupling_schemes import Jacobi
+from master.coupling.macro_steps import TimeGrid, simulate
 from master.run import loaded
-from master.scenario import Overrides, open_scenario
-from master.simulation import TimeGrid, simulate
+from master.scenario.open_scenario import Overrides, open_scenario
 
 archive, step, count, out = common.arguments()
 

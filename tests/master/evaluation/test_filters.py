@@ -16,7 +16,7 @@ from master.evaluation.filters import (
     low_pass,
     stands_in,
 )
-from master.ssp.annotation import Filter
+from master.ssp.run_settings import Filter
 
 STEP = 1e-3
 TIME = np.arange(12001) * STEP

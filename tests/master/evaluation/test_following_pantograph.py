@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from master.contacts import Contact
-from master.recorder import Recording
-from master.trains import followings, leading_first
+from master.evaluation.following_pantograph import followings, leading_first
+from master.recording.recorder import Recording
+from master.system.contacts import Contact
 
 TIME = np.linspace(0.0, 1.0, 11)
 

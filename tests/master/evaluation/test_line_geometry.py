@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from master.evaluation.filters import stands_in
-from master.line import laps, met, support_uplifts
-from master.recorder import Recording
+from master.evaluation.line_geometry import laps, met, support_uplifts
+from master.recording.recorder import Recording
 
 RING = {"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}
 

@@ -8,27 +8,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from master import compare, results
-from master.cli import main
-from master.contacts import Contact
+from master.batch.study.family import Interval
+from master.batch.study.study_evaluation import entries
+from master.batch.verification.quantities import QUANTITIES, Choice
+from master.commands.main import main
 from master.errors import MasterError
 from master.evaluation.contact_assessment import assess_contacts
 from master.evaluation.contact_quality import figures_of
 from master.evaluation.contact_signals import EvaluationSettings, contact_signals
 from master.evaluation.filters import BEFORE_CHOICE, DEFAULT, SETTLING, ForceFilter
-from master.recorder import Recording, load
+from master.recording.recorder import Recording, load
 from master.report import figure_rows
-from master.report.charts import interval_shape
-from master.results import Results
+from master.report.charts.run_charts import interval_shape
+from master.results import run_difference, run_results
+from master.results.run_results import Results
 from master.run import run
-from master.scenario import Overrides, open_scenario
-from master.study.family import Interval
-from master.study.figures import entries
-from master.verify.quantities import QUANTITIES, Choice
-from models.catenary.model import CatenaryModel
+from master.scenario.open_scenario import Overrides, open_scenario
+from master.system.contacts import Contact
+from models.catenary.line_model import CatenaryModel
 from models.commands import main as physics
-from models.commands.couple import Evaluated, write_timeseries
-from models.coupled import CoupledModel
+from models.commands.couple_command import Evaluated, write_timeseries
+from models.coupled.monolithic import CoupledModel
 from models.library import load_line, load_lumped
 
 ROOT = Path(__file__).parents[3]
@@ -43,7 +43,7 @@ def go(toy, folder, text, **overrides):
 
 def statistics(folder, name=CONTACT.prefix):
     """What a user makes of the results file, without this package."""
-    with (folder / results.FORCES).open(newline="") as file:
+    with (folder / run_results.FORCES).open(newline="") as file:
         rows = list(csv.DictReader(file))
     force = np.array([float(r[f"{name}.filtered_force [N]"]) for r in rows if r[f"{name}.in_interval"] == "1"])
     return {"mean": force.mean(), "sigma": force.std(), "maximum": force.max(), "minimum": force.min()}
@@ -55,7 +55,7 @@ def test_a_users_own_statistics_of_the_force_file_are_the_figures(toy, toy_text,
     told = json.loads((done.folder / "summary.json").read_text())["quality"][0]
     found = statistics(done.folder)
     assert {name: told[name] for name in found} == found  # to the last bit
-    (done.folder / results.FORCES).unlink()
+    (done.folder / run_results.FORCES).unlink()
     assert main(["report", str(done.folder)]) == 0
     assert statistics(done.folder) == found
 
@@ -64,7 +64,7 @@ def test_the_filter_is_in_the_summary_and_changes_the_figures(toy, toy_text, tmp
     interval = '<panto:Interval start="20" end="45"/>'
     given = ("", '<panto:Filter cutoff="3"/>', '<panto:Filter kind="fft"/>')
     runs = [go(toy, tmp_path / str(i), toy_text(f"{interval}{text}")) for i, text in enumerate(given)]
-    read = [results.read(r.folder) for r in runs]
+    read = [run_results.read(r.folder) for r in runs]
     assert [r.evaluation.filter for r in read] == [DEFAULT, ForceFilter(cutoff=3.0), ForceFilter("fft")]
     assert [r.summary["filter"] for r in read] == [r.evaluation.filter.sentence for r in read]
     assert len({r.summary["quality"][0]["sigma"] for r in read}) == 3
@@ -174,14 +174,14 @@ def test_figures_of_older_results_are_made_with_the_filter_of_their_time(toy, to
     summary = {k: v for k, v in old.summary.items() if k not in ("format", "judged_by")}
     summary["settings"] = {k: v for k, v in summary["settings"].items() if k not in ("filter", "limits")}
     summary["filter"] = "zero-phase low-pass 0-20 Hz by discrete Fourier transform"
-    results.write_json(old.folder / "summary.json", summary)
-    (old.folder / results.FORCES).unlink()
-    read = results.read(old.folder)
+    run_results.write_json(old.folder / "summary.json", summary)
+    (old.folder / run_results.FORCES).unlink()
+    read = run_results.read(old.folder)
     assert read.evaluation.filter == BEFORE_CHOICE
     assert read.assessments()[0].quality.sigma == sigma
     new = go(toy, tmp_path / "new", toy_text(interval))
-    assert "the filters differ (old: fft 20 Hz; new: butterworth" in compare.filter_note([read, new])
-    assert compare.filter_note([new, new]) == ""
+    assert "the filters differ (old: fft 20 Hz; new: butterworth" in run_difference.filter_note([read, new])
+    assert run_difference.filter_note([new, new]) == ""
     capsys.readouterr()
     assert main(["compare", str(old.folder), str(new.folder), "--report", str(tmp_path / "c.html")]) == 0
     assert "the filters differ" in " ".join(capsys.readouterr().out.split())
@@ -191,15 +191,15 @@ def test_figures_of_older_results_are_made_with_the_filter_of_their_time(toy, to
     assert (told["same_filter"], told["rms"]) == (False, 0.0)  # one force, one filter for the difference
     assert main(["report", str(old.folder)]) == 0
     again = json.loads((old.folder / "summary.json").read_text())
-    assert (again["format"], again["quality"][0]["sigma"]) == (results.FORMAT, sigma)
-    assert results.read(old.folder).evaluation.filter == BEFORE_CHOICE
+    assert (again["format"], again["quality"][0]["sigma"]) == (run_results.FORMAT, sigma)
+    assert run_results.read(old.folder).evaluation.filter == BEFORE_CHOICE
 
 
 def test_results_of_a_newer_version_are_refused(toy, toy_text, tmp_path):
     done = go(toy, tmp_path / "out", toy_text(""))
-    results.write_json(done.folder / "summary.json", {**done.summary, "format": results.FORMAT + 1})
+    run_results.write_json(done.folder / "summary.json", {**done.summary, "format": run_results.FORMAT + 1})
     with pytest.raises(MasterError, match="has format 3, this version reads up to 2"):
-        results.read(done.folder)
+        run_results.read(done.folder)
 
 
 def test_spans_are_told_one_by_one_with_a_warning_where_sigma_drifts():

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from master import compare, results
-from master.contacts import Contact
+from master.batch.study.family import Family, Interval, Settings, Variant
+from master.batch.study.study_outcome import Done, Outcome, as_data
+from master.batch.study.study_table import figures_table
 from master.evaluation.interval_coverage import shortfall
-from master.recorder import Recording
-from master.report import page
-from master.report.comparison import comparison_page
-from master.results import Results
-from master.study.family import Family, Interval, Settings, Variant
-from master.study.outcome import Done, Outcome, as_data
-from master.study.table import figures_table
+from master.recording.recorder import Recording
+from master.report import run_page
+from master.report.comparison_page import comparison_page
+from master.results import run_difference, run_results
+from master.results.run_results import Results
+from master.system.contacts import Contact
 
 CONTACT = Contact(1, "catenary", "pantograph", "catenary.pantograph[1].contact")
 PLACES = (50.0, 100.0, 150.0)
@@ -49,7 +49,7 @@ def test_a_run_that_is_not_complete_has_figures_and_no_verdict(status):
     (found,) = done.assessments()
     assert found.quality.mean == pytest.approx(140.0, abs=5.0)
     assert "figures so far" in found.withheld
-    (data,) = results.figures(done)["quality"]
+    (data,) = run_results.figures(done)["quality"]
     assert (data["passed"], data["criteria"]) == (None, [])
     assert made(**LIMITS).assessments()[0].passed
 
@@ -61,8 +61,8 @@ def test_limits_that_nothing_was_held_to_are_named():
     assert found.passed
     assert found.unchecked.startswith("not checked: uplift at supports, for no support")
     assert "contact height range, for the height" in found.unchecked
-    assert results.figures(bare)["quality"][0]["unchecked"] == found.unchecked
-    assert found.unchecked in page(bare)
+    assert run_results.figures(bare)["quality"][0]["unchecked"] == found.unchecked
+    assert found.unchecked in run_page(bare)
     between = made(interval=(110.0, 140.0), **LIMITS).assessments()[0]
     assert "uplift at supports" in between.unchecked
     assert "height" not in between.unchecked
@@ -75,7 +75,7 @@ def test_an_interval_that_takes_in_the_raising_is_warned_of(first, is_early):
     assert bool(found.early) == is_early
     if is_early:
         assert "the interval begin at 60 m or later" in found.early
-        assert found.early in page(made(interval=(first, 160.0)))
+        assert found.early in run_page(made(interval=(first, 160.0)))
 
 
 def test_a_record_that_goes_on_with_a_run_has_no_raising():
@@ -91,8 +91,8 @@ def test_a_badge_says_what_is_only_at_its_limit():
     at, below = made(mean=105.0), made(mean=104.0)
     least = 105.228 - at.assessments()[0].quality.mean
     at, below = made(mean=105.0 + least + 0.2), made(mean=105.0 + least - 0.2)
-    assert "passed, at the limit: mean force</span>" in page(at)
-    assert "at the limit:" not in page(below)
+    assert "passed, at the limit: mean force</span>" in run_page(at)
+    assert "at the limit:" not in run_page(below)
 
 
 def test_one_jump_of_a_position_does_not_stretch_the_end_of_an_interval():
@@ -106,12 +106,12 @@ def test_one_jump_of_a_position_does_not_stretch_the_end_of_an_interval():
 
 def test_runs_that_are_evaluated_differently_are_not_compared_without_a_word():
     one, same = made(**LIMITS), made(**LIMITS)
-    assert compare.setting_notes([one, same]) == ()
+    assert run_difference.setting_notes([one, same]) == ()
     elsewhere, otherwise = made(interval=(60.0, 160.0), **LIMITS), made(limits={"supply": "DC3"})
-    (interval,) = compare.setting_notes([one, elsewhere])
+    (interval,) = run_difference.setting_notes([one, elsewhere])
     assert "90 m to 160 m" in interval
     assert "60 m to 160 m" in interval
-    (limits,) = compare.setting_notes([one, otherwise])
+    (limits,) = run_difference.setting_notes([one, otherwise])
     assert "EN 50367, DC 3 kV" in limits
     assert "the intervals of interest differ" in comparison_page([one, elsewhere])
 
@@ -137,12 +137,12 @@ def test_forces_at_equal_times_and_other_places_are_not_called_the_same():
     one = made(**LIMITS)
     moved, later = made(**LIMITS), made(**LIMITS)
     moved.recordings[0].values[:, 1] += 5.0
-    (found,) = compare.compare(one, moved)
+    (found,) = run_difference.compare(one, moved)
     assert found.apart == pytest.approx(5.0)
     assert "up to 5 m apart" in found.sentence
-    assert "apart" not in compare.compare(one, made(**LIMITS))[0].sentence
+    assert "apart" not in run_difference.compare(one, made(**LIMITS))[0].sentence
     late = later.recordings[0]
     shifted = Recording(late.time + 10.0, late.names, late.units, late.values)
-    (none,) = compare.compare(one, dataclasses.replace(later, recordings=(shifted,)))
+    (none,) = run_difference.compare(one, dataclasses.replace(later, recordings=(shifted,)))
     assert none.rms is None
     assert "no time in common" in none.sentence

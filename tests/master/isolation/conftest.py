@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from pythonfmu.builder import FmuBuilder
 
-from master.fmu_file import read_fmu
-from master.isolation import IsolatedInstance, Isolation
-from master.system import Component
+from master.fmu.fmu_description import read_fmu
+from master.fmu.isolation import IsolatedInstance, Isolation
+from master.system.components import Component
 
 CRASHER = '''
 import ctypes

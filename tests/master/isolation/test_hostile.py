@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from master.errors import SlaveError
-from master.isolation import IsolatedInstance, Isolation, remote
-from master.isolation.wire import HEADER, LONGEST_TEXT, Answer, Channel, EndedError, ProtocolError
+from master.fmu.isolation import IsolatedInstance, Isolation, isolated_instance
+from master.fmu.isolation.channel import HEADER, LONGEST_TEXT, Answer, Channel, EndedError, ProtocolError
 
 
 class Puppet:
@@ -36,7 +36,7 @@ class Puppet:
 @pytest.fixture
 def puppet(monkeypatch, crasher):
     made = Puppet()
-    monkeypatch.setattr(remote, "Process", lambda: made)
+    monkeypatch.setattr(isolated_instance, "Process", lambda: made)
     instance = IsolatedInstance(crasher(), Isolation())
     instance.bind(np.zeros(1), np.zeros(1))
     return made, instance

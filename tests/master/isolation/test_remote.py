@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from master.errors import SlaveError
-from master.instance import Instance
-from master.isolation import IsolatedInstance, Isolation
+from master.fmu.instance import Instance
+from master.fmu.isolation import IsolatedInstance, Isolation
 
 ROOT = Path(__file__).parents[3]
 
@@ -193,9 +193,9 @@ def test_a_child_in_an_endless_loop_ends_with_its_master(crasher_fmu):
     script = f"""
         import numpy as np
         from pathlib import Path
-        from master.fmu_file import read_fmu
-        from master.isolation import IsolatedInstance, Isolation
-        from master.system import Component
+        from master.fmu.fmu_description import read_fmu
+        from master.fmu.isolation import IsolatedInstance, Isolation
+        from master.system.components import Component
         fmu = read_fmu(Path({str(crasher_fmu)!r}))
         toy = IsolatedInstance(Component("toy", fmu, {{"deed": 3}}, ("u",), ("pid",)), Isolation())
         pid = np.zeros(1)

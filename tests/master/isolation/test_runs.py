@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from master import checkpoint, results
-from master.cli import main
+from master.commands.main import main
+from master.recording import checkpoint
+from master.results import run_results
 
 ROOT = Path(__file__).parents[3]
 
@@ -74,7 +75,7 @@ def test_a_crash_leaves_what_was_computed(with_crasher, tmp_path, capsys, deed, 
     assert said.startswith(f"error: component 'toy' (Crasher.fmu) {text}")
     assert said.count("error") == 1
     assert "Traceback" not in said
-    left = results.read(folder)
+    left = run_results.read(folder)
     assert left.summary["status"] == "failed"
     assert text in left.summary["reason"]
     assert left.recordings[0].time[-1] == pytest.approx(0.3)
@@ -114,6 +115,6 @@ def test_interruption_reaches_the_master_alone(toy, tmp_path):
     _, said = process.communicate(timeout=60)
     assert process.returncode == 1
     assert "error: interrupted." in said
-    left = results.read(folder)
+    left = run_results.read(folder)
     assert left.summary["status"] == "interrupted"
     assert len(left.recordings[0].time) == left.summary["steps"] + 1

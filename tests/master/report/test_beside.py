@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from master.errors import MasterError
-from master.report.comparison import columns, comparison_page
-from master.report.inputs import differing_inputs
-from master.report.measured import compare_measured, comparison_rows, read_measured
+from master.report.charts.measured_charts import compare_measured, comparison_rows, read_measured
+from master.report.comparison_page import columns, comparison_page
+from master.report.run_inputs import differing_inputs
 
 
 def write(path, text):

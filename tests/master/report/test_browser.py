@@ -7,8 +7,8 @@ import subprocess
 import pytest
 
 from master import report
-from master.report import markup
-from master.report.comparison import comparison_page
+from master.report import html_markup
+from master.report.comparison_page import comparison_page
 
 BROWSER = next((b for b in ("chromium", "chromium-browser", "google-chrome") if shutil.which(b)), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH: pages cannot be tried out")
@@ -96,7 +96,7 @@ def test_the_console_is_heard_and_the_network_is_barred(tmp_path):
     """The tests above mean something: an error and a request would have been seen."""
     path = tmp_path / "bad.html"
     script = "<script>fetch('http://example.invalid/x').catch(() => 0); nowhere();</script>"
-    path.write_text(markup.document("bad", [script], []), encoding="utf-8")
+    path.write_text(html_markup.document("bad", [script], []), encoding="utf-8")
     _, said = look_at(path, tmp_path / "profile")
     assert any("nowhere is not defined" in line for line in said)
     assert any("Content Security Policy" in line for line in said)

@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 
 from master.errors import MasterError
-from master.report.film import FilmOptions, write_film
-from master.report.movie import DISPLACEMENT_UNIT, as_json, make_movie
+from master.report.film_file import FilmOptions, write_film
+from master.report.moving_picture import DISPLACEMENT_UNIT, as_json, make_movie
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from master.evaluation.contact_signals import power_spectrum
 from master.evaluation.filters import ForceFilter, low_pass, settled
-from master.report.encode import kept_samples, packed, packed_integers
+from master.report.charts.sample_packing import kept_samples, packed, packed_integers
 
 
 @settings(max_examples=50, deadline=None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from master.report.charts import Curve
+from master.report.charts.run_charts import Curve
 
 
 def test_no_two_curves_of_a_chart_are_alike():

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from master import report
-from master.contacts import Contact
-from master.recorder import Recording
-from master.report.charts import run_charts
-from master.report.inputs import inputs_of, quality_rows
-from master.results import Results
+from master.recording.recorder import Recording
+from master.report.charts.run_charts import run_charts
+from master.report.run_inputs import inputs_of, quality_rows
+from master.results.run_results import Results
+from master.system.contacts import Contact
 
 
 def unpacked(numbers):

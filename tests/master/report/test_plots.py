@@ -6,8 +6,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from master import plots
-from master.report.charts import line_marks, run_charts
+from master.report.charts import static_charts
+from master.report.charts.run_charts import line_marks, run_charts
 
 
 def lines(axes):
@@ -15,7 +15,7 @@ def lines(axes):
 
 
 def test_contact_force_shows_raw_and_filtered_over_track_position(made_up):
-    (axes,) = plots.contact_force(made_up()).axes
+    (axes,) = static_charts.contact_force(made_up()).axes
     drawn = lines(axes)
     assert drawn["raw"].get_xdata()[0] == pytest.approx(20.0)
     assert np.ptp(drawn["raw"].get_ydata()) == pytest.approx(180.0, rel=0.03)
@@ -29,18 +29,18 @@ def test_contact_force_shows_raw_and_filtered_over_track_position(made_up):
 
 
 def test_uplift_bars_are_in_millimetres_at_their_supports(made_up):
-    (axes,) = plots.uplift(made_up()).axes
+    (axes,) = static_charts.uplift(made_up()).axes
     assert [bar.get_height() for bar in axes.patches] == pytest.approx([40.0] * 3)
     assert [t.get_text() for t in axes.get_xticklabels()] == ["50", "100", "150"]
 
 
 def test_uplift_history_keeps_to_the_interval(made_up):
-    (axes,) = plots.uplift_history(made_up()).axes
+    (axes,) = static_charts.uplift_history(made_up()).axes
     assert [line.get_label() for line in axes.get_lines()] == ["50 m", "100 m"]
 
 
 def test_geometry_shows_elevation_and_plan(line_geometry):
-    elevation, plan = plots.geometry(line_geometry).axes
+    elevation, plan = static_charts.geometry(line_geometry).axes
     wire = lines(elevation)["contact wire"]
     assert wire.get_xdata().tolist() == sorted(wire.get_xdata())
     assert len(wire.get_xdata()) == 7
@@ -50,8 +50,8 @@ def test_geometry_shows_elevation_and_plan(line_geometry):
 
 def test_what_has_no_data_has_no_plot(made_up):
     bare = dataclasses.replace(made_up(with_geometry=False), recordings=(made_up().recordings[0],))
-    assert set(plots.all_plots(bare)) == {"contact_force", "contact_height"}
-    assert plots.geometry({"support[1].x": 1.0}) is None
+    assert set(static_charts.all_plots(bare)) == {"contact_force", "contact_height"}
+    assert static_charts.geometry({"support[1].x": 1.0}) is None
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def on_ring(made_up):
 
 
 def test_supports_of_a_line_that_closes_on_itself_are_marked_in_every_lap(on_ring):
-    (axes,) = plots.contact_force(on_ring).axes
+    (axes,) = static_charts.contact_force(on_ring).axes
     shown = {c.get_label(): c for c in axes.collections}
     assert [s[0, 0] for s in shown["support"].get_segments()] == [50.0, 100.0]
     assert [s[0, 0] for s in shown["dropper"].get_segments()] == [55.0, 80.0]
@@ -79,7 +79,7 @@ def test_supports_of_a_line_that_closes_on_itself_are_marked_in_every_lap(on_rin
 def test_the_interval_of_a_later_lap_has_its_supports(on_ring):
     settings = on_ring.summary["settings"] | {"interval": {"start": 140.0, "end": 160.0}}
     run = dataclasses.replace(on_ring, summary=on_ring.summary | {"settings": settings})
-    (axes,) = plots.uplift_history(run).axes
+    (axes,) = static_charts.uplift_history(run).axes
     assert [line.get_label() for line in axes.get_lines()] == ["50 m"]
 
 

@@ -8,7 +8,7 @@ import fmpy
 import pytest
 
 from master.errors import RunError
-from master.isolation import Isolation
+from master.fmu.isolation import Isolation
 from master.run import Manner
 from master.ssp.pack import pack
 from tests.foreign_fmus import (
@@ -29,7 +29,10 @@ from tests.foreign_fmus import (
 
 U, K, Y = connector("u", "input"), connector("k", "parameter"), connector("y", "output")
 X = connector("x", "output")
-KELVIN, CELSIUS = '<Unit name="K"><BaseUnit K="1"/></Unit>', '<Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>'
+KELVIN, CELSIUS = (
+    '<Unit name="K"><BaseUnit K="1"/></Unit>',
+    '<Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>',
+)
 
 
 def changed(*pairs, **options):
@@ -55,11 +58,18 @@ def two(bound="1"):
 # Relative quantities and limits, of variables and of their types.
 
 OWN = changed(('<Real unit="degC"/>', '<Real unit="degC" relativeQuantity="true"/>'), units=("", "degC"))
-OF_TYPE = changed(('continuous"><Real/>', 'continuous"><Real declaredType="T"/>'), typed('unit="degC" relativeQuantity="true"'))
-OWN_NOT = changed(('continuous"><Real/>', 'continuous"><Real declaredType="T" relativeQuantity="false"/>'), typed('unit="degC" relativeQuantity="true"'))
+OF_TYPE = changed(
+    ('continuous"><Real/>', 'continuous"><Real declaredType="T"/>'), typed('unit="degC" relativeQuantity="true"')
+)
+OWN_NOT = changed(
+    ('continuous"><Real/>', 'continuous"><Real declaredType="T" relativeQuantity="false"/>'),
+    typed('unit="degC" relativeQuantity="true"'),
+)
 
 
-@pytest.mark.parametrize(("told", "wanted"), [(OWN, 2.0), (OF_TYPE, 2.0), (OWN_NOT, 275.15), (description(("", "degC")), 275.15)])
+@pytest.mark.parametrize(
+    ("told", "wanted"), [(OWN, 2.0), (OF_TYPE, 2.0), (OWN_NOT, 275.15), (description(("", "degC")), 275.15)]
+)
 def test_the_offset_of_a_unit_falls_out_of_a_difference(scenario, tmp_path, told, wanted):
     folder = scenario(two("2"), one=told, other=description(("K", "")))
     assert ran(folder, tmp_path)["b.y"][-1] == pytest.approx(wanted, rel=1e-9)
@@ -68,14 +78,18 @@ def test_the_offset_of_a_unit_falls_out_of_a_difference(scenario, tmp_path, told
 def test_so_it_does_from_a_value_of_the_scenario(scenario):
     told = changed(('<Real start="1"/>', '<Real start="1" unit="K" relativeQuantity="1"/>'))
     bound = values(("k", 'Real value="20" unit="degC"'), ("u", 'Real value="20" unit="degC"'))
-    folder = scenario(ssd(system(component("a", Y, bindings=bound))), panel=told.replace('start="0.5"', 'start="0.5" unit="K"'))
+    folder = scenario(
+        ssd(system(component("a", Y, bindings=bound))), panel=told.replace('start="0.5"', 'start="0.5" unit="K"')
+    )
     assert opened(folder).components[0].parameters == pytest.approx({"k": 20.0, "u": 293.15})
 
 
 def test_limits_of_a_type_hold(scenario):
     told = changed(('<Real start="1"/>', '<Real start="1" declaredType="T"/>'), typed('min="0" max="2" unit="m"'))
     text = ssd(system(component("a", Y, bindings=values(("k", 'Real value="3"')))))
-    assert problems(scenario(text, panel=told)) == ["SystemStructure.ssd:3: parameter 'a.k' = 3 m is above its maximum 2; a value without a unit is in m: check its size, or write its unit [range]"]
+    assert problems(scenario(text, panel=told)) == [
+        "SystemStructure.ssd:3: parameter 'a.k' = 3 m is above its maximum 2; a value without a unit is in m: check its size, or write its unit [range]"
+    ]
 
 
 # Units of FMUs: one name, one meaning.
@@ -204,7 +218,9 @@ def test_two_names_of_one_variable_are_given_one_value(scenario, second):
     if second == 3:
         assert opened(folder).components[0].parameters == {"k": 3.0, "k2": 3.0}
     else:
-        assert problems(folder) == ["SystemStructure.ssd:3: 'k' and 'k2' of component 'a' are one variable in the FMU, but are given 3.0 and 5.0; leave out one of them [alias]"]
+        assert problems(folder) == [
+            "SystemStructure.ssd:3: 'k' and 'k2' of component 'a' are one variable in the FMU, but are given 3.0 and 5.0; leave out one of them [alias]"
+        ]
 
 
 @pytest.mark.parametrize("inside", ["", DOUBLE])
@@ -212,7 +228,9 @@ def test_and_take_one(scenario, inside):
     elements = component("a", Y) + component("b", U, connector("u2", "input"))
     folder = scenario(ssd(system(elements, wire("a.y", "b.u") + wire("a.y", "b.u2", inside))), panel=ALIASES)
     if inside:
-        assert problems(folder) == ["SystemStructure.ssd:3: 'u' and 'u2' of component 'b' are one variable in the FMU, but take 'a.y' and 'a.y' x 2 + 0; leave out one of them [alias]"]
+        assert problems(folder) == [
+            "SystemStructure.ssd:3: 'u' and 'u2' of component 'b' are one variable in the FMU, but take 'a.y' and 'a.y' x 2 + 0; leave out one of them [alias]"
+        ]
     else:
         assert len(opened(folder).connections) == 2
 
@@ -220,14 +238,22 @@ def test_and_take_one(scenario, inside):
 def test_one_instance_in_a_process(scenario, tmp_path):
     told = changed(("<CoSimulation ", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '))
     folder = scenario(ssd(system(component("a", Y) + component("b", Y))), panel=told)
-    with pytest.raises(RunError, match=r"'a' and 'b': both are of panel.fmu, of which a process can hold only one; --isolate"):
+    with pytest.raises(
+        RunError, match=r"'a' and 'b': both are of panel.fmu, of which a process can hold only one; --isolate"
+    ):
         ran(folder, tmp_path)
     assert ran(folder, tmp_path, Manner(isolation=Isolation()))["b.y"][-1] == 0.5
 
 
 EARLY = ("    m->r[3] += h", "    if (t > 0.45) return 2;\n    m->r[3] += h")
-ENDS = ("GetBooleanStatus(void *c, int k, int *w) { return 2; }", "GetBooleanStatus(void *c, int k, int *w) { *w = k == 3; return 0; }")
-LAST = ("GetRealStatus(void *c, int k, double *w) { return 2; }", "GetRealStatus(void *c, int k, double *w) { if (k != 2) return 3; *w = 0.53; return 0; }")
+ENDS = (
+    "GetBooleanStatus(void *c, int k, int *w) { return 2; }",
+    "GetBooleanStatus(void *c, int k, int *w) { *w = k == 3; return 0; }",
+)
+LAST = (
+    "GetRealStatus(void *c, int k, double *w) { return 2; }",
+    "GetRealStatus(void *c, int k, double *w) { if (k != 2) return 3; *w = 0.53; return 0; }",
+)
 
 
 @pytest.mark.parametrize("isolation", [None, Isolation()])
@@ -260,7 +286,10 @@ def test_up_to_a_stop_time_between_steps_a_run_is_that_of_fmpy(scenario, tmp_pat
 
 @pytest.mark.parametrize(
     ("source", "told"),
-    [("", "component 'a' has an empty source [source]"), ("resources", "component 'a': resources is a folder, not an FMU [fmu]")],
+    [
+        ("", "component 'a' has an empty source [source]"),
+        ("resources", "component 'a': resources is a folder, not an FMU [fmu]"),
+    ],
 )
 def test_sources_that_are_no_files(scenario, source, told):
     assert problems(scenario(ssd(system(component("a", Y, source=source))))) == [f"SystemStructure.ssd:3: {told}"]

@@ -8,13 +8,13 @@ import fmpy
 import numpy as np
 import pytest
 
-from master.algorithm import make_algorithm
-from master.cli import main
+from master.commands.main import main
+from master.coupling.coupling_schemes import make_algorithm
+from master.coupling.macro_steps import TimeGrid, simulate
 from master.errors import RequestError, SlaveError
+from master.fmu.isolation import Isolation
 from master.fmu.typed_values import TEXTS
-from master.isolation import Isolation
 from master.run import Manner, loaded
-from master.simulation import TimeGrid, simulate
 from tests.foreign_fmus import (
     binding,
     component,
@@ -144,9 +144,17 @@ def test_conversions_on_the_way_are_applied_in_turn(scenario):
     millinewton = 3 * 1000 * (2 * 4000 + 10) + 5
     assert opened(folder).components[0].parameters["k"] == pytest.approx(0.5 * (millinewton / 1000) + 1, rel=1e-12)
     for leg in ("", ' suppressUnitConversion="true"'):
-        told = ssd(outer.replace('endConnector="k"><ssc:LinearTransformation factor="0.5"', f'endConnector="k"{leg}><ssc:LinearTransformation factor="0.5"'), units)
+        told = ssd(
+            outer.replace(
+                'endConnector="k"><ssc:LinearTransformation factor="0.5"',
+                f'endConnector="k"{leg}><ssc:LinearTransformation factor="0.5"',
+            ),
+            units,
+        )
         scale = 1 if leg else 1000
-        assert opened(scenario(told)).components[0].parameters["k"] == pytest.approx(0.5 * (millinewton / scale) + 1, rel=1e-12)
+        assert opened(scenario(told)).components[0].parameters["k"] == pytest.approx(
+            0.5 * (millinewton / scale) + 1, rel=1e-12
+        )
 
 
 @pytest.mark.parametrize(("kind", "end"), [("parameter", "k"), ("input", "u")])
@@ -274,8 +282,14 @@ def test_only_real_values_are_transformed(scenario):
 def test_all_types_isolated_and_iterated(scenario, tmp_path):
     """Between processes, and with half weights, whole numbers stay whole."""
     text = pair("Integer", "count", "i_in", values(("i_set", 'Integer value="4"')))
-    text = text.replace("</ssd:Connectors></ssd:Component><ssd:Component", f"{connector('i_out', 'output', 'Integer')}</ssd:Connectors></ssd:Component><ssd:Component")
-    text = text.replace("</ssd:Connectors></ssd:Component></ssd:Elements>", f"{connector('i_out', 'output', 'Integer')}</ssd:Connectors></ssd:Component></ssd:Elements>")
+    text = text.replace(
+        "</ssd:Connectors></ssd:Component><ssd:Component",
+        f"{connector('i_out', 'output', 'Integer')}</ssd:Connectors></ssd:Component><ssd:Component",
+    )
+    text = text.replace(
+        "</ssd:Connectors></ssd:Component></ssd:Elements>",
+        f"{connector('i_out', 'output', 'Integer')}</ssd:Connectors></ssd:Component></ssd:Elements>",
+    )
     plain = ran(scenario(text), tmp_path)
     isolated = ran(scenario(text), tmp_path, Manner(isolation=Isolation()))
     assert {n: v.tolist() for n, v in plain.items()} == {n: v.tolist() for n, v in isolated.items()}
@@ -369,7 +383,9 @@ def test_a_bad_name_is_told_where_it_is_written(scenario):
         "m.ssm": SSM.format('\n<ssm:MappingEntry source="a" target="nix"/>'),
     }
     folder = scenario(ssd(system(component("a", Y, bindings=mapped("p.ssv", "m.ssm")))), files)
-    assert problems(folder) == ["m.ssm:4: parameter 'a.nix': the FMU resources/panel.fmu has no such variable [parameter]"]
+    assert problems(folder) == [
+        "m.ssm:4: parameter 'a.nix': the FMU resources/panel.fmu has no such variable [parameter]"
+    ]
 
 
 def test_a_unit_of_an_fmu_is_not_declared_otherwise(scenario):

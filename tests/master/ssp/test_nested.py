@@ -8,8 +8,8 @@ import pytest
 
 from master.errors import ScenarioError
 from master.run import loaded, run
-from master.scenario import Overrides, open_scenario
-from master.ssp.units import Conversion
+from master.scenario.open_scenario import Overrides, open_scenario
+from master.ssp.ssp_units import Conversion
 
 FORCE = "catenary.pantograph[1].contact.force"
 INPUT = '<ssd:Connector name="{}" kind="input"><ssc:Real{}/></ssd:Connector>'
@@ -226,7 +226,7 @@ def test_a_pantograph_is_not_fed_from_outside(toy, toy_text):
 
 
 def test_validate_lists_all_problems_at_once(toy, toy_text, capsys):
-    from master.cli import main
+    from master.commands.main import main
 
     text = nest(toy_text()).replace('endConnector="A.y"', 'endConnector="nix"', 1)
     text = text.replace('stopTime="1.0"', 'stopTime="-1"').replace(BINDING, MAPPED)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from master.errors import ScenarioError
-from master.scenario import Overrides, open_scenario
+from master.scenario.open_scenario import Overrides, open_scenario
 from tests.foreign_fmus import (
     binding,
     compile_library,
@@ -43,7 +43,9 @@ def rows(head):
 
 def typed(kind, source, target, what=""):
     what = what or kind
-    return component("a", connector(source, "output", what)) + component("b", connector(target, "input", what)), wire(f"a.{source}", f"b.{target}")
+    return component("a", connector(source, "output", what)) + component("b", connector(target, "input", what)), wire(
+        f"a.{source}", f"b.{target}"
+    )
 
 
 def of(*parts, **options):
@@ -68,9 +70,17 @@ HONOURED = {
     "percent-encoded sources": (of(component("a", Y, source="resources/pan%65l.fmu")), {"a": {}}),
     "names of SSP 2.0": (of(A.replace("Real", "Float64") + B.replace("Real", "Float64"), AB, version="2.0"), [("a.y", "b.u")]),
 }  # fmt: skip
-HONOURED["annotations of other tools"] = (of(A + B, AB).replace("</ssd:System>", '<ssd:Annotations><ssc:Annotation type="other"/></ssd:Annotations></ssd:System>'), [("a.y", "b.u")])
+HONOURED["annotations of other tools"] = (
+    of(A + B, AB).replace(
+        "</ssd:System>", '<ssd:Annotations><ssc:Annotation type="other"/></ssd:Annotations></ssd:System>'
+    ),
+    [("a.y", "b.u")],
+)
 TWICE = binding(("k", 'Real value="2"')) + binding(("k", 'Real value="3"'))
-HONOURED["parameter bindings"] = (of(component("a", Y, bindings=f"<ssd:ParameterBindings>{TWICE}</ssd:ParameterBindings>")), {"a": {"k": 3.0}})
+HONOURED["parameter bindings"] = (
+    of(component("a", Y, bindings=f"<ssd:ParameterBindings>{TWICE}</ssd:ParameterBindings>")),
+    {"a": {"k": 3.0}},
+)
 
 FORCE = component("p", connector("contact.force", "input"), source="resources/pantograph.fmu")
 REFUSED = {

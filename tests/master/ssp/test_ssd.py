@@ -6,8 +6,8 @@ import pytest
 
 from master.ssp.archive import Sources
 from master.ssp.ssd import read_structure
-from master.ssp.units import Conversion
-from master.ssp.xml import Reader
+from master.ssp.ssp_units import Conversion
+from master.ssp.ssp_xml import Reader
 
 SCENARIOS = Path(__file__).parents[3] / "ssp_scenarios"
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from master.ssp.annotation import Annotations, RunSettings
+from master.scenario.system_checks import Checker
+from master.ssp.run_settings import Annotations, RunSettings
 from master.ssp.ssd import Binding, Component, Connection, Connector, Structure
+from master.ssp.ssp_units import COMMON, Conversion
 from master.ssp.ssv import Parameter, ParameterSet
-from master.ssp.units import COMMON, Conversion
-from master.ssp.validation import Checker
-from master.system import Fmu, Variable
+from master.system.components import Fmu, Variable
 
 
 def variable(name, causality, unit="", kind="Real", minimum=None, maximum=None, variability="tunable"):

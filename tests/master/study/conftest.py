@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from master.contacts import Contact
-from master.recorder import Recording
-from master.results import Results
+from master.recording.recorder import Recording
+from master.results.run_results import Results
+from master.system.contacts import Contact
 
 STUDY = """
 title = "Toys"

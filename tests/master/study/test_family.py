@@ -2,8 +2,8 @@
 
 import pytest
 
+from master.batch.study.family import family_names, load_family, store_values
 from master.errors import MasterError, RequestError, ScenarioError
-from master.study.family import family_names, load_family, store_values
 
 
 def load(folder):

@@ -5,16 +5,16 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from master.contacts import Contact
+from master.batch.study import study_charts
+from master.batch.study.family import Family, Interval, Settings, Variant
+from master.batch.study.study_evaluation import entries
+from master.batch.study.study_outcome import Done, Outcome, as_csv, differences
+from master.batch.study.study_page import page
+from master.batch.verification.quantities import QUANTITIES, Choice
 from master.evaluation.contact_assessment import slack_share
-from master.recorder import Recording
-from master.results import Results
-from master.study import charts
-from master.study.family import Family, Interval, Settings, Variant
-from master.study.figures import entries
-from master.study.outcome import Done, Outcome, as_csv, differences
-from master.study.page import page
-from master.verify.quantities import QUANTITIES, Choice
+from master.recording.recorder import Recording
+from master.results.run_results import Results
+from master.system.contacts import Contact
 
 WHOLE = Interval(name="whole", start=60.0, end=120.0)
 
@@ -93,19 +93,19 @@ def test_the_page_shows_all_and_asks_for_nothing(outcome):
 
 
 def test_histories_are_drawn_at_the_nearest_support_and_dropper(outcome):
-    uplift, dropper = charts.history_charts(outcome)
+    uplift, dropper = study_charts.history_charts(outcome)
     assert uplift.title == "Uplift at the support at 75.0 m"
     assert dropper.title == "Force in the dropper at 70.0 m"
 
 
 def test_wires_are_drawn_with_their_sum(outcome):
-    made = charts.sharing_charts(outcome)
+    made = study_charts.sharing_charts(outcome)
     assert [c.title for c in made] == [f"From wire to wire, 30 m, {p}" for p in ("leading", "trailing")]
     assert [t["name"] for t in made[0].figure["data"]] == ["section 1", "section 2", "total"]
 
 
 def test_statistics_are_drawn_by_place_in_the_train_with_the_single_one(outcome):
-    made = charts.interval_charts(outcome, WHOLE, outcome.entries(WHOLE))
+    made = study_charts.interval_charts(outcome, WHOLE, outcome.entries(WHOLE))
     assert [c.title for c in made[:2]] == ["Statistics, leading", "Statistics, trailing"]
     assert [t["name"] for t in made[0].figure["data"]] == ["single", "30 m"]
     assert [c.title for c in made[2:]] == ["Contact force, 30 m", "Histogram, 30 m"]

@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from master.cli import main
+from master.batch.study.family import load_family
+from master.batch.study.study_session import study
+from master.batch.study.variants import Runner, calibrate_variant
+from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError, RequestError
-from master.results import is_ours
-from master.study.family import load_family
-from master.study.session import study
-from master.study.variants import Runner, calibrate_variant
-from master.system import without
+from master.results.run_results import is_ours
+from master.system.components import without
 
 
 @pytest.fixture

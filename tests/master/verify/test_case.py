@@ -2,8 +2,8 @@
 
 import pytest
 
+from master.batch.verification.case import CASES, find_cases, load_case, load_cases
 from master.errors import RequestError, ScenarioError
-from master.verify.case import CASES, find_cases, load_case, load_cases
 
 GOOD = """
 title = "A toy"

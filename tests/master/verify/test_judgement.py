@@ -4,10 +4,10 @@ import math
 
 import pytest
 
+from master.batch.verification.case import Row
+from master.batch.verification.judgement import Bounds, decide, judge_row, reference_text
+from master.batch.verification.quantities import QUANTITIES, Measured
 from master.errors import MasterError
-from master.verify.case import Row
-from master.verify.judgement import Bounds, decide, judge_row, reference_text
-from master.verify.quantities import QUANTITIES, Measured
 
 
 def _row(quantity="sigma", **values):

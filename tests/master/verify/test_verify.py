@@ -6,11 +6,11 @@ from contextlib import contextmanager
 
 import pytest
 
-from master.cli import main
+from master.batch.verification import verification_session
+from master.batch.verification.case import load_cases
+from master.batch.verification.case_runs import Runs
+from master.commands.main import main
 from master.errors import InterruptedRunError
-from master.verify import session
-from master.verify.case import load_cases
-from master.verify.runs import Runs
 
 CASE = """
 title = "A <toy>"
@@ -212,7 +212,7 @@ def test_an_interruption_leaves_the_finished_cases(case, in_folder):
 
     runs = Interrupted(in_folder / "v" / "runs", nobody, build=False)
     with pytest.raises(InterruptedRunError):
-        session.verify(cases, in_folder / "v", runs, shown.append)
+        verification_session.verify(cases, in_folder / "v", runs, shown.append)
     data = _data(in_folder)
     assert data["status"] == "interrupted"
     assert data["passed"] is False

@@ -8,12 +8,12 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu, spsolve
 
-from models.catenary.assembly import assemble
-from models.catenary.elements import NODE_DOFS
-from models.catenary.equilibrium import weight
-from models.catenary.mesh import CatenaryMesh, Chain
-from models.catenary.model import CatenaryModel, StripMotion
-from models.time_integration import Newmark, steps_within
+from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.form_finding import weight
+from models.catenary.shape.line_matrices import assemble
+from models.catenary.shape.line_mesh import CatenaryMesh, Chain
+from models.numerics.newmark import Newmark, steps_within
 from tests.models.nodal_line import NodalLine, pulls
 
 GRAVITY = 9.81
@@ -75,7 +75,7 @@ def test_sag_of_a_single_tensioned_span(short_line):
 def test_reactions_carry_the_weight(short_line):
     model = CatenaryModel(short_line)
     static, mesh = model.static, model.mesh
-    from models.catenary.assembly import dropper_rows
+    from models.catenary.shape.line_matrices import dropper_rows
 
     rows = dropper_rows(mesh, static.points)
     internal = static.matrices.K @ static.displacement + rows.T @ static.dropper_force - static.matrices.load

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from models.catenary.elements import (
+from models.catenary.shape.beam_elements import (
     beam_geometric_stiffness,
     beam_mass,
     beam_stiffness,

@@ -7,17 +7,17 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from models.catenary.assembly import (
+from models.catenary.definition.line_definition import COMPONENTS, GRAVITY
+from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.form_finding import EquilibriumError, find_form, weight
+from models.catenary.shape.line_matrices import (
     assemble,
     dropper_lengths,
     dropper_rows,
     dropper_stiffness,
 )
-from models.catenary.elements import NODE_DOFS
-from models.catenary.equilibrium import EquilibriumError, find_form, weight
-from models.catenary.mesh import build_mesh
-from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.parameters import COMPONENTS, GRAVITY
+from models.catenary.shape.line_mesh import build_mesh
 from models.commands import main
 from models.library import line_names, load_line
 
@@ -266,7 +266,7 @@ def test_what_nothing_holds_is_one_sentence(line_maker, monkeypatch):
         kept[inner * NODE_DOFS + 3] = 0.0  # nothing keeps it from twisting
         return dataclasses.replace(matrices, K=(sp.diags(kept) @ matrices.K @ sp.diags(kept)).tocsc())
 
-    monkeypatch.setattr("models.catenary.equilibrium.assemble", loose)
+    monkeypatch.setattr("models.catenary.shape.form_finding.assemble", loose)
     with pytest.raises(EquilibriumError, match="equations are singular, as they are where nothing holds a wire"):
         find_form(line, mesh)
 
@@ -284,7 +284,7 @@ def test_a_line_without_mass_is_one_sentence(line_maker, monkeypatch):
         matrices = dataclasses.replace(state.matrices, M=0.0 * state.matrices.M)
         return dataclasses.replace(state, matrices=matrices)
 
-    monkeypatch.setattr("models.catenary.model.find_form", weightless)
+    monkeypatch.setattr("models.catenary.line_model.find_form", weightless)
     with pytest.raises(EquilibriumError, match=r"line 'short' cannot move in modes .*not positive"):
         CatenaryModel(line_maker(spans=3))
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from models.catenary.elements import NODE_DOFS
-from models.catenary.intervals import attachments, intervals, plan_angles, plan_rotation, without_rounding
-from models.catenary.model import CatenaryModel
+from models.catenary.line_model import CatenaryModel
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.wire_intervals import attachments, intervals, plan_angles, plan_rotation, without_rounding
 from models.library import load_line
 from tests.models.nodal_line import NodalLine
 

@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from models.catenary.limits import (
+from models.catenary.definition.line_definition import Contact, Rayleigh
+from models.catenary.line_advice import (
     longest_step,
     slack_law_warning,
     slack_warning,
@@ -14,9 +15,8 @@ from models.catenary.limits import (
     step_warning,
     tangent_stiffness,
 )
-from models.catenary.parameters import Contact, Rayleigh
-from models.catenary.part import CatenaryPart
-from models.catenary.statics import contact_wire_wave_speed, wave_speed
+from models.catenary.line_part import CatenaryPart
+from models.catenary.statics.elasticity import contact_wire_wave_speed, wave_speed
 from models.commands import main
 
 

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from models.catenary.mesh import build_mesh, contact_wire_height
-from models.catenary.parameters import COMPONENTS
+from models.catenary.definition.line_definition import COMPONENTS
+from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
 from models.library import line_names, load_line
 
 

@@ -9,8 +9,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from models.catenary import statics
-from models.catenary.model import CatenaryModel
+from models.catenary.line_model import CatenaryModel
+from models.catenary.statics import elasticity
 from models.library import load_line
 from tests.models.nonlinear_truss import Truss
 
@@ -34,7 +34,7 @@ def places(line, truss):
 
 
 def rises(line, at):
-    return 1e3 * FORCE * statics.elasticity(CatenaryModel(line), np.array(at), FORCE).value
+    return 1e3 * FORCE * elasticity.elasticity(CatenaryModel(line), np.array(at), FORCE).value
 
 
 @pytest.mark.parametrize("name", ["LN2", "EN50318_2018_AC_simple", "LN6"])

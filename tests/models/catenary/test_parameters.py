@@ -5,10 +5,10 @@ import tomllib
 import pytest
 
 import models.library
-from models.catenary.parameters import Rayleigh, load, read
-from models.definition import DefinitionError, Table
+from models.catenary.definition.line_definition import Rayleigh, load, read
+from models.definition_files.parameter import ParameterError
+from models.definition_files.toml_reader import DefinitionError, Table
 from models.library import line_names, line_path, load_line
-from models.part import ParameterError
 
 SOURCE = "test"
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from models.catenary import statics
-from models.catenary.assembly import pendulum_stiffness
-from models.catenary.elements import NODE_DOFS, bar_geometric_stiffness
-from models.catenary.equilibrium import EquilibriumError, find_form
-from models.catenary.mesh import build_mesh
-from models.catenary.model import CatenaryModel
+from models.catenary.line_model import CatenaryModel
+from models.catenary.shape.beam_elements import NODE_DOFS, bar_geometric_stiffness
+from models.catenary.shape.form_finding import EquilibriumError, find_form
+from models.catenary.shape.line_matrices import pendulum_stiffness
+from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.statics import elasticity
+from models.definition_files.parameter import ParameterError
 from models.library import line_names, load_line
-from models.part import ParameterError
 from tests.models import nodal_line
 
 GRAVITY = 9.81
@@ -41,9 +41,7 @@ def differences(ends, unstrained, stiffness, move=1e-5):
     for k in range(6):
         step = np.zeros(6)
         step[k] = move
-        ahead, behind = (
-            bar_force(ends + sign * step.reshape(2, 3), unstrained, stiffness) for sign in (1.0, -1.0)
-        )
+        ahead, behind = (bar_force(ends + sign * step.reshape(2, 3), unstrained, stiffness) for sign in (1.0, -1.0))
         columns.append((ahead - behind) / (2.0 * move))
     return np.array(columns).T
 
@@ -154,10 +152,10 @@ def test_the_support_of_LN2_gives_way_as_a_nonlinear_truss_does(ln2):
     """100 N lift it by 22.63 mm in a truss without bending, 16 elements between droppers; 23.9 mm without N/L."""
     at = np.array([600.7])
     line = without_bending(ln2, 16)
-    lifted = 1e5 * statics.elasticity(CatenaryModel(line), at, 100.0).value[0]
+    lifted = 1e5 * elasticity.elasticity(CatenaryModel(line), at, 100.0).value[0]
     assert lifted == pytest.approx(22.63, rel=0.015)
     plain = CatenaryModel(line.with_values({"dynamics.geometric_stiffness": 0}))
-    assert 1e5 * statics.elasticity(plain, at, 100.0).value[0] == pytest.approx(23.9, abs=0.1)
+    assert 1e5 * elasticity.elasticity(plain, at, 100.0).value[0] == pytest.approx(23.9, abs=0.1)
 
 
 def test_the_switch_is_a_number_that_an_FMU_offers(ln2):

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.linalg import cho_factor, cho_solve
 
-from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.part import CatenaryPart
-from models.catenary.statics import elasticity
-from models.coupled import CoupledModel
+from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_part import CatenaryPart
+from models.catenary.statics.elasticity import elasticity
+from models.coupled.monolithic import CoupledModel
+from models.definition_files.parameter import ParameterError
 from models.library import line_names, load_line
-from models.part import ParameterError
-from models.time_integration import Newmark
+from models.numerics.newmark import Newmark
 from tests.models.nodal_line import NodalLine
 
 HIGHEST = "dynamics.highest_frequency"

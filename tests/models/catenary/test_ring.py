@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from models.catenary.assembly import assemble, dropper_rows
-from models.catenary.band import Banded, Cyclic, factorised
-from models.catenary.compliance import Compliance
-from models.catenary.elements import NODE_DOFS
-from models.catenary.energy import LineBalance
-from models.catenary.mesh import build_mesh
-from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.parameters import read
-from models.catenary.part import CatenaryPart
-from models.catenary.statics import elasticity
-from models.coupled import CoupledModel
-from models.definition import DefinitionError, Table
+from models.catenary.definition.line_definition import read
+from models.catenary.line_energy import LineBalance
+from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_part import CatenaryPart
+from models.catenary.linear_motion.attachment_solver import Banded, Cyclic, factorised
+from models.catenary.linear_motion.compliance import Compliance
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.line_matrices import assemble, dropper_rows
+from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.statics.elasticity import elasticity
+from models.coupled.monolithic import CoupledModel
+from models.definition_files.toml_reader import DefinitionError, Table
 from models.library import line_names, line_path, load_line
 
 STEP, SPAN = 1e-3, 50.0

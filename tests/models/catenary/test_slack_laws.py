@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from models.catenary.assembly import slack_delay
-from models.catenary.mesh import build_mesh
-from models.definition import DefinitionError
+from models.catenary.shape.line_matrices import slack_delay
+from models.catenary.shape.line_mesh import build_mesh
+from models.definition_files.toml_reader import DefinitionError
 from models.library import line_names, load_line
 
 

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from models.catenary import statics
-from models.catenary.model import CatenaryModel
-from models.catenary.parameters import Wire
+from models.catenary.definition.line_definition import Wire
+from models.catenary.line_model import CatenaryModel
+from models.catenary.statics import elasticity
 from models.commands import main
 from models.library import line_names, load_line
 from tests.models.nodal_line import NodalLine
@@ -26,9 +26,9 @@ def re330():
 
 def test_wave_speed_of_a_string_and_of_a_beam():
     wire = Wire(area=150e-6, mass=1.25, youngs_modulus=1.0, tension=20000.0, bending_stiffness=0.0)
-    assert statics.wave_speed(wire, 50.0) == pytest.approx(math.sqrt(16000.0))
+    assert elasticity.wave_speed(wire, 50.0) == pytest.approx(math.sqrt(16000.0))
     beam = Wire(area=150e-6, mass=1.25, youngs_modulus=1.0, tension=1e-9, bending_stiffness=200.0)
-    assert statics.wave_speed(beam, 2.0) == pytest.approx(math.pi / 2.0 * math.sqrt(200.0 / 1.25))
+    assert elasticity.wave_speed(beam, 2.0) == pytest.approx(math.pi / 2.0 * math.sqrt(200.0 / 1.25))
 
 
 @pytest.mark.parametrize(
@@ -37,26 +37,26 @@ def test_wave_speed_of_a_string_and_of_a_beam():
 def test_wave_speeds_of_table_2_1(name, speed):
     line = load_line(name)
     length = line.sections[0].spans[5].length
-    assert 3.6 * statics.wave_speed(line.contact_wire, length) == pytest.approx(speed, rel=0.01)
+    assert 3.6 * elasticity.wave_speed(line.contact_wire, length) == pytest.approx(speed, rel=0.01)
 
 
 def test_reflection_doppler_and_amplification():
     equal = Wire(area=1e-4, mass=1.0, youngs_modulus=1e11, tension=20000.0)
-    assert statics.reflection_factor(equal, equal) == 0.5
-    waves = statics.waves(load_line("LN2"), 300.0 / 3.6, 50.0)
+    assert elasticity.reflection_factor(equal, equal) == 0.5
+    waves = elasticity.waves(load_line("LN2"), 300.0 / 3.6, 50.0)
     C, V = waves.speed, 300.0 / 3.6
     r = math.sqrt(14000.0 * 0.605) / (math.sqrt(14000.0 * 0.605) + math.sqrt(20000.0 * 1.334))
     assert waves.reflection == pytest.approx(r)
     assert waves.doppler == pytest.approx((C - V) / (C + V))
     assert waves.amplification == pytest.approx(r * (C + V) / (C - V))
     assert waves.limit == pytest.approx(0.7 * C)
-    assert statics.waves(load_line("LN2"), 130.0, 50.0).amplification == math.inf
+    assert elasticity.waves(load_line("LN2"), 130.0, 50.0).amplification == math.inf
 
 
 def test_droppers_of_a_compound_line_reflect_at_the_auxiliary_wire():
     line = load_line("Shinkansen")
-    expected = statics.reflection_factor(line.auxiliary_wire, line.contact_wire)
-    assert statics.waves(line, 80.0, 50.0).reflection == expected
+    expected = elasticity.reflection_factor(line.auxiliary_wire, line.contact_wire)
+    assert elasticity.waves(line, 80.0, 50.0).reflection == expected
 
 
 def string_on_springs(x, F1, F2, k, positions, length):
@@ -85,7 +85,7 @@ def test_elasticity_of_two_strings_tied_by_springs(line_maker, share):
     limp = {f"{w}.bending_stiffness": 0.0 for w in wires} | {f"{w}.youngs_modulus": 1e7 for w in wires}
     line = line.with_values(limp | {"contact_wire.tension": 18000.0, "dynamics.geometric_stiffness": 0})
     model = CatenaryModel(line)
-    found = statics.elasticity(model, np.array([50.0 * share]), 1.0)
+    found = elasticity.elasticity(model, np.array([50.0 * share]), 1.0)
     k = model.dropper_stiffness
     expected = string_on_springs(50.0 * share, 18000.0, 14000.0, k, line.sections[0].spans[0].droppers, 50.0)
     assert found.value[0] == pytest.approx(expected, rel=2e-3)
@@ -93,15 +93,15 @@ def test_elasticity_of_two_strings_tied_by_springs(line_maker, share):
 
 def test_elasticity_without_slack_does_not_depend_on_the_force(short):
     x = np.array([125.0, 130.0])
-    small, large = (statics.elasticity(short, x, force).value for force in (1.0, 10.0))
+    small, large = (elasticity.elasticity(short, x, force).value for force in (1.0, 10.0))
     assert small == pytest.approx(large, rel=1e-9)
 
 
 def test_slack_droppers_make_a_line_softer_and_the_solution_exact(short):
     """Where droppers are slack they carry nothing: removing them gives the same uplift."""
     x, force = 125.0, 400.0
-    slack = statics.elasticity(short, np.array([x]), force)
-    tight = statics.elasticity(short, np.array([x]), 1.0)
+    slack = elasticity.elasticity(short, np.array([x]), force)
+    tight = elasticity.elasticity(short, np.array([x]), 1.0)
     assert slack.value[0] > 1.05 * tight.value[0]
 
     elastic = np.ones(len(short.static.dropper_force), dtype=bool)
@@ -126,20 +126,20 @@ def test_elasticity_is_even_in_a_stitched_line_and_uneven_in_a_simple_one(re330)
     ln2 = CatenaryModel(load_line("LN2"))
     u = {}
     for name, model, number in (("LN2", ln2, 11), ("Re330", re330, 8)):
-        x = statics.positions_in_span(model.definition.sections[0].spans[number], 2)
-        u[name] = statics.elasticity(model, x, 100.0).non_uniformity
+        x = elasticity.positions_in_span(model.definition.sections[0].spans[number], 2)
+        u[name] = elasticity.elasticity(model, x, 100.0).non_uniformity
     assert u["Re330"] < 0.2 < 0.3 < u["LN2"]
 
 
 def test_non_uniformity():
-    result = statics.Elasticity(np.arange(3.0), np.array([2e-4, 4e-4, 6e-4]), 100.0)
+    result = elasticity.Elasticity(np.arange(3.0), np.array([2e-4, 4e-4, 6e-4]), 100.0)
     assert (result.minimum, result.maximum) == (2e-4, 6e-4)
     assert result.non_uniformity == pytest.approx(0.5)
 
 
 def test_steady_arms_balance_the_kink_of_the_wire_in_plan(re330):
     """Lateral load = F (sin of the angle on one side + on the other): 2 x 27 kN x 0.6 m / 65 m = 498 N."""
-    arms = statics.arm_loads(re330)
+    arms = elasticity.arm_loads(re330)
     inner = (arms.x > 300.0) & (arms.x < 800.0)
     assert arms.lateral[inner] == pytest.approx(np.full(inner.sum(), 2 * 27000.0 * 0.6 / 65.0), rel=0.03)
     assert arms.lift == pytest.approx(arms.lateral * math.tan(math.radians(6.0)), rel=1e-3)
@@ -147,14 +147,14 @@ def test_steady_arms_balance_the_kink_of_the_wire_in_plan(re330):
 
 def test_the_sign_of_the_arms_angle_decides_between_lift_and_pull(re330):
     line = re330.definition.with_values({"steady_arm.angle": math.radians(6.0)})
-    risen = statics.arm_loads(CatenaryModel(line))
+    risen = elasticity.arm_loads(CatenaryModel(line))
     assert (risen.lift < -30.0).all()
-    assert (statics.arm_loads(re330).lift > 30.0).all()
+    assert (elasticity.arm_loads(re330).lift > 30.0).all()
 
 
 def test_profile_and_droppers_belong_together(re330):
-    contact = next(p for p in statics.profiles(re330) if p.component == "contact_wire")
-    droppers = statics.droppers(re330, 496.0, 561.0)
+    contact = next(p for p in elasticity.profiles(re330) if p.component == "contact_wire")
+    droppers = elasticity.droppers(re330, 496.0, 561.0)
     assert len(droppers.x) == 9
     assert (np.diff(droppers.x) > 0.0).all()
     z = np.interp(droppers.x, contact.x, contact.z)

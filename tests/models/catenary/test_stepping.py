@@ -5,16 +5,16 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from models.catenary.band import CUT, Banded, Sparse, factorised
-from models.catenary.compiled import CompiledStepper, KernelError, kernels, make_stepper
-from models.catenary.compliance import Compliance
-from models.catenary.interval_modes import slower_than
-from models.catenary.model import CatenaryModel, StripMotion
-from models.catenary.product import BlockProduct, Product, TransposedProduct
-from models.catenary.stepping import Stepper, _by_blocks
-from models.coupled import CoupledModel
+from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.linear_motion.attachment_solver import CUT, Banded, Sparse, factorised
+from models.catenary.linear_motion.compliance import Compliance
+from models.catenary.linear_motion.interval_modes import slower_than
+from models.catenary.linear_motion.sparse_products import BlockProduct, Product, TransposedProduct
+from models.catenary.step.numba_engine import CompiledStepper, KernelError, kernels, make_stepper
+from models.catenary.step.numpy_engine import Stepper, _by_blocks
+from models.coupled.monolithic import CoupledModel
 from models.library import load_line
-from models.time_integration import Newmark
+from models.numerics.newmark import Newmark
 from tests.models.nodal_line import NodalLine
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
-from models.part import ParameterError
+from models.definition_files.parameter import ParameterError
 
 
 def wire(stagger, first=0.0, last=200.0, height=5.0, shift=0.0):

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no watching process without fork")
 
 BUSY = """
-from models.commands.interruption import watch_interruptions
+from models.commands.physics_interruption import watch_interruptions
 watch_interruptions({grace})
 print("ready", flush=True)
 {work}

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models.definition import DefinitionError, Table
+from models.definition_files.toml_reader import DefinitionError, Table
 from models.library import load_pantograph
-from models.pantograph.lumped import LumpedModel
-from models.pantograph.parameters import read_lumped
+from models.pantograph.lumped.lumped_definition import read_lumped
+from models.pantograph.lumped.lumped_model import LumpedModel
 
 # Table 5.1, figure 3.5 and EN 50318: mass kg, stiffness N/m, damping N s/m, bottom to top.
 PRINTED = {

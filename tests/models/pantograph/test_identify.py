@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.definition import DefinitionError
-from models.pantograph.identify import Response, identify, read_response
-from models.pantograph.lumped_characteristics import chain_stiffness
+from models.definition_files.toml_reader import DefinitionError
+from models.pantograph.identification import Response, identify, read_response
+from models.pantograph.lumped.lumped_rig import chain_stiffness
 
 CX = (np.array([5.58, 8.78, 7.75]), np.array([108.39, 0.009, 45.85]), np.array([178.45, 15487.0, 7000.0]))
 FREQUENCY = np.linspace(0.2, 20.0, 120)

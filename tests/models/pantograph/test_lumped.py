@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
-from models.pantograph.lumped import LumpedModel, LumpedPantographPart
-from models.part import ParameterError
+from models.definition_files.parameter import ParameterError
+from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
 
 POINT, BASE = np.zeros(3), np.zeros(2)
 

@@ -3,7 +3,7 @@
 import pytest
 
 from models.library import load_lumped
-from models.pantograph.lumped_advice import working_height_warning
+from models.pantograph.lumped.lumped_advice import working_height_warning
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from models.catenary.assembly import assemble, beam_properties, compression_ratio, dropper_stiffness
-from models.catenary.elements import NODE_DOFS
-from models.catenary.mesh import build_mesh, contact_wire_height
-from models.catenary.parameters import COMPONENTS, Damping, Dropper, MessengerSupport, Rayleigh
+from models.catenary.definition.line_definition import COMPONENTS, Damping, Dropper, MessengerSupport, Rayleigh
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.line_matrices import assemble, beam_properties, compression_ratio, dropper_stiffness
+from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
 from models.library import line_names, load_line
 
 GRAVITY = 9.81

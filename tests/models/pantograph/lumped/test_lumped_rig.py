@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.pantograph.lumped import LumpedModel, LumpedPantographPart
-from models.pantograph.lumped_characteristics import apparent_mass, contact_force_over_height, modes
-from models.pantograph.parameters import Stage
+from models.pantograph.lumped.lumped_definition import Stage
+from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
+from models.pantograph.lumped.lumped_rig import apparent_mass, contact_force_over_height, modes
 
 
 def _one(cx, mass, stiffness, damping):

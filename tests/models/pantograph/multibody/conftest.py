@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from models.pantograph.multibody.analysis.mechanism_statics import settle_springs
 from models.pantograph.multibody.mechanism import Mechanism
-from models.pantograph.multibody.statics import settle_springs
 from tests.models.pantograph.multibody.mechanisms import library
 
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from models.pantograph.multibody import definition
-from models.pantograph.multibody.definition import MechanismDefinition
+from models.pantograph.multibody import mechanism_definition
 from models.pantograph.multibody.mechanism import Mechanism
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 
-LIBRARY = Path(definition.__file__).parents[2] / "library" / "pantographs"
+LIBRARY = Path(mechanism_definition.__file__).parents[2] / "library" / "pantographs"
 
 
 def q(value: Any, unit: str) -> list[Any]:
@@ -51,7 +51,7 @@ def mechanism_data(
 
 
 def mechanism(*args: Any, **changes: Any) -> Mechanism:
-    return Mechanism(definition.from_dict(mechanism_data(*args) | changes))
+    return Mechanism(mechanism_definition.from_dict(mechanism_data(*args) | changes))
 
 
 def library_data(name: str) -> dict[str, Any]:
@@ -59,7 +59,7 @@ def library_data(name: str) -> dict[str, Any]:
 
 
 def library(name: str) -> MechanismDefinition:
-    return definition.load(LIBRARY / f"{name}.toml")
+    return mechanism_definition.load(LIBRARY / f"{name}.toml")
 
 
 def pendulum_data(euler: Any = (0.0, 0.0, 0.0)) -> dict[str, Any]:

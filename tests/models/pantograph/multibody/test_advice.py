@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from models.definition_files.parameter import ParameterError
 from models.library import load_pantograph
-from models.pantograph.multibody.characteristics import Rig
-from models.pantograph.multibody.part import MultibodyPantographPart
+from models.pantograph.multibody.analysis.mechanism_rig import Rig
+from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from models.pantograph.working_height import Raised
-from models.part import ParameterError
 
 
 def said(name, x, z, **values):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from models.pantograph.lumped_characteristics import chain_stiffness
-from models.pantograph.multibody.characteristics import Rig
+from models.pantograph.lumped.lumped_rig import chain_stiffness
+from models.pantograph.multibody.analysis.mechanism_rig import Rig
 from tests.models.pantograph.multibody.mechanisms import library
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.library import load_pantograph
-from models.pantograph.multibody.part import MultibodyPantographPart
+from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 
 
 def run(name, step, roof=0.0, stop=0.5):

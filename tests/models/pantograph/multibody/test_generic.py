@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from models.pantograph.multibody import definition
-from models.pantograph.multibody.assembly import assemble, constraint_rank, null_space
-from models.pantograph.multibody.integration import Integrator
-from models.pantograph.multibody.linearisation import (
+from models.pantograph.multibody import mechanism_definition
+from models.pantograph.multibody.analysis.linearisation import (
     apparent_mass,
     base_transmission,
     linearise,
     modes,
     receptance,
 )
+from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium, lift_over_height
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
-from models.pantograph.multibody.statics import contact_force_at, equilibrium, lift_over_height
+from models.pantograph.multibody.mechanism_assembly import assemble, constraint_rank, null_space
+from models.pantograph.multibody.mechanism_integrator import Integrator
 from tests.models.pantograph.multibody import independent
 from tests.models.pantograph.multibody.mechanisms import library, library_data
 from tests.models.pantograph.multibody.test_mechanisms import line_force, run
@@ -37,7 +37,7 @@ def test_thirty_one_independent_constraints_and_five_degrees_of_freedom():
     """As printed: raise, heave, roll and the two links' spins; the two locks take the spins."""
     data = library_data("generic_multibody")
     del data["joint"]["lock_4"], data["joint"]["lock_6"]
-    free = Mechanism(definition.from_dict(data))
+    free = Mechanism(mechanism_definition.from_dict(data))
     y = assemble(free)
     assert constraint_rank(free, y) == free.constraints.count == 31
     assert null_space(free, y).shape[1] == 6 * 7 - 6 - 31 == 5
@@ -48,7 +48,7 @@ def test_thirty_one_independent_constraints_and_five_degrees_of_freedom():
 def test_lower_links_spin_is_unstable_as_printed_and_locking_changes_nothing_else(generic):
     data = library_data("generic_multibody")
     del data["joint"]["lock_4"], data["joint"]["lock_6"]
-    free = Mechanism(definition.from_dict(data))
+    free = Mechanism(mechanism_definition.from_dict(data))
     e = equilibrium(free, contact_force=100.0)
     found = modes(free, linearise(free, e.y, e.inputs))
     growing = [m for m in found if m.eigenvalue.real > 0.1]
@@ -192,7 +192,7 @@ def undamped():
     data["force"]["wire"] = line_force(
         stiffness=(3000.0, "N/m"), free_length=(1.787, "m"), direction=([0, 0, 1], "1")
     ) | {"body_j": "pan_head"}
-    mechanism = Mechanism(definition.from_dict(data))
+    mechanism = Mechanism(mechanism_definition.from_dict(data))
     return mechanism, assemble(mechanism)
 
 

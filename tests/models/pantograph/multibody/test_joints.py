@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models.pantograph.multibody import definition
-from models.pantograph.multibody.assembly import assemble, constraint_rank, joint_gaps
-from models.pantograph.multibody.bodies import euler_parameters, rotation_matrices, turned
+from models.pantograph.multibody import mechanism_definition
+from models.pantograph.multibody.elements.rotations import euler_parameters, rotation_matrices, turned
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
+from models.pantograph.multibody.mechanism_assembly import assemble, constraint_rank, joint_gaps
 from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism, one_of_each_joint
 
 FREEDOM = {
@@ -17,7 +17,7 @@ FREEDOM = {
 
 @pytest.fixture(scope="module")
 def chain():
-    m = Mechanism(definition.from_dict(one_of_each_joint()))
+    m = Mechanism(mechanism_definition.from_dict(one_of_each_joint()))
     y = m.written_state()
     random = np.random.default_rng(4)
     s = m.split(y)
@@ -92,7 +92,7 @@ def test_each_joint_leaves_its_degrees_of_freedom(kind):
 def test_chain_of_all_joints_assembles_and_stays_together():
     data = one_of_each_joint()
     data["assembly"] = {"largest_gap": [2.0, "m", "test"]}
-    m = Mechanism(definition.from_dict(data))
+    m = Mechanism(mechanism_definition.from_dict(data))
     y = assemble(m)
     assert max(max(gap) for gap in joint_gaps(m, y).values()) < 1e-11
     acceleration = m.evaluate(y, Inputs()).constraints

@@ -1,0 +1,219 @@
+"""Packing source packages under a private name.
+
+FMUs in one process share ``sys.modules``: a module named ``models`` would be taken from whichever FMU
+came first. So each FMU carries what it needs, and no more, inside one package whose name holds the FMU's
+content hash.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+#: What a machine that runs an FMU must have besides Python itself.
+REQUIREMENTS = ("numpy", "scipy")
+#: What makes an FMU faster where it is installed.
+OPTIONAL = ("numba",)
+_DYNAMIC_IMPORTS = {"import_module", "__import__"}
+
+
+class BundleError(ValueError):
+    """Sources that cannot be packed; says which file and why."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """A source file.
+
+    Attributes
+    ----------
+    name : str
+        Dotted, as imported (``models.definition_files.si_units``).
+    path : Path
+    source : str
+    """
+
+    name: str
+    path: Path
+    source: str
+
+    @property
+    def is_package(self) -> bool:
+        """Whether other modules lie in it."""
+        return self.path.name == "__init__.py"
+
+    @property
+    def is_optional(self) -> bool:
+        """Whether it needs what a machine may lack; then it is carried along, but not imported by its name."""
+        return any(_root(name) in OPTIONAL for node in _imports(self) for name in _imported_names(node))
+
+    def inner_path(self) -> str:
+        """Return where the file belongs below the private package, with forward slashes."""
+        stem = self.name.replace(".", "/")
+        return f"{stem}/__init__.py" if self.is_package else f"{stem}.py"
+
+
+def collect(start: str, roots: Mapping[str, Path], emptied: frozenset[str] = frozenset()) -> dict[str, Module]:
+    """Return a module and all that it imports, directly or not, from the given packages.
+
+    Parameters
+    ----------
+    start : str
+        Dotted name of the module to begin with.
+    roots : mapping
+        Package name -> its folder.
+    emptied : frozenset of str
+        Packages whose ``__init__`` is to be left empty.
+
+    Raises
+    ------
+    BundleError
+        If a module is missing, or imports what a machine with only ``REQUIREMENTS`` does not have.
+    """
+    found: dict[str, Module] = {}
+    waiting = [start]
+    while waiting:
+        name = waiting.pop()
+        for part in _with_parents(name):
+            if part not in found:
+                found[part] = _load(part, roots, emptied)
+                waiting += _own_imports(found[part], roots)
+    return dict(sorted(found.items()))
+
+
+def rewrite(module: Module, package: str, roots: Mapping[str, Path]) -> str:
+    """Return the module's source with every import from ``roots`` moved below ``package``.
+
+    Raises
+    ------
+    BundleError
+        If an import cannot be moved.
+
+    Examples
+    --------
+    >>> rewrite(Module("m", Path("m.py"), "from models.numerics import newmark"), "private", {"models": Path()})
+    'from private.models.numerics import newmark'
+    """
+    lines = module.source.encode().splitlines(keepends=True)
+    for node in sorted(_imports(module), key=lambda n: (n.lineno, n.col_offset), reverse=True):
+        if any(_root(name) in roots for name in _imported_names(node)):
+            _replace(lines, node, package, roots)
+    text = b"".join(lines).decode()
+    check_rewritten(text, str(module.path), roots)
+    return text
+
+
+def check_rewritten(source: str, where: str, roots: Mapping[str, Path]) -> None:
+    """Raise ``BundleError`` if a source still imports from ``roots`` under their public names."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            left = [name for name in _imported_names(node) if _root(name) in roots]
+            if left:
+                raise BundleError(f"{where}: import of {left[0]} could not be moved into the FMU")
+        elif isinstance(node, ast.Call) and _called(node) in _DYNAMIC_IMPORTS:
+            raise BundleError(f"{where}, line {node.lineno}: {_called(node)} cannot be moved into an FMU")
+
+
+def _with_parents(name: str) -> list[str]:
+    parts = name.split(".")
+    return [".".join(parts[: i + 1]) for i in range(len(parts))]
+
+
+def _load(name: str, roots: Mapping[str, Path], emptied: frozenset[str]) -> Module:
+    path = _find(name, roots)
+    if path is None:
+        raise BundleError(f"module {name} is imported, but there is no such file")
+    if name in emptied:
+        return Module(name, path, '"""Only the modules that an FMU needs."""\n')
+    return Module(name, path, path.read_text(encoding="utf-8"))
+
+
+def _find(name: str, roots: Mapping[str, Path]) -> Path | None:
+    base = roots[_root(name)].joinpath(*name.split(".")[1:])
+    for candidate in (base / "__init__.py", base.with_suffix(".py")):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+def _own_imports(module: Module, roots: Mapping[str, Path]) -> list[str]:
+    own: list[str] = []
+    for node in _imports(module):
+        for name in _absolute_names(node, module):
+            if _root(name) in roots:
+                own += _modules_of(node, name, roots)
+            elif _root(name) not in (*REQUIREMENTS, *OPTIONAL, *sys.stdlib_module_names):
+                raise BundleError(
+                    f"{module.path}, line {node.lineno}: imports {name}, but an FMU may only need "
+                    f"{' and '.join(REQUIREMENTS)}"
+                )
+    return own
+
+
+def _modules_of(node: ast.Import | ast.ImportFrom, name: str, roots: Mapping[str, Path]) -> Iterator[str]:
+    """Yield the modules behind an import: ``from package import x`` may mean a module x."""
+    yield name
+    if isinstance(node, ast.ImportFrom):
+        for alias in node.names:
+            inner = f"{name}.{alias.name}"
+            if _find(inner, roots) is not None:
+                yield inner
+
+
+def _imports(module: Module) -> Iterator[ast.Import | ast.ImportFrom]:
+    for node in ast.walk(ast.parse(module.source, str(module.path))):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node
+
+
+def _imported_names(node: ast.Import | ast.ImportFrom) -> list[str]:
+    """Return the dotted names of absolute imports; none for relative ones, which move along by themselves."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return [node.module] if node.level == 0 and node.module else []
+
+
+def _absolute_names(node: ast.Import | ast.ImportFrom, module: Module) -> list[str]:
+    if isinstance(node, ast.Import) or node.level == 0:
+        return _imported_names(node)
+    parts = module.name.split(".") if module.is_package else module.name.split(".")[:-1]
+    parts = parts[: len(parts) - (node.level - 1)]
+    return [".".join([*parts, node.module] if node.module else parts)]
+
+
+def _replace(lines: list[bytes], node: ast.Import | ast.ImportFrom, package: str, roots: Mapping[str, Path]) -> None:
+    first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
+    start, end = node.col_offset, node.end_col_offset
+    if isinstance(node, ast.ImportFrom):
+        # Only its head changes, so that line numbers stay those of the source.
+        head = lines[first][start:]
+        moved = re.sub(rb"^from\s+", f"from {package}.".encode(), head, count=1)
+        lines[first] = lines[first][:start] + moved
+        return
+    moved = "; ".join(_moved_import(alias, package, roots) for alias in node.names).encode()
+    tail = lines[last][end:]
+    lines[first : last + 1] = [lines[first][:start] + moved + tail]
+
+
+def _moved_import(alias: ast.alias, package: str, roots: Mapping[str, Path]) -> str:
+    named = f" as {alias.asname}" if alias.asname else ""
+    if _root(alias.name) not in roots:
+        return f"import {alias.name}{named}"
+    if alias.asname:
+        return f"import {package}.{alias.name}{named}"
+    # ``import models.x`` binds ``models``.
+    return f"import {package}.{alias.name}; from {package} import {_root(alias.name)}"
+
+
+def _root(name: str) -> str:
+    return name.partition(".")[0]
+
+
+def _called(node: ast.Call) -> str:
+    function = node.func
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")

@@ -1,0 +1,73 @@
+"""Ports of a pantograph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from operator import attrgetter, methodcaller
+from pathlib import Path
+from typing import Any, ClassVar
+
+from fmus.slave.adapter import Adapter
+from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
+from models.definition_files.parameter import FloatArray
+from models.pantograph.lumped.lumped_advice import working_height_warning
+from models.pantograph.lumped.lumped_definition import LumpedDefinition, load_lumped
+from models.pantograph.lumped.lumped_model import LumpedPantographPart
+
+
+class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
+    """Pantograph of lumped masses: contact force and point in, collector strip out."""
+
+    models: ClassVar[str] = (
+        "A pantograph as a chain of masses above each other, joined by springs and dampers, the lowest to the "
+        "vehicle's roof, the highest carrying the collector strip; it moves along the track at constant speed. A "
+        "static force lifts the lowest mass, raised smoothly from raise_start over raise_duration. It starts at rest "
+        "at reference_height, where the springs carry the weights. The contact force acts on the highest mass; "
+        "between communication points it is continued from its last values, so hosts that hold inputs lose no accuracy."
+    )
+    limits: ClassVar[tuple[str, ...]] = (
+        "Vertical motion only: the strip does not roll, and the lateral point of application has no effect.",
+        "Linear springs and dampers, identified at one working height; no friction, no stops.",
+        "No aerodynamic uplift of its own: add it to static_force.",
+        "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
+    )
+
+    def _read_definition(self, path: Path) -> LumpedDefinition:
+        return load_lumped(path)
+
+    def _make_part(self, definition: LumpedDefinition) -> LumpedPantographPart:
+        return LumpedPantographPart(definition)
+
+    def _make_ports(self, part: LumpedPantographPart) -> Ports:
+        return pantograph_ports(part)
+
+    def _doubts(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
+        yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
+
+    def _initialise(self, part: LumpedPantographPart, time: float, inputs: FloatArray) -> None:
+        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6])
+
+    def _advance(self, part: LumpedPantographPart, inputs: FloatArray, step: float) -> None:
+        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step)
+
+
+def pantograph_ports(part: Any) -> Ports:
+    """Return the ports that every pantograph has, and those of its own observations."""
+    return Ports(
+        inputs=(
+            Signal("contact.force", "N", "contact force; positive pushes the strip down", 0.0),
+            *vector("contact.", "m", "point of application of the contact force", (0.0, 0.0, 0.0)),
+            Signal("base.z", "m", "displacement of the vehicle's roof, up", 0.0),
+            Signal("base.vz", "m/s", "velocity of the vehicle's roof, up", 0.0),
+        ),
+        outputs=(
+            Port(tuple(s for end in "AB" for s in _end(end)), attrgetter("strip")),
+            Port(tuple(Signal(*observed) for observed in part.observed), methodcaller("observation_values")),
+        ),
+        local=energy_ports(["contact"]),
+    )
+
+
+def _end(end: str) -> tuple[Signal, ...]:
+    text = f"of end {end} of the collector strip"
+    return vector(f"{end}.", "m", f"position {text}") + vector(f"{end}.v", "m/s", f"velocity {text}")

@@ -1,0 +1,48 @@
+"""Ports of a multibody pantograph: those of every pantograph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import ClassVar
+
+from fmus.slave.adapter import Adapter
+from fmus.slave.lumped_slave import pantograph_ports
+from fmus.slave.ports import Ports
+from models.definition_files.parameter import FloatArray
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition, load
+from models.pantograph.multibody.multibody_part import MultibodyPantographPart
+
+
+class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographPart]):
+    """Pantograph of rigid bodies and joints: contact force and point in, collector strip out."""
+
+    models: ClassVar[str] = (
+        "A pantograph as rigid bodies with joints, springs, dampers and an actuator, on a roof that moves along the "
+        "track at constant speed. It starts at rest with the strip at reference_height, the actuator just carrying "
+        "the weights; from raise_start the actuator grows to its value over raise_duration. The contact force acts "
+        "on the head where the line says, so that a staggered wire makes the head roll, and the strip's ends follow."
+    )
+    limits: ClassVar[tuple[str, ...]] = (
+        "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops).",
+        "No aerodynamic forces.",
+        "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
+    )
+
+    def _read_definition(self, path: Path) -> MechanismDefinition:
+        return load(path)
+
+    def _make_part(self, definition: MechanismDefinition) -> MultibodyPantographPart:
+        return MultibodyPantographPart(definition)
+
+    def _make_ports(self, part: MultibodyPantographPart) -> Ports:
+        return pantograph_ports(part)
+
+    def _doubts(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
+        yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
+
+    def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:
+        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6])
+
+    def _advance(self, part: MultibodyPantographPart, inputs: FloatArray, step: float) -> None:
+        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step)

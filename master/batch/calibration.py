@@ -1,0 +1,222 @@
+"""Finding the parameter (usually the static force) that gives the wanted mean contact force."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from master.errors import MasterError
+from master.recording.safe_files import write_whole
+from master.results import folder_lock
+
+MAX_RUNS: Final = 12
+#: Files of a scenario in which values stand.
+_TEXTS: Final = (".ssd", ".ssv", ".ssm", ".csv", ".toml")
+#: First change tried, as a share of the start value, and how much a step may exceed the bracket's secant.
+_FIRST_CHANGE: Final = 0.03
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run of a calibration: parameter value and what came out."""
+
+    value: float
+    result: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """Result of a calibration: the chosen value, what it gives, and all trials in order."""
+
+    value: float
+    result: float
+    trials: tuple[Trial, ...]
+
+
+def find_value(
+    function: Callable[[float], float],
+    target: float,
+    start: float,
+    tolerance: float,
+    guess: float | None = None,
+) -> Found:
+    """Find the value at which ``function`` gives ``target``.
+
+    Secant steps, held inside a bracket once there is one.
+
+    Parameters
+    ----------
+    function : callable
+        Value -> result; each call is a whole run.
+    target, tolerance : float
+        Wanted result and how near is near enough.
+    start : float
+        First value tried.
+    guess : float, optional
+        Second value; by default ``start`` plus the first miss (right where both are the same quantity).
+
+    Raises
+    ------
+    MasterError
+        If it is not found within `MAX_RUNS` runs, or the result does not depend on the value.
+    """
+    trials = [Trial(start, function(start))]
+    while abs(trials[-1].result - target) > tolerance:
+        if len(trials) >= MAX_RUNS:
+            raise MasterError(
+                f"no value found after {MAX_RUNS} runs; the last was {trials[-1].value:g}, "
+                f"giving {trials[-1].result:g}; widen the tolerance or start nearer"
+            )
+        value = _first_step(trials[0], target, guess) if len(trials) == 1 else _next(trials, target)
+        trials.append(Trial(value, function(value)))
+    return Found(trials[-1].value, trials[-1].result, tuple(trials))
+
+
+def find_values(
+    function: Callable[[tuple[float, ...]], tuple[float, ...]],
+    target: float,
+    starts: Sequence[float],
+    tolerance: float,
+) -> tuple[Found, ...]:
+    """Find the values at which every result of ``function`` is ``target``, all of them in the same runs.
+
+    Each result must depend mainly on the value in the same place: every value takes its own secant steps.
+
+    Parameters
+    ----------
+    function : callable
+        Values -> as many results; each call is a whole run.
+    target, tolerance : float
+        Wanted result and how near is near enough.
+    starts : sequence of float
+        First values tried.
+
+    Raises
+    ------
+    MasterError
+        If they are not found within `MAX_RUNS` runs, or a result does not depend on its value.
+    """
+    values = tuple(starts)
+    trials: list[list[Trial]] = [[] for _ in values]
+    for _ in range(MAX_RUNS):
+        for own, value, result in zip(trials, values, function(values), strict=True):
+            own.append(Trial(value, result))
+        if all(abs(own[-1].result - target) <= tolerance for own in trials):
+            return tuple(Found(own[-1].value, own[-1].result, tuple(own)) for own in trials)
+        values = tuple(_next_of_several(own, target, tolerance) for own in trials)
+    last = ", ".join(f"{own[-1].value:g} giving {own[-1].result:g}" for own in trials)
+    raise MasterError(f"no values found after {MAX_RUNS} runs; the last were {last}; widen the tolerance")
+
+
+def _next_of_several(trials: list[Trial], target: float, tolerance: float) -> float:
+    """Return the next value; a good one stays, and runs in which only the others changed tell nothing."""
+    last = trials[-1]
+    if abs(last.result - target) <= 0.5 * tolerance:
+        return last.value
+    others = [t for t in trials if t.value != last.value]
+    return _next([*others, last], target) if others else _first_step(last, target, None)
+
+
+def _first_step(first: Trial, target: float, guess: float | None) -> float:
+    if guess is not None:
+        return guess
+    miss = target - first.result
+    bound = max(_FIRST_CHANGE * abs(first.value), 1e-6)
+    return first.value + math.copysign(min(abs(miss), 10.0 * bound), miss)
+
+
+def _next(trials: list[Trial], target: float) -> float:
+    """Return the secant's value; the middle of the bracket if the secant leaves it or has hardly helped."""
+    a, b = trials[-2], trials[-1]
+    bracket = _bracket(trials, target)
+    has_helped = abs(b.result - target) <= 0.5 * abs(a.result - target)
+    if bracket is not None and not (has_helped and bracket[0] < _secant(a, b, target) < bracket[1]):
+        return 0.5 * (bracket[0] + bracket[1])
+    value = _secant(a, b, target)
+    span = 4.0 * abs(b.value - a.value)
+    return min(max(value, b.value - span), b.value + span)
+
+
+def _secant(a: Trial, b: Trial, target: float) -> float:
+    if a.result == b.result:
+        raise MasterError(
+            f"the result {b.result:g} does not depend on the parameter (tried {a.value:g} and {b.value:g})"
+        )
+    return b.value + (target - b.result) * (b.value - a.value) / (b.result - a.result)
+
+
+def _bracket(trials: list[Trial], target: float) -> tuple[float, float] | None:
+    below = [t for t in trials if t.result < target]
+    above = [t for t in trials if t.result > target]
+    if not below or not above:
+        return None
+    lower = min(below, key=lambda t: target - t.result)
+    upper = min(above, key=lambda t: t.result - target)
+    return min(lower.value, upper.value), max(lower.value, upper.value)
+
+
+@contextmanager
+def unchanged(folder: Path) -> Iterator[Callable[[], None]]:
+    """Work on a scenario in which a value is to be stored at the end; gives what checks that nobody else did so.
+
+    To be entered before the scenario is read.
+
+    Parameters
+    ----------
+    folder : Path
+        The scenario's folder, in which one calibration at a time may work.
+
+    Raises
+    ------
+    FolderInUseError
+        If another calibration is at work there.
+    MasterError
+        By the check, naming a file that was changed meanwhile.
+    """
+    with folder_lock.claimed(folder, "wait for it to end, or try with --dry-run"):
+        before = _texts(folder)
+
+        def check() -> None:
+            now = _texts(folder)
+            for path in sorted({*before, *now}):
+                if before.get(path) != now.get(path):
+                    raise MasterError(f"{path} was changed during the calibration: nothing is stored, run it again")
+
+        yield check
+
+
+def _texts(folder: Path) -> dict[Path, bytes]:
+    """Return the files that say what is computed; FMUs may be built meanwhile."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.suffix in _TEXTS and path.is_file()}
+
+
+def store_value(path: Path, parameter: str, value: float, note: str) -> None:
+    """Write a Real parameter's value into an ``.ssv`` file, leaving the rest of its text as it is.
+
+    A comment in front of the parameter says how the value was found; one from an earlier calibration is
+    replaced.
+
+    Raises
+    ------
+    MasterError
+        If the parameter does not occur exactly once.
+    """
+    text = path.read_text(encoding="utf-8")
+    pattern = re.compile(
+        r"(?P<indent>[ \t]*)(?:<!-- calibrated:[^>]*-->\s*)?"
+        rf"(?P<head><ssv:Parameter\s+name=\"{re.escape(parameter)}\"[^>]*>\s*<ssv:Real\s[^>]*?value=\")[^\"]*(?P<tail>\")"
+    )
+    found = list(pattern.finditer(text))
+    if len(found) != 1:
+        raise MasterError(
+            f"{path}: parameter '{parameter}' stands there {len(found)} times as ssv:Real; once is needed"
+        )
+    m = found[0]
+    comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
+    new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"
+    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode(), "a copy of the scenario elsewhere")

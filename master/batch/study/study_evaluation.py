@@ -1,0 +1,123 @@
+"""What a study reports of one pantograph in one interval beyond the figures of every run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from master.arrays import BoolArray, FloatArray
+from master.batch.study.family import Interval
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_quality import Quality
+from master.evaluation.filters import interval_mask
+from master.recording.recorder import Recording
+from master.results.run_results import Results
+from master.system.contacts import Contact, leading_first, track_position
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """A strip between two wires, while both can be touched.
+
+    Attributes
+    ----------
+    start, end : float
+        Track positions of the strip at the first and last contact with both wires [m].
+    duration : float
+        Between these [s].
+    touching : float
+        Time in which both wires are touched [s].
+    losses : tuple of int
+        How often contact with each wire is lost, from ``start`` on, section by section.
+    least_force : float
+        Least total force, as computed [N].
+    """
+
+    start: float
+    end: float
+    duration: float
+    touching: float
+    losses: tuple[int, ...]
+    least_force: float
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One pantograph of one variant in one interval.
+
+    Attributes
+    ----------
+    variant : str
+    interval : Interval
+    assessment : Assessment
+        Figures and verdict in it.
+    sharing : Sharing or None
+        If it touches two wires within the interval.
+    """
+
+    variant: str
+    interval: Interval
+    assessment: Assessment
+    sharing: Sharing | None
+
+    @property
+    def pantograph(self) -> str:
+        """The pantograph's name."""
+        return self.assessment.contact.pantograph
+
+    @property
+    def quality(self) -> Quality:
+        """The figures of the contact force."""
+        return self.assessment.quality
+
+    @property
+    def uplift(self) -> float | None:
+        """Largest uplift of the interval's supports [m]."""
+        return None if self.assessment.uplift is None else self.assessment.uplift.maximum
+
+    @property
+    def slack(self) -> float | None:
+        """Share of the interval's droppers that go slack as this pantograph passes."""
+        return self.assessment.slack
+
+
+def entries(variant: str, done: Results, interval: Interval) -> tuple[Entry, ...]:
+    """Return the entries of a run's pantographs in an interval, the leading one first."""
+    found = {a.contact: a for a in done.assessments_in((interval.start, interval.end))}
+    ordered = leading_first(done.recordings[0], list(found))
+    return tuple(Entry(variant, interval, found[c], sharing(done.recordings[0], c, interval)) for c in ordered)
+
+
+def section_forces(recording: Recording, contact: Contact) -> FloatArray | None:
+    """Return the force per wire, shape (n, n_sections) [N]; None if the line has one section."""
+    prefix = contact.prefix.removesuffix(".contact")
+    names = recording.matching(f"{prefix}.section[*].force")
+    return np.column_stack([recording[n] for n in names]) if len(names) > 1 else None
+
+
+def sharing(recording: Recording, contact: Contact, interval: Interval) -> Sharing | None:
+    """Return how a strip passes from wire to wire within an interval; None if it never touches two at once."""
+    forces = section_forces(recording, contact)
+    position = track_position(recording, contact)
+    if forces is None:
+        return None
+    touched = forces > 0.0
+    both = np.flatnonzero((touched.sum(axis=1) > 1) & interval_mask(position, interval.start, interval.end))
+    if not both.size:
+        return None
+    first, last = int(both[0]), int(both[-1])
+    step = float(np.median(np.diff(recording.time)))
+    after = touched[first : last + 2]
+    return Sharing(
+        start=float(position[first]),
+        end=float(position[last]),
+        duration=float(recording.time[last] - recording.time[first]),
+        touching=both.size * step,
+        losses=tuple(_losses(after[:, s]) for s in range(after.shape[1])),
+        least_force=float(forces[first : last + 1].sum(axis=1).min()),
+    )
+
+
+def _losses(touched: BoolArray) -> int:
+    return int(np.count_nonzero(touched[:-1] & ~touched[1:]))

@@ -1,0 +1,228 @@
+"""What a study has found so far, and as rows for tables and files."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
+from typing import Any, Final
+
+from master.batch.study.family import Family, Interval, Variant
+from master.batch.study.study_evaluation import Entry, entries
+from master.recording.safe_files import safe_cell
+from master.results.run_results import Results
+
+GENERATOR: Final = "openpanto study"
+#: Version of ``study.json`` and ``study.csv``; 1 says none.
+FORMAT: Final = 2
+#: Columns of the figures: title, unit, how to get it, decimals.
+FIGURES: Final[tuple[tuple[str, str, Callable[[Entry], float | None], int], ...]] = (
+    ("mean", "N", lambda e: e.assessment.quality.mean, 1),
+    ("sigma", "N", lambda e: e.assessment.quality.sigma, 1),
+    ("sigma / mean", "1", lambda e: e.assessment.quality.sigma_share, 3),
+    ("maximum", "N", lambda e: e.assessment.quality.maximum, 1),
+    ("minimum", "N", lambda e: e.assessment.quality.minimum, 1),
+    ("amplitude", "N", lambda e: e.assessment.quality.amplitude, 1),
+    ("statistical minimum", "N", lambda e: e.assessment.quality.statistical_minimum, 1),
+    ("share of loss", "%", lambda e: e.assessment.quality.losses.percentage, 2),
+    ("uplift", "mm", lambda e: None if e.uplift is None else 1e3 * e.uplift, 1),
+    ("slack droppers", "%", lambda e: None if e.slack is None else 1e2 * e.slack, 0),
+)
+
+
+@dataclass(frozen=True)
+class Done:
+    """A variant that was run.
+
+    Attributes
+    ----------
+    name : str
+    results : Results
+    """
+
+    name: str
+    results: Results
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A study so far.
+
+    Attributes
+    ----------
+    family : Family
+    date : str
+    versions : dict
+    status : str
+        running, interrupted or complete.
+    done : tuple of Done
+        In the order of the table.
+    failures : dict
+        Why variants failed, by name.
+    """
+
+    family: Family
+    date: str
+    versions: Mapping[str, str]
+    status: str = "running"
+    done: tuple[Done, ...] = ()
+    failures: Mapping[str, str] = field(default_factory=dict)
+
+    def entries(self, interval: Interval) -> tuple[Entry, ...]:
+        """Return the figures of all pantographs of all variants in an interval."""
+        return tuple(e for d in self.done for e in entries(d.name, d.results, interval))
+
+
+def shown(value: float | None, decimals: int) -> str:
+    """Return a figure as text."""
+    return "-" if value is None else f"{value:.{decimals}f}"
+
+
+def verdict(entry: Entry) -> str:
+    """Return the verdict on the limits in a few words."""
+    if entry.assessment.withheld:
+        return "not judged"
+    criteria = entry.assessment.criteria
+    failed = [c.name for c in criteria if not c.passed]
+    if failed:
+        return f"fails: {', '.join(failed)}"
+    at_limit = entry.assessment.at_limit
+    return f"passes, at the limit: {', '.join(at_limit)}" if at_limit else "passes"
+
+
+def filters(outcome: Outcome) -> tuple[str, ...]:
+    """Return with what the forces of the variants were low-passed: one filter, several if runs had other settings."""
+    return tuple(dict.fromkeys(d.results.evaluation.filter.sentence for d in outcome.done))
+
+
+def judged_by(found: Sequence[Done]) -> str:
+    """Return by which limits the variants are judged."""
+    return "; ".join(dict.fromkeys(d.results.evaluation.limits.title for d in found)) or "EN 50367"
+
+
+def filter_remarks(found: Sequence[Entry]) -> list[str]:
+    """Return whose extremes depend on the filter, with what they would be, and which verdicts do."""
+    remarks = []
+    for e in found:
+        who = f"{e.variant}, {e.pantograph}"
+        told = "; ".join(f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.told)
+        remarks += [f"{who}: {told}"] if told else []
+        remarks += [f"{who}: {c.name}: {c.remark}" for c in e.assessment.criteria if c.remark and not c.is_at_limit]
+        remarks += [f"{who}: {warning}" for warning in e.assessment.warnings]
+    return remarks
+
+
+def differences(found: Sequence[Entry]) -> list[tuple[str, str, str, tuple[float, float, float]]]:
+    """Return what stands beside what: sigma, maximum and minimum of one less those of the other [N].
+
+    Every follower is compared with the pantograph ahead, and everyone of several with a variant of a single pantograph
+    of the same name ending (``single, low damping`` for ``31 m, low damping``), if there is just one. Variants of one
+    pantograph each differ in what was swept: what another one of them has less or more means nothing here.
+    """
+    alone = [e for e in found if _is_single(e, found)]
+    kinds = [_kind(e.variant) for e in alone]
+    singles = {_kind(e.variant): e for e in alone if kinds.count(_kind(e.variant)) == 1}
+    rows = []
+    for variant in dict.fromkeys(e.variant for e in found):
+        own = [e for e in found if e.variant == variant]
+        rows += [_beside(b, a, a.pantograph) for a, b in pairwise(own)]
+        single = singles.get(_kind(variant)) if len(own) > 1 else None
+        rows += [_beside(e, single, single.variant) for e in own if single is not None]
+    return rows
+
+
+def _is_single(entry: Entry, found: Sequence[Entry]) -> bool:
+    return sum(e.variant == entry.variant for e in found) == 1
+
+
+def _kind(variant: str) -> str:
+    return variant.partition(",")[2].strip()
+
+
+def _beside(one: Entry, other: Entry, name: str) -> tuple[str, str, str, tuple[float, float, float]]:
+    a, b = one.assessment.quality, other.assessment.quality
+    change = (a.sigma - b.sigma, a.maximum - b.maximum, a.minimum - b.minimum)
+    return one.variant, one.pantograph, name, change
+
+
+def as_csv(outcome: Outcome) -> str:
+    """Return every figure of the study as a table."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    heads = [f"{title} [{unit}]" for title, unit, _, _ in FIGURES]
+    sharing = ["both wires from [m]", "both wires to [m]", "both wires [s]", "least total force [N]", "losses per wire"]
+    swept = _swept(outcome.family.variants)
+    writer.writerow(["variant", "interval", "pantograph", *heads, "EN 50367", "filter", *sharing, *swept])
+    filtered = {d.name: d.results.evaluation.filter.short for d in outcome.done}
+    for interval in outcome.family.settings.interval:
+        for e in outcome.entries(interval):
+            values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
+            named = map(safe_cell, (e.variant, interval.name, e.pantograph))
+            told = _values_of(outcome.family, e.variant)
+            own = [told.get(name, "") for name in swept]
+            cells = [*values, verdict(e), filtered[e.variant], *_sharing_cells(e), *own]
+            writer.writerow([*named, *cells])
+    return text.getvalue()
+
+
+def _swept(variants: Sequence[Variant]) -> list[str]:
+    """Return the columns of the table of variants that hold a value somewhere, in their order."""
+    return list(dict.fromkeys(name for v in variants for name in _told(v)))
+
+
+def _values_of(family: Family, name: str) -> dict[str, str]:
+    """Return what a variant was given, as its table has it."""
+    return next((_told(v) for v in family.variants if v.name == name), {})
+
+
+def _told(variant: Variant) -> dict[str, str]:
+    times = {"stop": variant.stop, "step": variant.step}
+    return {**variant.values, **{name: f"{value:g}" for name, value in times.items() if value is not None}}
+
+
+def _sharing_cells(e: Entry) -> list[str]:
+    s = e.sharing
+    if s is None:
+        return [""] * 5
+    numbers = (s.start, s.end, s.duration, s.least_force)
+    return [*(f"{v:.6g}" for v in numbers), " ".join(map(str, s.losses))]
+
+
+def as_data(outcome: Outcome) -> dict[str, Any]:
+    """Return the contents of ``study.json``."""
+    return {
+        "generator": GENERATOR,
+        "format": FORMAT,
+        "filter": list(filters(outcome)),
+        "judged_by": judged_by(outcome.done),
+        "study": outcome.family.name,
+        "title": outcome.family.settings.title,
+        "status": outcome.status,
+        "date": outcome.date,
+        "versions": dict(outcome.versions),
+        "variants": [
+            {"name": d.name, "folder": d.results.folder.name, "values": _values_of(outcome.family, d.name)}
+            for d in outcome.done
+        ],
+        "failures": dict(outcome.failures),
+        "figures": [_entry_data(e) for i in outcome.family.settings.interval for e in outcome.entries(i)],
+    }
+
+
+def _entry_data(e: Entry) -> dict[str, Any]:
+    figures = {f"{title} [{unit}]": get(e) for title, unit, get, _ in FIGURES}
+    return {
+        "variant": e.variant,
+        "interval": e.interval.name,
+        "pantograph": e.pantograph,
+        **figures,
+        "other_filters": [asdict(f) for f in e.quality.others],
+        "drift": e.assessment.drift,
+        "early": e.assessment.early,
+        "unchecked": e.assessment.unchecked,
+        "withheld": e.assessment.withheld,
+        "criteria": [asdict(c) for c in e.assessment.criteria],
+        "sharing": asdict(e.sharing) if e.sharing is not None else None,
+    }

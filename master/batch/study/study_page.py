@@ -1,0 +1,93 @@
+"""A study as a page: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from master.batch.study import study_charts
+from master.batch.study.study_evaluation import Entry
+from master.batch.study.study_outcome import (
+    FIGURES,
+    Outcome,
+    differences,
+    filter_remarks,
+    filters,
+    judged_by,
+    shown,
+    verdict,
+)
+from master.report import html_markup
+from master.report.charts.run_charts import Chart
+from master.report.run_page import INTERVAL_NOTE
+
+_STATUS = {
+    "running": "Not finished: still running, or killed. What follows is what was computed.",
+    "interrupted": "Interrupted. What follows is what was computed.",
+}
+
+
+def page(outcome: Outcome) -> str:
+    """Return the whole page."""
+    settings = outcome.family.settings
+    drawn: list[Chart] = []
+    body = [
+        f"<h1>{html_markup.text(outcome.family.name)}</h1>",
+        f"<p>{html_markup.text(settings.title)}</p>",
+        f"<p class='note'>{html_markup.text(settings.source)}; {html_markup.text(outcome.date)}</p>",
+    ]
+    if outcome.status in _STATUS:
+        body.append(f"<p class='warning'>{_STATUS[outcome.status]}</p>")
+    body += [f"<p class='warning'>{html_markup.text(f'{n}: {why}')}</p>" for n, why in outcome.failures.items()]
+    for interval in settings.interval:
+        found = outcome.entries(interval)
+        title = f"{interval.name}, {interval.start:g} m to {interval.end:g} m"
+        body.append(f"<h2>{html_markup.text(title)}</h2>")
+        if found:
+            body += _tables(found, judged_by(outcome.done))
+            body += _place(study_charts.interval_charts(outcome, interval, found), drawn)
+    body += _sharing(outcome)
+    body += _place(study_charts.sharing_charts(outcome), drawn)
+    if histories := study_charts.history_charts(outcome):
+        body += ["<h2>Histories</h2>", *_place(histories, drawn)]
+    body += [f"<p class='note'>Contact forces: {html_markup.text(f)}.</p>" for f in filters(outcome)]
+    return html_markup.document(outcome.family.name, body, drawn)
+
+
+def _place(made: Sequence[Chart], drawn: list[Chart]) -> list[str]:
+    drawn += made
+    return [html_markup.chart(c) for c in made]
+
+
+def _tables(found: Sequence[Entry], title: str) -> list[str]:
+    heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), title]
+    rows = [
+        [f"{e.variant}, {e.pantograph}", *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found
+    ]
+    note = INTERVAL_NOTE
+    parts = [html_markup.table(heads, rows), f"<p class='note'>{note}</p>"]
+    parts += [f"<p class='note'>{html_markup.text(r)}</p>" for r in filter_remarks(found)]
+    if beside := differences(found):
+        lines = [[f"{v}, {p}", other, *(f"{d:+.1f}" for d in change)] for v, p, other, change in beside]
+        heads = ["variant, pantograph", "less", "sigma [N]", "maximum [N]", "minimum [N]"]
+        parts += ["<h3>Leading and trailing, one and two</h3>", html_markup.table(heads, lines)]
+    return parts
+
+
+def _sharing(outcome: Outcome) -> list[str]:
+    found = [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing is not None]
+    if not found:
+        return []
+    heads = ["variant, pantograph", "both wires from [m]", "to [m]", "[s]", "losses per wire", "least total force [N]"]
+    rows = [
+        [
+            f"{e.variant}, {e.pantograph}",
+            f"{s.start:.1f}",
+            f"{s.end:.1f}",
+            f"{s.duration:.3f}",
+            ", ".join(map(str, s.losses)),
+            f"{s.least_force:.1f}",
+        ]
+        for e in found
+        if (s := e.sharing) is not None
+    ]
+    return ["<h2>From wire to wire</h2>", html_markup.table(heads, rows)]

@@ -1,0 +1,121 @@
+"""The runs that cases need: each made once within a verification, told apart by content, never kept beyond it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from master.batch.verification.case import Case
+from master.coupling.macro_steps import Observer
+from master.errors import InterruptedRunError, MasterError
+from master.results.run_results import Results
+from master.run import run
+from master.scenario.open_scenario import Overrides, open_scenario
+from master.system.components import System
+
+#: Folder of the runs within the verification's folder.
+RUNS: Final = "runs"
+
+#: Makes the observers of one run, and takes them away after it.
+Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
+
+
+def content_key(system: System) -> str:
+    """Return a hash of all that a run's outcome depends on: FMUs, values, connections, times, settings."""
+    content = (
+        [(c.name, c.fmu.sha256, sorted(c.parameters.items()), c.inputs, c.outputs) for c in system.components],
+        [asdict(c) for c in system.connections],
+        (system.start, system.stop, system.step),
+        system.settings.model_dump_json(),
+    )
+    return hashlib.sha256(repr(content).encode()).hexdigest()
+
+
+def first_instant(system: System) -> System:
+    """Return the system with a run of a single step: enough for static figures."""
+    return replace(system, stop=system.start + system.step, may_stop_early=True)
+
+
+class _Wanted(NamedTuple):
+    """A run as a case asks for it: scenario, whether its first instant is enough, parameters and their values."""
+
+    path: Path
+    start_only: bool
+    values: tuple[tuple[str, float], ...]
+
+
+@dataclass
+class Runs:
+    """Makes runs and keeps them as long as the verification lasts.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the runs' folders are put.
+    watching : callable
+        System -> context manager that gives its observers (progress).
+    tell : callable
+        Is told what takes time.
+    build : bool
+        Whether missing or stale FMUs are built.
+    """
+
+    folder: Path
+    watching: Watching
+    tell: Callable[[str], None] = lambda _: None
+    build: bool = True
+    _done: dict[str, Results | MasterError] = field(default_factory=dict)
+    _opened: dict[_Wanted, str] = field(default_factory=dict)
+    _names: set[str] = field(default_factory=set)
+
+    def get(self, case: Case, name: str) -> Results:
+        """Return the results of a case's run, which is made unless one of the same content was.
+
+        Raises
+        ------
+        MasterError
+            If it fails, and again whenever it is asked for.
+        InterruptedRunError
+            If the user stops it.
+        """
+        wanted = _Wanted(case.scenario_path(name), case.runs[name].start_only, tuple(case.runs[name].set.items()))
+        if wanted not in self._opened:
+            self._opened[wanted] = self._make(wanted)
+        outcome = self._done[self._opened[wanted]]
+        if isinstance(outcome, MasterError):
+            raise outcome
+        return outcome
+
+    def _make(self, wanted: _Wanted) -> str:
+        """Make a run, unless there is one, and return the key under which it is kept."""
+        try:
+            overrides = Overrides(parameters={name: f"{value:.17g}" for name, value in wanted.values})
+            with open_scenario(wanted.path, overrides, self.tell, self.build) as scenario:
+                return self._run(scenario.system, wanted.start_only)
+        except InterruptedRunError:
+            raise
+        except MasterError as error:
+            key = str(wanted)
+            self._done[key] = error
+            return key
+
+    def _run(self, whole: System, start_only: bool) -> str:
+        system = first_instant(whole) if start_only else whole
+        for key in (content_key(whole), content_key(system)):
+            if key in self._done:
+                return key
+        key = content_key(system)
+        folder = self._folder_of(f"{system.name}-start" if start_only else system.name, key)
+        with self.watching(system) as observers:
+            self._done[key] = run(system, folder, observers)
+        return key
+
+    def _folder_of(self, name: str, key: str) -> Path:
+        """Return a folder of the run's own, with part of its key in the name if the name is taken."""
+        own = f"{name}-{key[:8]}" if name in self._names else name
+        self._names.add(own)
+        return self.folder / own

@@ -1,0 +1,169 @@
+"""The verbs ``report`` and ``compare`` of the command line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from master import report
+from master.errors import MasterError
+from master.recording.safe_files import write_whole
+from master.report import result_tables
+from master.report.charts.measured_charts import Comparison, compare_measured, read_measured
+from master.report.comparison_page import columns, comparison_page
+from master.report.film_file import FilmOptions, write_film
+from master.report.moving_picture import MOST_LAPS, make_movie
+from master.report.terminal_summary import Terminal
+from master.results import folder_lock, parquet_export, run_difference, run_results
+from master.results.run_results import Results
+
+REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
+COMPARE_HELP: Final = "two or more runs side by side"
+_WIDTH: Final = 80
+
+
+def add_report_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``report``."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
+    parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to put beside")
+    parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
+    parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
+    parser.add_argument("--magnify", type=float, default=8.0, metavar="N", help="deformation in the film, default 8")
+    parser.add_argument("--parquet", action="store_true", help="write the time series as Parquet too")
+
+
+def run_report(options: argparse.Namespace) -> int:
+    """Write the report of a run again, and what else is wanted."""
+    run_results.identity(options.run)  # a folder that is none of ours is left alone
+    with _claimed(options.run):
+        done = run_results.read(options.run)
+        summary = {**done.summary, **run_results.figures(done), "format": run_results.FORMAT}
+        summary["settings"] = {**summary.get("settings", {}), "filter": run_results.filter_data(done.evaluation.filter)}
+        done = replace(done, summary=summary)
+        measured = _measured(done, options.measured, options.contact) if options.measured else None
+        run_results.write_forces(done)
+        run_results.write_json(done.folder / run_results.SUMMARY, summary)
+        print(report.write(done, measured))
+        if options.parquet:
+            print(*parquet_export.write_parquet(done.folder), sep="\n")
+    _warn_of_open_runs([done])
+    if options.film:
+        print(_film(done, options))
+    if measured is not None:
+        _say_measured(measured)
+    return 0
+
+
+@contextmanager
+def _claimed(folder: Path) -> Iterator[None]:
+    """Keep others out of a results folder while its report is written."""
+    with ExitStack() as claim:
+        with suppress(PermissionError):  # writing the report will say it
+            claim.enter_context(folder_lock.claimed(folder, "wait for it to end"))
+        yield
+
+
+def _warn_of_open_runs(runs: Sequence[Results]) -> None:
+    """Say which runs are not complete: what they show is a part."""
+    for done in runs:
+        status = done.summary.get("status") or "complete"
+        if status != "complete":
+            how = "was ended before it had finished" if status == "running" else f"is {status}"
+            text = f"warning: the run in {done.folder} {how}; figures are of what it left"
+            Terminal(stderr=True).print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
+
+
+def report_what_there_is(folder: Path) -> None:
+    """Write the report of a run that stopped, if it has left anything to report on."""
+    try:
+        done = run_results.read(folder)
+        run_results.write_forces(done)
+        report.write(done)
+    except MasterError:
+        return  # it stopped before anything was recorded; the error itself is told by the caller
+
+
+def _measured(done: Results, path: Path, contact: int) -> Comparison:
+    signals = [s for s in done.signals if s.contact.index == contact]
+    if not signals:
+        raise MasterError(
+            f"{done.folder} has no contact {contact} with a recorded force; choose another with --contact"
+        )
+    return compare_measured(signals[0], read_measured(path))
+
+
+def _say_measured(measured: Comparison) -> None:
+    rows = result_tables.plain_table(
+        ("low-passed", "simulated", "measured", "difference"), report.comparison_rows(measured)
+    )
+    console = Terminal(width=_WIDTH, highlight=False)
+    console.print(rows)
+    console.print(f"compared from {measured.start:.1f} m to {measured.end:.1f} m", markup=False)
+    for warning in measured.warnings:
+        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+
+
+def _film(done: Results, options: argparse.Namespace) -> Path:
+    movie = make_movie(done, done.signals)
+    if movie is None:
+        needed = "a film needs recorded uplift, contact point and geometry"
+        raise MasterError(f"{done.folder} cannot be drawn: {needed}, and at most {MOST_LAPS} laps of a line")
+    start, end = done.interval
+    return write_film(movie, options.film, FilmOptions(options.magnify, start=start, end=end))
+
+
+def add_compare_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``compare``."""
+    parser.add_argument("first", type=Path, metavar="RUN", help="results folder")
+    parser.add_argument("others", type=Path, metavar="RUN", nargs="+", help="results folders")
+    parser.add_argument("--report", type=Path, metavar="FILE", help="write a report in HTML")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+
+
+def run_compare(options: argparse.Namespace) -> int:
+    """Compare runs with the first one."""
+    runs = [run_results.read(folder) for folder in (options.first, *options.others)]
+    _warn_of_open_runs(runs)
+    if options.report:
+        write_whole(options.report, comparison_page(runs).encode(), "another file with --report")
+    pairs = [run_difference.compare(runs[0], other) for other in runs[1:]]
+    if options.json:
+        others = [(other, c) for other, found in zip(runs[1:], pairs, strict=True) for c in found]
+        print(json.dumps([_as_json(c, runs[0], other) for other, c in others], indent=1))
+        return 0
+    _show(runs, pairs, options)
+    return 0
+
+
+def _show(
+    runs: Sequence[Results], pairs: Sequence[Sequence[run_difference.Comparison]], options: argparse.Namespace
+) -> None:
+    console = Terminal(width=_WIDTH, highlight=False)
+    found = columns(runs)
+    heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
+    console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
+    warnings = [f"{c.name}: {warning}" for c in found for warning in c.assessment.warnings]
+    for note in (*run_difference.setting_notes(runs), *warnings):
+        console.print(f"warning: {note}", markup=False)
+    for folder, differences in zip(options.others, pairs, strict=True):
+        for c in differences:
+            console.print(f"{folder}, {c.first.contact.pantograph}: {c.sentence}", markup=False, soft_wrap=True)
+    if options.report:
+        console.print(f"report in {options.report}", markup=False, soft_wrap=True)
+
+
+def _as_json(c: run_difference.Comparison, first: Results, other: Results) -> Mapping[str, Any]:
+    names = ("mean", "sigma", "minimum", "maximum")
+    one, two = c.first.quality, c.second.quality
+    difference = {n: getattr(two, n) - getattr(one, n) for n in names}
+    filters = [run.evaluation.filter.short for run in (first, other)]
+    same = len(set(filters)) == 1
+    notes = list(run_difference.setting_notes([first, other]))
+    forces = {"rms": c.rms, "largest": c.largest, "apart": c.apart}
+    known = {"notes": notes, "contact": one.contact, "difference": difference, **forces}
+    return {**known, "filters": filters, "same_filter": same}

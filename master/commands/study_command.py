@@ -1,0 +1,112 @@
+"""``python -m master study``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from master.batch.calibration import unchanged
+from master.batch.study.family import Family, Variant, family_names, load_family, store_values
+from master.batch.study.study_outcome import Done
+from master.batch.study.study_session import CSV, JSON, PAGE, study
+from master.batch.study.study_table import list_table, show
+from master.batch.study.variants import Runner, Watching, calibrate_variant, unwatched
+from master.coupling.macro_steps import Observer
+from master.errors import UsageError
+from master.report.progress import ProgressObserver
+from master.report.terminal_summary import Terminal, printable_json
+from master.system.components import System
+
+HELP: Final = "run a family of variants of a scenario and report them side by side"
+_WIDTH: Final = 80
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what may stand behind ``study``."""
+    parser.add_argument("name", nargs="?", metavar="NAME", help="study, or folder of its scenario; not with --list")
+    parser.add_argument("--list", action="store_true", help="say which studies and variants there are and run nothing")
+    parser.add_argument(
+        "--only", action="append", default=[], metavar="VARIANT", help="run this variant; may be given several times"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="default: results/study/NAME")
+    parser.add_argument("--again", action="store_true", help="run again what an earlier study has finished")
+    parser.add_argument(
+        "--calibrate", action="store_true", help="find the static forces for the wanted mean and store them first"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress, no tables; files and exit code only")
+    parser.add_argument("--json", action="store_true", help=f"print {JSON} instead of tables")
+    parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run a study; returns 0 if every variant was run, 1 if not."""
+    if options.list:
+        names = [options.name] if options.name else family_names()
+        Terminal(width=_WIDTH).print(list_table([load_family(n) for n in names]))
+        return 0
+    if not options.name:
+        raise UsageError(f"which study? known: {', '.join(family_names()) or 'none'}")
+    family = load_family(options.name)
+    chosen = family.chosen(options.only)
+    error = Terminal(stderr=True)
+    runner = _runner(options, error)
+    if options.calibrate:
+        family, chosen = _calibrated(family, chosen, options, runner)
+    folder = options.out or Path("results") / "study" / family.name
+    done = study(family, chosen, folder, runner, options.again, _announcer(runner))
+    _print(options, folder, lambda console: show(console, done))
+    return 1 if done.failures else 0
+
+
+def _print(options: argparse.Namespace, folder: Path, tables: Callable[[Console], None]) -> None:
+    if options.json:
+        print(printable_json((folder / JSON).read_text(encoding="utf-8")), end="")
+    elif not options.quiet:
+        console = Terminal(width=_WIDTH, highlight=False)
+        tables(console)
+        console.print(f"page: {folder / PAGE}, table: {folder / CSV}", markup=False, soft_wrap=True)
+
+
+def _calibrated(
+    family: Family, chosen: Sequence[Variant], options: argparse.Namespace, runner: Runner
+) -> tuple[Family, tuple[Variant, ...]]:
+    """Find and store the forces of variants, one after the other; return the family as it is then."""
+    for variant in chosen:
+        with unchanged(family.folder) as check:
+            found = calibrate_variant(family, variant, runner)
+            check()
+            store_values(family, variant.name, {name: f.value for name, f in found.items()})
+    renewed = load_family(str(family.folder))
+    return renewed, renewed.chosen(options.only)
+
+
+def _runner(options: argparse.Namespace, console: Console) -> Runner:
+    if options.quiet:
+        return Runner(build=not options.no_build)
+    tell = _teller(console)
+    return Runner(_progress(console), tell, not options.no_build)
+
+
+def _teller(console: Console) -> Callable[[str], None]:
+    return lambda text: console.print(text, style="dim", markup=False, highlight=False)
+
+
+def _announcer(runner: Runner) -> Callable[[Done], None]:
+    return lambda done: runner.tell(f"{done.name}: results in {done.results.folder}")
+
+
+def _progress(console: Console) -> Watching:
+    @contextmanager
+    def watching(system: System) -> Iterator[Sequence[Observer]]:
+        progress = ProgressObserver(console, system.start, system.stop)
+        try:
+            yield [progress]
+        finally:
+            progress.finish()
+
+    return watching if console.is_terminal else unwatched

@@ -1,0 +1,113 @@
+"""What the FMUs of a run warn of, and values that cannot be.
+
+An FMU is asked when initialization and the first step are over, and once more at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from master.coupling.network import Network
+from master.errors import MasterError
+from master.fmu.instance import Cautious
+
+#: Magnitude beyond which no length, velocity or force of a line and a pantograph lies [SI].
+LARGEST: Final = 1e15
+
+
+@dataclass(frozen=True)
+class Caution:
+    """What an FMU has warned of.
+
+    Attributes
+    ----------
+    component : str
+    text : str
+        In the FMU's own words.
+    is_own : bool
+        Whether they are: how an FMU ended it does not say itself.
+    """
+
+    component: str
+    text: str
+    is_own: bool = True
+
+    def __str__(self) -> str:
+        if not self.is_own:
+            return f"warning: {self.text}; what was computed is not touched by that"
+        return f"warning: component '{self.component}' says: {self.text}"
+
+
+class Excess(Caution):
+    """What was seen in an FMU's values, which has not warned of it itself; the text begins with the variable."""
+
+    def __str__(self) -> str:
+        return f"warning: component '{self.component}': {self.text}"
+
+
+class CautionObserver:
+    """Observer that asks the FMUs after initialization, after the first step and at the end, and looks at all values.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with every new warning.
+
+    Attributes
+    ----------
+    warnings : list of Caution
+        So far.
+    """
+
+    def __init__(self, tell: Callable[[Caution], None] = lambda _: None) -> None:
+        self._tell = tell
+        self._has_stepped = False
+        self._network: Network | None = None
+        self._seen: set[str] = set()
+        self.warnings: list[Caution] = []
+
+    def begin(self, start: float, network: Network) -> None:
+        """Initialization is over."""
+        self._network = network
+        self._look(network)
+        self._weigh(start, network)
+
+    def observe(self, index: int, end: float, network: Network) -> None:
+        """Look at the values, and once more at the warnings after the first step."""
+        if max(map(abs, network.outputs.tolist()), default=0.0) > LARGEST:
+            self._weigh(end, network)
+        if not self._has_stepped:
+            self._has_stepped = True
+            self._look(network)
+
+    def finish(self) -> None:
+        """Ask for what was said since the first step; one that cannot answer any more has said why it failed."""
+        if self._network is not None:
+            with suppress(MasterError):
+                self._look(self._network)
+
+    def add(self, found: Caution) -> None:
+        """Take a warning that comes from elsewhere."""
+        if found not in self.warnings:
+            self.warnings.append(found)
+            self._tell(found)
+
+    def _look(self, network: Network) -> None:
+        for slave in network.slaves:
+            for text in slave.warnings() if isinstance(slave, Cautious) else ():
+                self.add(Caution(slave.name, text))
+
+    def _weigh(self, time: float, network: Network) -> None:
+        """Tell once of every output that has become larger than anything can be."""
+        for index in np.flatnonzero(np.abs(network.outputs) > LARGEST):
+            name = network.output_names[index]
+            if name not in self._seen:
+                self._seen.add(name)
+                component, _, variable = name.partition(".")
+                text = f"{variable} became {network.outputs[index]:.3g} at t = {time:.6g} s, larger than anything here"
+                self.add(Excess(component, f"{text} can be ({LARGEST:g}); the results mean nothing"))

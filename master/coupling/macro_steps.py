@@ -1,0 +1,217 @@
+"""The loop over macro steps: time, observers, checks of exchanged values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from master.arrays import FloatArray
+from master.commands.supervision import phase
+from master.coupling.coupling_schemes import Algorithm, initialise
+from master.coupling.interruption import heeded_at_once
+from master.coupling.network import Network
+from master.errors import MasterError, RunError
+
+Status = Literal["complete", "interrupted", "failed", "incomplete"]
+
+
+class Observer(Protocol):
+    """Looks on; outside the loop's logic."""
+
+    def begin(self, time: float, network: Network) -> None:
+        """After initialization, at the start time."""
+
+    def observe(self, index: int, time: float, network: Network) -> None:
+        """At the end of macro step ``index`` (1, 2, ...), at its end time."""
+
+    def finish(self) -> None:
+        """When the run has ended, however it ended."""
+
+
+@dataclass(frozen=True)
+class TimeGrid:
+    """Communication points t_n = start + n step, never summed up; a run goes from ``first`` to ``count``."""
+
+    start: float
+    step: float
+    count: int
+    first: int = 0
+
+    def time(self, index: int) -> float:
+        """Return t_n."""
+        return self.start + index * self.step
+
+    @property
+    def begin(self) -> float:
+        """Return the communication point that the run begins with."""
+        return self.time(self.first)
+
+    @property
+    def stop(self) -> float:
+        """Return the last communication point."""
+        return self.time(self.count)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes
+    ----------
+    status : str
+        complete, interrupted, failed, or incomplete: it came to its end, and that is not enough to judge it.
+    steps : int
+        Completed macro steps.
+    time : float
+        Time reached [s].
+    error : MasterError, optional
+        Why it failed.
+    """
+
+    status: Status
+    steps: int
+    time: float
+    error: MasterError | None = None
+
+
+def _initialise(network: Network, _algorithm: Algorithm, grid: TimeGrid) -> None:
+    initialise(network, grid.start, grid.stop)
+
+
+def simulate(
+    network: Network,
+    algorithm: Algorithm,
+    grid: TimeGrid,
+    observers: Sequence[Observer] = (),
+    stop_wanted: Callable[[], bool] = lambda: False,
+    prepare: Callable[[Network, Algorithm, TimeGrid], None] = _initialise,
+) -> Outcome:
+    """Initialise (or otherwise prepare) and step the network over the grid.
+
+    A failure does not raise: it ends the run, and the outcome carries it, so that what was computed is kept.
+    """
+    try:
+        outcome = _run(network, algorithm, grid, observers, stop_wanted, prepare)
+    finally:
+        failure = _finish(observers)
+    if failure is not None and outcome.error is None:
+        return Outcome("failed", outcome.steps, outcome.time, failure)
+    return outcome
+
+
+def _run(
+    network: Network,
+    algorithm: Algorithm,
+    grid: TimeGrid,
+    observers: Sequence[Observer],
+    stop_wanted: Callable[[], bool],
+    prepare: Callable[[Network, Algorithm, TimeGrid], None],
+) -> Outcome:
+    index = grid.first
+    try:
+        with phase("loading"), heeded_at_once():
+            prepare(network, algorithm, grid)
+        check_finite(network, grid.begin, None)
+        check_inputs(network, grid.begin, None)
+        for observer in observers:
+            observer.begin(grid.begin, network)
+        previous = network.outputs.copy()
+        with phase("stepping"):
+            for index in range(grid.first, grid.count):
+                if stop_wanted():
+                    return Outcome("interrupted", index, grid.time(index))
+                _advance(network, algorithm, grid, index, observers, previous)
+    except KeyboardInterrupt:
+        return Outcome("interrupted", index, grid.time(index))
+    except MasterError as error:
+        # An FMU in Python takes the interruption for a failure of its own.
+        if stop_wanted():
+            return Outcome("interrupted", index, grid.time(index))
+        return Outcome("failed", index, grid.time(index), error)
+    return Outcome("complete", grid.count, grid.stop)
+
+
+def _finish(observers: Sequence[Observer]) -> MasterError | None:
+    """Finish every observer, also after one that cannot; returns the first failure."""
+    first = None
+    for observer in observers:
+        try:
+            observer.finish()
+        except MasterError as error:
+            first = first or error
+    return first
+
+
+def _advance(
+    network: Network,
+    algorithm: Algorithm,
+    grid: TimeGrid,
+    index: int,
+    observers: Sequence[Observer],
+    previous: FloatArray,
+) -> None:
+    algorithm.step(network, grid.time(index), grid.step)
+    end = grid.time(index + 1)
+    # Cheap, at every step: not finite if a value is not (or if they are too large to be added).
+    if not math.isfinite(sum(network.outputs.tolist())):
+        check_finite(network, end, previous)
+    if not network.is_plain:
+        check_inputs(network, end, previous)
+    previous[:] = network.outputs
+    for observer in observers:
+        observer.observe(index + 1, end, network)
+
+
+def check_finite(network: Network, time: float, last_good: FloatArray | None) -> None:
+    """Refuse exchanged values that are not finite.
+
+    Raises
+    ------
+    RunError
+        Naming the variable, the time and its last good value.
+    """
+    found = _not_finite(network.output_names, network.outputs, last_good, time)
+    said = _remarks(network) if found else ""
+    if said and last_good is None:
+        raise RunError(f"the run cannot begin: {said}")
+    if found:
+        raise RunError(f"{found}. {said or 'Try a smaller --step, and check the parameters'}")
+
+
+def check_inputs(network: Network, time: float, last_good: FloatArray | None) -> None:
+    """Refuse outputs, finite themselves, that a connection's conversion turns into something that is not.
+
+    Parameters
+    ----------
+    last_good : ndarray, shape (n_outputs,), optional
+        The outputs of the step before.
+
+    Raises
+    ------
+    RunError
+        Naming the input, the time and its last good value.
+    """
+    before = None if last_good is None else network.converted(last_good)
+    found = _not_finite(network.input_names, network.converted(network.outputs), before, time)
+    if found:
+        raise RunError(f"{found}. Check the factor and the offset of its connection")
+
+
+def _not_finite(names: Sequence[str], values: FloatArray, last_good: FloatArray | None, time: float) -> str:
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size == 0:
+        return ""
+    first = int(bad[0])
+    good = "" if last_good is None else f"; its last good value was {last_good[first]:.6g}"
+    more = f" (and {bad.size - 1} more variables)" if bad.size > 1 else ""
+    return f"'{names[first]}' became {values[first]} at t = {time:.6g} s{more}{good}"
+
+
+def _remarks(network: Network) -> str:
+    """Return what the slaves themselves have said."""
+    said = ((slave.name, slave.remark()) for slave in network.slaves)
+    return "; ".join(f"component '{name}' says: {text}" for name, text in said if text)

@@ -1,0 +1,309 @@
+"""The line's static geometry, the supports' uplift and what is slack, as the catenary FMU reports them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from master.arrays import BoolArray, FloatArray
+from master.coupling.network import Network
+from master.evaluation.filters import stands_in
+from master.recording.recorder import Recording
+from master.system.components import System
+
+#: Calculated parameter of a line that closes on itself: the length after which it repeats [m].
+PERIOD: Final = "period"
+#: Most laps on a line that closes on itself.
+_MOST_LAPS: Final = 10_000
+_INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
+_TENSIONED: Final = re.compile(r"(.+?)\.((?:support|dropper)\[\d+\])\.(force|slack)")
+
+#: Values of one component's calculated parameters by variable name.
+Geometry = dict[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Uplift:
+    """Largest uplift of a support over the whole run.
+
+    Attributes
+    ----------
+    component : str
+        The catenary.
+    support : int
+        Number of the support.
+    x : float, optional
+        Its position along the track [m], if the FMU says it.
+    section : int, optional
+        The section that it belongs to, if the line has several.
+    period : float
+        Length after which the line repeats, and with it the support [m]; 0 if it does not.
+    maximum : float
+        Largest uplift [m].
+    time : float
+        When it occurs [s].
+    """
+
+    component: str
+    support: int
+    x: float | None
+    maximum: float
+    time: float
+    section: int | None = None
+    period: float = 0.0
+
+    @property
+    def place(self) -> str:
+        """Where it stands, short and unambiguous, for tables and legends."""
+        where = f"{self.x:.0f} m" if self.x is not None else f"support {self.support}"
+        return where if self.section is None else f"{where} (section {self.section})"
+
+    def stands_in(self, interval: tuple[float | None, float | None]) -> bool:
+        """Return whether the support stands in an interval of the track [m], its ends included."""
+        return stands_in(self.x, interval, self.period)
+
+
+@dataclass(frozen=True)
+class Slackness:
+    """When a dropper is slack, or a support whose force is recorded.
+
+    Attributes
+    ----------
+    component : str
+        The catenary.
+    name : str
+        ``dropper[n]`` or ``support[n]``.
+    time : ndarray, shape (n,)
+        When it is recorded [s].
+    slack : ndarray of bool, shape (n,)
+        Whether it is slack then.
+    """
+
+    component: str
+    name: str
+    time: FloatArray
+    slack: BoolArray
+
+
+class GeometryObserver:
+    """Observer that reads all Real calculated parameters once, when they are known.
+
+    Parameters
+    ----------
+    system : System
+    tell : callable
+        Is given them.
+    """
+
+    def __init__(self, system: System, tell: Callable[[Geometry], None] = lambda _: None) -> None:
+        self._system = system
+        self._tell = tell
+        self.geometry: Geometry = {}
+
+    def begin(self, time: float, network: Network) -> None:
+        """Read."""
+        for component, slave in zip(self._system.components, network.slaves, strict=True):
+            variables = component.fmu.variables.values()
+            names = [v.name for v in variables if v.causality == "calculatedParameter" and v.type == "Real"]
+            group = getattr(slave, "group", None)
+            if names and group is not None:
+                values = group(names)
+                values.read()
+                self.geometry[component.name] = dict(zip(names, values.values.tolist(), strict=True))
+        self._tell(self.geometry)
+
+    def observe(self, index: int, time: float, network: Network) -> None:
+        """Nothing changes."""
+
+    def finish(self) -> None:
+        """Nothing to close."""
+
+
+def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:
+    """Return the values ``kind[1].name, kind[2].name, ...``, shape (n,); empty if there are none.
+
+    Examples
+    --------
+    >>> indexed({"support[1].x": 0.0, "support[2].x": 50.0}, "support", "x").tolist()
+    [0.0, 50.0]
+    """
+    found = {
+        int(m[2]): v for k, v in geometry.items() if (m := _INDEXED.fullmatch(k)) and m[1] == kind and m[3] == name
+    }
+    return np.array([found[i] for i in sorted(found)])
+
+
+def aligned(geometry: Mapping[str, float], kind: str, names: Sequence[str]) -> dict[str, FloatArray]:
+    """Return values of supports or droppers that are to be put side by side, of those whose ``x`` is known.
+
+    Examples
+    --------
+    >>> known = {"support[1].x": 0.0, "support[2].x": 50.0, "support[2].z": 5.0, "support[3].z": 6.0}
+    >>> {name: values.tolist() for name, values in aligned(known, "support", ("x", "z")).items()}
+    {'x': [0.0, 50.0], 'z': [nan, 5.0]}
+    """
+    numbers = sorted(int(m[2]) for k in geometry if (m := _INDEXED.fullmatch(k)) and (m[1], m[3]) == (kind, "x"))
+    return {name: np.array([geometry.get(f"{kind}[{i}].{name}", math.nan) for i in numbers]) for name in names}
+
+
+def period_of(geometry: Mapping[str, float]) -> float:
+    """Return the length after which a line repeats because it closes on itself [m]; 0 if it does not."""
+    return max(0.0, geometry.get(PERIOD, 0.0))
+
+
+def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArray:
+    """Return by how much a line is to be moved along to be where it is met between two positions of the track [m].
+
+    Parameters
+    ----------
+    limits : (float, float)
+        Both positions [m].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Whole periods for a line that closes on itself; a single 0 for one that ends.
+
+    Examples
+    --------
+    >>> laps({"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}, (120.0, 310.0)).tolist()
+    [100.0, 200.0, 300.0]
+    """
+    period, x = period_of(geometry), indexed(geometry, "support", "x")
+    if not period or not len(x):
+        return np.zeros(1)
+    return period * _whole(*((limit - x.min()) / period for limit in limits))
+
+
+def _whole(first: float, last: float) -> FloatArray:
+    """Return the whole numbers from the one at or below ``first`` to that at or below ``last``, shape (n,).
+
+    Where there are more than any run has laps, the positions mean nothing, and there are none.
+    """
+    if not last - first <= _MOST_LAPS:
+        return np.zeros(0)
+    return np.arange(math.floor(first), math.floor(last) + 1, dtype=np.float64)
+
+
+def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -> FloatArray:
+    """Return where supports or droppers are met between two positions of the track [m], shape (n,).
+
+    On a line that closes on itself they are met once a lap.
+
+    Examples
+    --------
+    >>> met({"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}, "support", (120.0, 310.0)).tolist()
+    [150.0, 200.0, 250.0, 300.0]
+    """
+    x = (laps(geometry, limits)[:, None] + indexed(geometry, kind, "x")).ravel()
+    return x[(x >= limits[0]) & (x <= limits[1])]
+
+
+def passages(
+    x: float, interval: tuple[float | None, float | None], travelled: tuple[float, float], period: float = 0.0
+) -> FloatArray:
+    """Return where a place is passed within an interval of the track, shape (n,) [m].
+
+    Parameters
+    ----------
+    x : float
+        The place [m].
+    interval : (float or None, float or None)
+        Ends of the interval [m]; None where it has none.
+    travelled : (float, float)
+        Between what positions the run goes [m]: on a line that repeats there is no lap beyond.
+    period : float
+        Length after which the line repeats [m]; 0 if it does not: then the place is passed once.
+
+    Examples
+    --------
+    >>> passages(20.0, (110.0, None), (0.0, 330.0), 100.0).tolist()
+    [120.0, 220.0, 320.0]
+    >>> passages(20.0, (110.0, None), (0.0, 330.0)).tolist()
+    []
+    """
+    start = -math.inf if interval[0] is None else interval[0]
+    end = math.inf if interval[1] is None else interval[1]
+    if not period:
+        return np.array([x] if start <= x <= end else [])
+    start, end = max(start, travelled[0]), min(end, travelled[1])
+    places: FloatArray = x + period * _whole((start - x) / period, (end - x) / period)
+    return places[(places >= start) & (places <= end)]
+
+
+def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:
+    """Return the static geometry of each section of a line; a line of one section as it is.
+
+    Examples
+    --------
+    >>> two = {"support[1].x": 0.0, "support[1].section": 1.0, "support[2].x": 5.0, "support[2].section": 2.0}
+    >>> [indexed(one, "support", "x").tolist() for one in by_section(two)]
+    [[0.0], [5.0]]
+    """
+    owner = {(m[1], m[2]): v for k, v in geometry.items() if (m := _INDEXED.fullmatch(k)) and m[3] == "section"}
+    if not owner:
+        return (dict(geometry),)
+    return tuple(
+        {k: v for k, v in geometry.items() if (m := _INDEXED.fullmatch(k)) and owner.get((m[1], m[2])) == section}
+        for section in sorted(set(owner.values()))
+    )
+
+
+def slackness(recordings: Iterable[Recording]) -> tuple[Slackness, ...]:
+    """Return when droppers and supports are slack, of which that is recorded.
+
+    A line says it itself, by ``dropper[n].slack``, as a slack dropper whose damper goes on acting carries something all
+    the same. Of one that does not (a foreign line, results of an older version) what pulls by nothing is slack.
+
+    Examples
+    --------
+    >>> names = ("line.dropper[1].force", "line.dropper[1].slack", "line.dropper[2].force")
+    >>> values = np.array([[50.0, 0.0, 50.0], [-3.0, 1.0, 50.0], [8.0, 1.0, 0.0]])
+    >>> found = slackness([Recording(np.arange(3.0), names, ("N", "1", "N"), values)])
+    >>> [(s.name, s.slack.tolist()) for s in found]
+    [('dropper[1]', [False, True, True]), ('dropper[2]', [False, False, True])]
+    """
+    told: dict[tuple[str, str], Slackness] = {}
+    pulling: dict[tuple[str, str], Slackness] = {}
+    for recording in recordings:
+        for name, values in zip(recording.names, recording.values.T, strict=True) if len(recording.time) else ():
+            match = _TENSIONED.fullmatch(name)
+            if match is not None:
+                found, slack = (pulling, values <= 0.0) if match[3] == "force" else (told, values > 0.5)
+                found.setdefault((match[1], match[2]), Slackness(match[1], match[2], recording.time, slack))
+    return tuple((pulling | told).values())
+
+
+def support_uplifts(recordings: tuple[Recording, ...], geometry: Geometry) -> tuple[Uplift, ...]:
+    """Return the largest uplift of every support that is recorded, in the order of the supports."""
+    found = [
+        _uplift(recording, name, geometry)
+        for recording in recordings
+        if len(recording.time)
+        for name in recording.matching("*.support[*].uplift")
+    ]
+    return tuple(sorted(found, key=lambda u: (u.component, u.support)))
+
+
+def _uplift(recording: Recording, full: str, geometry: Geometry) -> Uplift:
+    component, _, name = full.partition(".support[")
+    number = int(name.partition("]")[0])
+    values = recording[full]
+    peak = int(np.argmax(values))
+    known = geometry.get(component, {})
+    x, section = known.get(f"support[{number}].x"), known.get(f"support[{number}].section")
+    peak_time = float(recording.time[peak])
+    return Uplift(
+        component,
+        number,
+        x,
+        float(values[peak]),
+        peak_time,
+        None if section is None else round(section),
+        period_of(known),
+    )

@@ -1,0 +1,5 @@
+"""The process of an isolated FMU."""
+
+from master.fmu.isolation.child import main
+
+main()

@@ -1,9 +1,0 @@
-"""FMUs in processes of their own: what crashes there does not take the run along.
-
-`IsolatedInstance` stands in for `Instance`; behind it a child process (``python -m master.isolation``) holds the real
-one. They talk over a socket in frames of a fixed layout (`wire`); nothing that the child says is ever executed.
-"""
-
-from master.isolation.remote import INIT_TIMEOUT, IsolatedInstance, Isolation
-
-__all__ = ["INIT_TIMEOUT", "IsolatedInstance", "Isolation"]

@@ -1,0 +1,260 @@
+"""Recording: one row per time at the end of each step, plus the start, written out as the run goes on."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from master.arrays import FloatArray
+from master.coupling.network import Network
+from master.errors import MasterError
+from master.recording.safe_files import LineFile, plain_cell, safe_cell
+from master.system.variable_names import matcher
+
+#: Rows kept back before they are written, and the simulated time that they may span [s].
+ROWS_PER_FLUSH: Final = 250
+LONGEST_UNWRITTEN: Final = 1.0
+NUMBER_FORMAT: Final = "%.10g"
+_HEADER: Final = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Recorded variables over time.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Times [s].
+    names : tuple of str
+        ``component.variable``.
+    units : tuple of str
+        Units, empty where there is none.
+    values : ndarray, shape (n, n_variables)
+        One row per time.
+    """
+
+    time: FloatArray
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names
+
+    def __getitem__(self, name: str) -> FloatArray:
+        column: FloatArray = self.values[:, self.names.index(name)]
+        return column
+
+    def matching(self, pattern: str) -> tuple[str, ...]:
+        """Return the names that match a pattern (`matcher`), in order."""
+        fits = matcher(pattern)
+        return tuple(n for n in self.names if fits(n))
+
+
+EMPTY: Final = Recording(np.zeros(0), (), (), np.zeros((0, 0)))
+
+
+def header(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Return column titles: ``time [s]``, then ``name [unit]``."""
+    titles = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
+    return ["time [s]", *titles]
+
+
+class Source:
+    """Where values of a recording come from: called when a row is due."""
+
+    def __init__(self, names: Sequence[str], values: FloatArray, read: Callable[[], None] = lambda: None) -> None:
+        self.names = tuple(names)
+        self.values = values
+        self.read = read
+
+
+class Recorder:
+    """Observer that records sources every ``every``-th step in a CSV file, row by row as the run goes on.
+
+    A row is written at the latest when `ROWS_PER_FLUSH` are waiting, or when waiting for the next one would leave more
+    than `LONGEST_UNWRITTEN` of simulated time unwritten, so that a process that is killed loses no more than that.
+
+    Parameters
+    ----------
+    path : Path
+        The CSV file.
+    sources : sequence of Source
+        Groups of variables.
+    units : mapping
+        Unit by name.
+    every : int
+        Steps between rows.
+    keep : int, optional
+        Rows of a file that is there already to keep and to go on after, which makes the first of them the start.
+    is_steady : bool
+        Whether every row costs the same; otherwise many are made into text at once, which costs less in all.
+
+    Raises
+    ------
+    MasterError
+        If the file cannot be written, or what is to be kept is not there.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        sources: Sequence[Source],
+        units: Mapping[str, str],
+        every: int = 1,
+        keep: int = 0,
+        is_steady: bool = False,
+    ) -> None:
+        self.names = tuple(n for s in sources for n in s.names)
+        self.units = tuple(units.get(n, "") for n in self.names)
+        self._sources = tuple(sources)
+        self._every = every
+        self._format = (",".join([NUMBER_FORMAT] * (len(self.names) + 1)) + "\n").encode()
+        self._is_steady = is_steady
+        self._waiting: list[list[float]] = []
+        self._lines: list[bytes] = []
+        self._count = 0  # rows not written yet, as numbers or as lines
+        self._oldest = self._latest = -math.inf
+        self._goes_on = keep > 0
+        self._rows = keep
+        titles = _title_line(self.names, self.units)
+        self._file = LineFile(path, _end_of_rows(path, titles, keep) if keep else 0)
+        if not keep:
+            self._file.write(titles.encode())
+
+    def begin(self, time: float, network: Network) -> None:
+        """Record the start, unless it is the last row of a file that is gone on with."""
+        if not self._goes_on:
+            self._record(time)
+
+    def observe(self, index: int, time: float, network: Network) -> None:
+        """Record the end of a step, if one is due."""
+        if index % self._every == 0:
+            self._record(time)
+
+    def finish(self) -> None:
+        """Write what is left and close the file."""
+        if self._file.is_open:
+            try:
+                self._write()
+            finally:
+                self._file.close()
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._file.path
+
+    @property
+    def rows(self) -> int:
+        """How many rows the file must have: those kept and those recorded."""
+        return self._rows
+
+    @property
+    def is_as_written(self) -> bool:
+        """Whether the file holds to the last byte what was kept and recorded."""
+        return self._file.is_as_written
+
+    def sync(self) -> None:
+        """Write what is waiting and wait until it is on the disk."""
+        self._write()
+        self._file.sync()
+
+    @property
+    def recording(self) -> Recording:
+        """What is in the file."""
+        return load(self._file.path)
+
+    def _record(self, time: float) -> None:
+        values = [time]
+        for source in self._sources:
+            source.read()
+            values += source.values.tolist()
+        if self._count == 0:
+            self._oldest = time
+        self._count += 1
+        self._rows += 1
+        self._waiting.append(values)
+        if self._is_steady:
+            self._format_rows()
+        spacing, self._latest = time - self._latest, time
+        if self._count >= ROWS_PER_FLUSH or time + spacing > self._oldest + LONGEST_UNWRITTEN:
+            self._write()
+
+    def _format_rows(self) -> None:
+        self._lines += [self._format % tuple(row) for row in self._waiting]
+        self._waiting.clear()
+
+    def _write(self) -> None:
+        self._format_rows()
+        lines, self._count = b"".join(self._lines), 0
+        self._lines.clear()  # before writing: what cannot be written now is not tried again
+        if lines:
+            self._file.write(lines)
+
+
+def _title_line(names: Sequence[str], units: Sequence[str]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(map(safe_cell, header(names, units)))
+    return text.getvalue()
+
+
+def _end_of_rows(path: Path, titles: str, rows: int) -> int:
+    """Return how long a recording with these titles is up to and with its row number ``rows`` [bytes]."""
+    try:
+        with path.open("rb") as file:
+            same = file.readline() == titles.encode()
+            sizes = [len(line) for line in itertools.islice(file, rows) if line.endswith(b"\n")]
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror})") from error
+    if not same:
+        raise MasterError(f"{path} holds other variables than this run records: it cannot be gone on with")
+    if len(sizes) < rows:
+        raise MasterError(f"{path} has {len(sizes)} rows, the run that is to go on had made {rows}: some are lost")
+    return len(titles.encode()) + sum(sizes)
+
+
+def load(path: Path) -> Recording:
+    """Read a recording from its CSV file; a last line cut short by a crash is left out.
+
+    Raises
+    ------
+    MasterError
+        If the file is missing or is not such a recording.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MasterError(f"{path} cannot be read ({error})") from error
+    first, _, rest = text[: text.rfind("\n") + 1].partition("\n")
+    titles = [plain_cell(cell) for cell in next(csv.reader([first]), [])]
+    if titles[:1] != ["time [s]"]:
+        raise MasterError(f"{path} is not a recording: its first column is not 'time [s]'")
+    return _table(path, titles[1:], rest)
+
+
+def _table(path: Path, titles: Sequence[str], rows: str) -> Recording:
+    columns = len(titles) + 1
+    try:
+        table = np.loadtxt(io.StringIO(rows), delimiter=",", ndmin=2, comments=None) if rows else np.zeros((0, columns))
+    except ValueError as error:
+        raise MasterError(f"{path} is not a recording: {error}") from error
+    if table.shape[1] != columns:
+        raise MasterError(f"{path} is not a recording: {columns} titles, but {table.shape[1]} columns")
+    time = table[:, 0]
+    if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+        raise MasterError(f"{path} is not a recording: its times are not finite, or do not increase from row to row")
+    parts = [m for t in titles if (m := _HEADER.fullmatch(t))]
+    names = tuple(m["name"] for m in parts)
+    units = tuple(m["unit"] or "" for m in parts)
+    return Recording(time, names, units, table[:, 1:])

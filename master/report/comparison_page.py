@@ -1,0 +1,244 @@
+"""Reports of two or more runs side by side; every contact of every run is a column."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from master.arrays import FloatArray
+from master.errors import MasterError
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import Signals
+from master.report import html_markup
+from master.report.charts.run_charts import (
+    Axes,
+    Chart,
+    Curve,
+    common_edges,
+    curve_trace,
+    force_title,
+    grouped_bars,
+    line_marks,
+    shares,
+    spectrum_trace,
+    uplift_trace,
+)
+from master.report.result_tables import figure_rows
+from master.report.run_inputs import differing_inputs, quality_rows
+from master.report.run_page import status_note
+from master.results.run_difference import setting_notes
+from master.results.run_results import Results
+
+_BANDS: Final = ("0-2", "0-5", "5-20")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A contact of a run.
+
+    Attributes
+    ----------
+    name : str
+        As shown.
+    run : Results
+        Its run.
+    assessment : Assessment
+        Its figures.
+    signals : Signals
+        Its force.
+    """
+
+    name: str
+    run: Results
+    assessment: Assessment
+    signals: Signals
+
+
+def columns(runs: Sequence[Results]) -> tuple[Column, ...]:
+    """Return the contacts that have figures, in the order of the runs.
+
+    Raises
+    ------
+    MasterError
+        If there are fewer than two.
+    """
+    names = run_names([run.folder for run in runs])
+    found = [c for name, run in zip(names, runs, strict=True) for c in _columns(name, run)]
+    if len(found) < 2:
+        raise MasterError("nothing to compare: fewer than two contacts have figures in their interval of interest")
+    return tuple(found)
+
+
+def _columns(name: str, run: Results) -> list[Column]:
+    by_contact = {s.contact: s for s in run.signals}
+    assessments = [a for a in run.assessments() if a.contact in by_contact]
+    several = len(assessments) > 1
+    return [
+        Column(f"{name}, {a.contact.pantograph}" if several else name, run, a, by_contact[a.contact])
+        for a in assessments
+    ]
+
+
+def run_names(folders: Sequence[Path]) -> list[str]:
+    """Return the shortest endings of the folders' paths that tell them apart.
+
+    Examples
+    --------
+    >>> run_names([Path("a/before"), Path("a/after")])
+    ['before', 'after']
+    >>> run_names([Path("x/out"), Path("y/out")])
+    ['x/out', 'y/out']
+    """
+    paths = [folder.absolute().parts for folder in folders]
+    for length in range(1, max(len(p) for p in paths) + 1):
+        names = ["/".join(p[-length:]) for p in paths]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{'/'.join(p[-1:])} ({i + 1})" for i, p in enumerate(paths)]
+
+
+def comparison_page(runs: Sequence[Results]) -> str:
+    """Return the page that compares runs, or the contacts of one run.
+
+    Raises
+    ------
+    MasterError
+        If there is nothing to compare.
+    """
+    found = columns(runs)
+    charts = comparison_charts(found)
+    names = [c.name for c in found]
+    body = [
+        f"<h1>{html_markup.text(' | '.join(dict.fromkeys(names)))}</h1>",
+        *(
+            f"<p class='note'>{html_markup.text(r.folder.name)}</p>{note}"
+            for r in runs
+            if (note := status_note(r.summary))
+        ),
+        *map(_verdict, found),
+        *(f"<p class='warning'>Warning: {html_markup.text(note)}.</p>" for note in setting_notes(runs)),
+        "<h2>Figures</h2>",
+        html_markup.table(["figure, low-passed", *names], _rows_with_differences(found)),
+        f"<p class='note'>In brackets: difference from {html_markup.text(names[0])}. {_filters(runs)}</p>",
+        "<h2>Curves</h2>",
+        *map(html_markup.chart, charts),
+        *_input_section(runs),
+        *_quality_section(runs),
+    ]
+    return html_markup.document(f"comparison: {', '.join(names)}", body, charts)
+
+
+def _verdict(c: Column) -> str:
+    return html_markup.verdict(c.assessment, c.name, c.run.evaluation.limits)
+
+
+def _filters(runs: Sequence[Results]) -> str:
+    """Return which filters the runs were evaluated with."""
+    return f"Filter: {html_markup.text('; '.join(dict.fromkeys(run.evaluation.filter.sentence for run in runs)))}."
+
+
+def _rows_with_differences(found: Sequence[Column]) -> list[tuple[str, ...]]:
+    return [_with_differences(row) for row in figure_rows([c.assessment for c in found])]
+
+
+def _with_differences(row: Sequence[str]) -> tuple[str, ...]:
+    name, first, *others = row
+    return (name, first, *(_difference(first, other) for other in others))
+
+
+def _difference(first: str, other: str) -> str:
+    if "-" in (first, other):
+        return other
+    decimals = len(other.partition(".")[2])
+    return f"{other} ({float(other) - float(first):+.{decimals}f})"
+
+
+def comparison_charts(found: Sequence[Column]) -> list[Chart]:
+    """Return the curves of all columns, overlaid."""
+    charts = [_force_chart(found), _histogram(found), _spectrum(found), _bands(found)]
+    if any(c.run.uplifts for c in found):
+        charts.append(_uplift(found))
+    return charts
+
+
+def _force_chart(found: Sequence[Column]) -> Chart:
+    traces = [
+        curve_trace(c.signals.position, c.signals.shown, Curve(i, c.name, 1.9 - 0.2 * min(i, 3)))
+        for i, c in enumerate(found)
+    ]
+    first = found[0]
+    limits = (float(first.signals.position.min()), float(first.signals.position.max()))
+    traces += line_marks(first.run, first.assessment.contact.catenary, limits)
+    axes = Axes("track position of the contact [m]", force_title([c.signals for c in found]))
+    axes.extra = {"yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}}
+    note = f"Supports and droppers of {first.name}."
+    return Chart("force", "Contact force", {"data": traces, "layout": axes.layout()}, note, 440)
+
+
+def _histogram(found: Sequence[Column]) -> Chart:
+    cuts = [c.signals.filtered[c.signals.inside] for c in found]
+    edges = common_edges(cuts)
+    traces = [
+        curve_trace(*_staircase(edges, shares(cut, edges)), Curve(i, c.name))
+        for i, (c, cut) in enumerate(zip(found, cuts, strict=True))
+    ]
+    axes = Axes(force_title([c.signals for c in found]), "share of time [%]")
+    note = "Interval of interest of each run."
+    return Chart("histogram", "Histogram", {"data": traces, "layout": axes.layout()}, note, 340)
+
+
+def _staircase(edges: FloatArray, heights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the outline of a histogram."""
+    return np.repeat(edges, 2), np.concatenate(([0.0], np.repeat(heights, 2), [0.0]))
+
+
+def _spectrum(found: Sequence[Column]) -> Chart:
+    chosen = [(i, c) for i, c in enumerate(found) if np.count_nonzero(c.signals.inside) > 16]
+    traces = [spectrum_trace(c.signals, Curve(i, c.name, 1.4)) for i, c in chosen]
+    layout = Axes("frequency [Hz]", "power spectral density [N\u00b2/Hz]").layout()
+    layout["xaxis"] |= {"type": "log", "tickvals": [0.5, 1, 2, 5, 10, 20, 50, 100]}
+    layout["yaxis"] |= {"type": "log", "exponentformat": "power"}
+    note = "Force as computed, interval of interest of each run."
+    return Chart("spectrum", "Spectrum", {"data": traces, "layout": layout}, note, 380)
+
+
+def _bands(found: Sequence[Column]) -> Chart:
+    names = ["whole", *(f"{b} Hz" for b in _BANDS)]
+    traces = []
+    for i, c in enumerate(found):
+        q = c.assessment.quality
+        traces.append({**grouped_bars(i, c.name), "x": names, "y": [q.sigma, *(q.sigma_bands[b] for b in _BANDS)]})
+    layout = {**Axes("band", "standard deviation [N]").layout(), "barmode": "group"}
+    return Chart("bands", "Standard deviation per band", {"data": traces, "layout": layout}, "", 320)
+
+
+def _uplift(found: Sequence[Column]) -> Chart:
+    runs = {id(c.run): (i, c) for i, c in reversed(list(enumerate(found)))}
+    traces: list[dict[str, Any]] = []
+    for i, c in sorted(runs.values(), key=lambda entry: entry[0]):
+        own = [u for u in c.run.uplifts if u.component == c.assessment.contact.catenary]
+        if own:
+            traces.append({**uplift_trace(own, c.name, i), "width": None})
+    layout = {**Axes("track position of the support [m]", "largest uplift [mm]").layout(), "barmode": "group"}
+    return Chart("uplift", "Uplift at the supports", {"data": traces, "layout": layout}, "Whole run.", 340)
+
+
+def _input_section(runs: Sequence[Results]) -> list[str]:
+    if len(runs) < 2:
+        return []
+    rows = differing_inputs([run.summary for run in runs])
+    heads = ["input", *run_names([run.folder for run in runs])]
+    shown = html_markup.table(heads, rows) if rows else "<p>The inputs are the same.</p>"
+    return ["<h2>Inputs that differ</h2>", shown]
+
+
+def _quality_section(runs: Sequence[Results]) -> list[str]:
+    tables = [dict(quality_rows(run.summary)) for run in runs]
+    names = list(dict.fromkeys(name for table in tables for name in table))
+    rows = [(name, *(table.get(name, "-") for table in tables)) for name in names]
+    heads = ["what", *run_names([run.folder for run in runs])]
+    return ["<h2>Numerical quality</h2>", html_markup.table(heads, rows, numbers=False)]

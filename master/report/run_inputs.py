@@ -1,0 +1,179 @@
+"""What went into a run, with its provenance: parameters, FMUs, versions, settings."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from master.ssp.run_settings import OPTIONS
+
+_SOURCE: Final = re.compile(r"\s*\[(?P<source>[^\[\]]*)\]\s*$")
+
+
+@dataclass(frozen=True)
+class Input:
+    """One parameter of a component.
+
+    Attributes
+    ----------
+    name, value, unit, description, source : str
+        As shown; the source is the last bracket of the FMU's description.
+    changed : bool
+        Whether the scenario or the command line set it; otherwise it is the FMU's start value.
+    """
+
+    name: str
+    value: str
+    unit: str
+    description: str
+    source: str
+    changed: bool
+
+
+def inputs_of(component: Mapping[str, Any]) -> list[Input]:
+    """Return the parameters of a component of summary.json; of older runs only those that were set."""
+    listed: Sequence[Mapping[str, Any]] = component.get("inputs") or [
+        {"name": n, "value": v, "changed": True} for n, v in component.get("parameters", {}).items()
+    ]
+    return [_input(entry) for entry in listed]
+
+
+def _input(entry: Mapping[str, Any]) -> Input:
+    description, source = split_source(str(entry.get("description", "")))
+    changed = bool(entry.get("changed"))
+    if changed:
+        source = "scenario or command line" + (f"; the FMU's own: {source}" if source else "")
+    unit = str(entry.get("unit", ""))
+    return Input(entry["name"], number(entry.get("value")), "" if unit == "1" else unit, description, source, changed)
+
+
+def split_source(description: str) -> tuple[str, str]:
+    """Split a description into its text and the source in its last bracket.
+
+    Examples
+    --------
+    >>> split_source("tension [Table 5.2]")
+    ('tension', 'Table 5.2')
+    >>> split_source("speed")
+    ('speed', '')
+    """
+    match = _SOURCE.search(description)
+    return (description[: match.start()], match["source"]) if match else (description, "")
+
+
+def number(value: Any) -> str:
+    """Return a value as short as its meaning allows.
+
+    Examples
+    --------
+    >>> number("6.549999999999999e-05"), number(83.3333333333333), number(True), number(None)
+    ('6.55e-05', '83.3333', 'True', '-')
+    """
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return str(value)
+    try:
+        return f"{float(value):.6g}"
+    except (TypeError, ValueError):
+        return str(value)
+
+
+def differing_inputs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """Return the parameters that are not the same in all runs: name with unit, then one value per run."""
+    tables = [_table(summary) for summary in runs]
+    names = list(dict.fromkeys(name for table in tables for name in table))
+    rows = [(name, *(table.get(name, "-") for table in tables)) for name in names]
+    return [row for row in rows if len(set(row[1:])) > 1]
+
+
+def _table(summary: Mapping[str, Any]) -> dict[str, str]:
+    settings = summary.get("settings", {})
+    coupling = settings.get("coupling", {})
+    found = {"scheme": str(coupling.get("scheme", "-")), "step [s]": number(settings.get("step"))}
+    found |= {f"scheme, {name}": text for name, text in scheme_options(coupling)}
+    for section in ("interval", "filter", "limits"):
+        found |= {f"{section}, {k}": str(v) for k, v in (settings.get(section) or {}).items() if v is not None}
+    for component in summary.get("components", []):
+        found[f"FMU of {component['name']}"] = f"{component.get('fmu', '-')} ({component.get('sha256', '-')[:8]})"
+        for i in inputs_of(component):
+            found[f"{component['name']}.{i.name}" + (f" [{i.unit}]" if i.unit else "")] = i.value
+    return found
+
+
+def scheme_options(coupling: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the options that a run's coupling scheme went by, as name and text.
+
+    Examples
+    --------
+    >>> scheme_options({"scheme": "gauss-seidel", "order": ["pantograph", "catenary"], "tolerance": 1e-8})
+    [('order', 'pantograph catenary')]
+    """
+    names = OPTIONS.get(coupling.get("scheme", ""), ())
+    return [(name.replace("_", " "), _option(coupling[name])) for name in names if name in coupling]
+
+
+def _option(value: Any) -> str:
+    return (" ".join(map(str, value)) or "as in the scenario") if isinstance(value, list | tuple) else number(value)
+
+
+def quality_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return how well and how fast the run was computed."""
+    settings, performance = summary.get("settings", {}), summary.get("performance", {})
+    coupling = settings.get("coupling", {})
+    rows = [
+        ("coupling scheme", str(coupling.get("scheme", "-"))),
+        ("macro step", f"{1e3 * (settings.get('step') or 0.0):g} ms"),
+    ]
+    told = {c["name"]: c["tolerance"] for c in summary.get("components", []) if c.get("tolerance") is not None}
+    rows += [(f"tolerance told to the FMU of {name}", f"{value:g}") for name, value in told.items()]
+    rows += [(f"{name} of the scheme", text) for name, text in scheme_options(coupling)]
+    rows += [("not as asked for", text) for text in summary.get("adjustments", [])]
+    for p in summary.get("interface_power", []):
+        text = "not finite: the values exchanged were too large"
+        if None not in (p["energy"], p["transferred"], p["rms"]):
+            share = 100.0 * p["energy"] / p["transferred"] if p["transferred"] else 0.0
+            text = f"{p['energy']:.3g} J of {p['transferred']:.4g} J exchanged ({share:.2f} %), rms {p['rms']:.3g} W"
+        rows.append((f"interface residual, contact {p['contact']}", text))
+    rows += [(f"energy, {b['what']}", b["text"]) for b in summary.get("energy", [])]
+    if performance:
+        rows += _performance_rows(performance)
+    return rows
+
+
+def _performance_rows(performance: Mapping[str, Any]) -> list[tuple[str, str]]:
+    wall = performance.get("wall_time", 0.0)
+    rows = [
+        ("wall time", f"{wall:.2f} s, initialization {performance.get('initialisation_time', 0.0):.2f} s"),
+        ("real-time factor", f"{performance.get('real_time_factor', 0.0):.2f} (simulated over wall time)"),
+    ]
+    steps = performance.get("component_time", {})
+    rows += [(f"time in {name}", f"{t:.2f} s ({100.0 * t / wall if wall else 0.0:.0f} %)") for name, t in steps.items()]
+    paced = performance.get("real_time")
+    # Isolated components step at the same time, and a paced run waits: then the difference means nothing.
+    if steps and wall and not performance.get("isolated") and not paced:
+        rest = wall - sum(steps.values())
+        rows.append(("time in the master", f"{rest:.2f} s ({100.0 * rest / wall:.0f} %): exchange, recording"))
+    if paced:
+        late = f"{paced['missed']} of {paced['steps']} deadlines missed, by {1e3 * paced['lateness']['maximum']:.3g} ms"
+        rows.append((f"real time x {paced['factor']:g}", f"{late} at most"))
+    if "peak_memory" in performance:
+        rows.append(("peak memory", f"{performance['peak_memory']:.0f} MB"))
+    return rows
+
+
+def _identity(component: Mapping[str, Any]) -> tuple[str, str]:
+    return f"sha256 {component.get('sha256', '-')}", f"GUID {component.get('guid', '-')}"
+
+
+def provenance_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return where and with what the run was computed."""
+    rows = [("scenario", str(summary.get("scenario", ""))), ("date", str(summary.get("date", "")))]
+    rows += [
+        (f"FMU of {c['name']}", ", ".join([c.get("fmu", "-"), c.get("tool", ""), *_identity(c)]))
+        for c in summary.get("components", [])
+    ]
+    rows += [(f"version of {k}", str(v)) for k, v in summary.get("versions", {}).items()]
+    return rows

@@ -1,0 +1,357 @@
+"""The contact wire as a strip meets it: elements along the track, their shape and their static height.
+
+An element's nodes move with its interval: with its modes q and with the displacements x of the two attachments.
+Local coordinates of an interval are these, one after the other.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from models.catenary.linear_motion.interval_modes import IntervalModes, IntervalMotion
+from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
+from models.catenary.shape.form_finding import StaticState
+from models.catenary.shape.line_matrices import element_dofs
+from models.catenary.shape.line_mesh import Chain
+from models.catenary.shape.wire_intervals import Interval, turns
+from models.contact_law import crossing, engagement
+from models.definition_files.parameter import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class WireInterval:
+    """A contact wire between two attachments: k + 1 elements, m local coordinates.
+
+    Attributes
+    ----------
+    first : int
+        Its first element.
+    modes : slice
+        Its modes.
+    count, size : int
+        How many these are; how many local coordinates, m.
+    sides : (ndarray, ndarray)
+        Places of its two attachments' displacements.
+    ends : ndarray, shape (e,)
+        The same, one after the other.
+    plan : ndarray, shape (2 k + 4, m)
+        Displacement in plan, x and y, of its k + 2 nodes.
+    plan_static : ndarray, shape (2 k + 4,)
+        Static position of its nodes in plan [m].
+    height : ndarray, shape (k + 1, 4, m)
+        Height above the static shape = [1, xi, xi^2, xi^3] @ height[element] @ local coordinates.
+    height_static : ndarray, shape (k + 1, 4)
+        Static height = [1, xi, xi^2, xi^3] @ height_static[element] [m].
+    """
+
+    first: int
+    modes: slice
+    count: int
+    size: int
+    sides: tuple[IntArray, IntArray]
+    ends: IntArray
+    plan: FloatArray
+    plan_static: FloatArray
+    height: FloatArray
+    height_static: FloatArray
+
+    def positions(self, local: FloatArray) -> list[float]:
+        """Return the positions of its nodes in plan, x and y in turn [m]."""
+        return (self.plan_static + self.plan.dot(local)).tolist()
+
+    def touch(self, element: int, xi: float) -> Touch:
+        """Return a point of one of its elements, counted from 0."""
+        powers, count = np.array((1.0, xi, xi * xi, xi * xi * xi)), self.count
+        row = powers.dot(self.height[element])
+        return Touch(self, row, row[:count], row[count:], float(powers.dot(self.height_static[element])))
+
+    def at(self, found: Crossing, local: FloatArray) -> tuple[float, float]:
+        """Return a point of the interval in plan from its local coordinates [m]."""
+        k = 2 * (found.element - self.first)
+        x1, y1, x2, y2 = (self.plan_static[k : k + 4] + self.plan[k : k + 4].dot(local)).tolist()
+        return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1)
+
+
+class Touch(NamedTuple):
+    """A point of a contact wire.
+
+    Attributes
+    ----------
+    interval : WireInterval
+    row : ndarray, shape (m,)
+        What unit local coordinates lift it by; or what a unit vertical force on it does to them.
+    modal, ends : ndarray, shape (n_span,), (e,)
+        The parts of ``row``.
+    height : float
+        Static height [m].
+    """
+
+    interval: WireInterval
+    row: FloatArray
+    modal: FloatArray
+    ends: FloatArray
+    height: float
+
+
+class Crossing(NamedTuple):
+    """Where a strip crosses a wire in plan.
+
+    Attributes
+    ----------
+    element : int
+        Of the wire.
+    xi : float
+        Share of the way along the element.
+    share : float
+        Share of the way along the strip.
+    engagement : float
+        How much of the contact acts.
+    """
+
+    element: int
+    xi: float
+    share: float
+    engagement: float = 1.0
+
+
+#: A strip farther than this from the ends of a wire does not meet it, however the wire moves [m].
+_FAR = 1.0
+
+#: Positions in plan of an interval's nodes, x and y in turn [m], from wherever its motion is known.
+Positions = Callable[[WireInterval], Sequence[float]]
+
+
+class ContactWire:
+    """Contact wire of one section.
+
+    One that closes on itself (``period`` > 0) is met at the same place after every lap; a strip is looked for in the
+    lap of the elements, and may cross the wire on either side of the place where it closes.
+
+    Parameters
+    ----------
+    chain : Chain
+        Its nodes.
+    parts : sequence of (Interval, slice)
+        Its intervals, from end to end, and their modes.
+    static : StaticState
+    modes : IntervalModes
+        Coordinates of the line.
+    angles : ndarray, shape (n,)
+        Direction of the nodal axes in plan [rad].
+    period : float
+        Length after which the wire is met again, because it closes on itself [m]; 0 for one that ends.
+    """
+
+    def __init__(
+        self,
+        chain: Chain,
+        parts: Sequence[tuple[Interval, slice]],
+        static: StaticState,
+        modes: IntervalModes,
+        angles: FloatArray,
+        period: float = 0.0,
+    ) -> None:
+        self.period = period
+        self._starts: list[float] = static.positions[chain.nodes, 0].tolist()
+        self.intervals = _intervals(parts, static, modes, angles)
+        self._of_element = [i for i in self.intervals for _ in i.height]
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Return where the wire begins and ends along the track [m]."""
+        return self._starts[0], self._starts[-1]
+
+    @property
+    def elements(self) -> int:
+        """Return the number of its elements."""
+        return len(self._of_element)
+
+    def is_near(self, strip: FloatArray) -> bool:
+        """Return whether a strip could meet the wire, which may end before it.
+
+        Parameters
+        ----------
+        strip : ndarray, shape (2, 2, 3)
+            Ends A and B; position and velocity.
+        """
+        a, b = float(strip[0, 0, 0]), float(strip[1, 0, 0])
+        return self.period > 0.0 or (max(a, b) > self._starts[0] - _FAR and min(a, b) < self._starts[-1] + _FAR)
+
+    def locate(self, x: float) -> tuple[int, float]:
+        """Return the element at a position of the track and the share of the way along it, in the static shape."""
+        x -= self._laps(x) * self.period
+        element = self.start(-1, x)
+        start, end = self._starts[element : element + 2]
+        return element, (x - start) / (end - start)
+
+    def interval(self, element: int) -> WireInterval:
+        """Return the interval that an element belongs to."""
+        return self._of_element[element]
+
+    def next_interval(self, element: int) -> WireInterval:
+        """Return the interval after that of an element; the last one of a wire that ends follows itself."""
+        after, count = self._of_element[element].first + len(self._of_element[element].height), self.elements
+        return self._of_element[after % count if self.period else min(after, count - 1)]
+
+    def touch(self, element: int, xi: float) -> Touch:
+        """Return a point of an element."""
+        interval = self._of_element[element]
+        return interval.touch(element - interval.first, xi)
+
+    def find(self, strip: FloatArray, positions: Positions, guess: int) -> Crossing | None:
+        """Find where a strip crosses the wire, walking from the element ``guess``.
+
+        Parameters
+        ----------
+        strip : ndarray, shape (2, 2, 3)
+            Ends A and B; position and velocity.
+        positions : callable
+            Interval -> positions in plan of its nodes, x and y in turn [m].
+
+        Returns
+        -------
+        Crossing or None
+            None beyond the wire's ends, or where the wire passes beside the strip.
+        """
+        a, b = strip[:, 0].tolist()
+        if self.period:
+            self._shift(a, b, -self._laps((a[0] + b[0]) / 2.0))
+        element = self.start(guess, (a[0] + b[0]) / 2.0)
+        last = len(self._of_element) - 1
+        interval: WireInterval | None = None
+        at: Sequence[float] = ()
+        direction, round_trips = 0, 0
+        while True:
+            if interval is not self._of_element[element]:
+                interval = self._of_element[element]
+                at = positions(interval)
+            k = 2 * (element - interval.first)
+            found = crossing(a, b, at[k : k + 2], at[k + 2 : k + 4])
+            if found is None:
+                return None
+            share, xi = found
+            step = -1 if xi < 0.0 else (1 if xi > 1.0 else 0)
+            if step == 0 or step == -direction:
+                return self.crossing(strip, element, min(max(xi, 0.0), 1.0), share) if 0.0 <= share <= 1.0 else None
+            direction = step
+            element += step
+            if not 0 <= element <= last:
+                round_trips += 1
+                if not self.period or round_trips > 1:  # a strip along the track may cross nowhere near
+                    return None
+                element %= last + 1
+                self._shift(a, b, -step)
+
+    def crossing(self, strip: FloatArray, element: int, xi: float, share: float) -> Crossing:
+        """Return a crossing from its place on an element and on the strip."""
+        a, b = strip[:, 0, :2].tolist()
+        start, end = self._starts[element : element + 2]
+        x = start + xi * (end - start)
+        from_wire_end = math.inf if self.period else min(x - self._starts[0], self._starts[-1] - x)
+        return Crossing(element, xi, share, engagement(min(share, 1.0 - share) * math.dist(a, b), from_wire_end))
+
+    def start(self, guess: int, x: float) -> int:
+        """Return where to begin walking; a guess that is far off (first step, reset) is replaced by a search."""
+        if 0 <= guess < len(self._of_element) and abs(self._starts[guess] - x) < 5.0:
+            return guess
+        found = bisect_left(self._starts, x) - 1
+        return min(max(found, 0), len(self._of_element) - 1)
+
+    def in_lap(self, strip: FloatArray) -> FloatArray:
+        """Return a strip in the lap of the elements of a wire that closes on itself; on one that ends, the strip.
+
+        Parameters
+        ----------
+        strip : ndarray, shape (2, 2, 3)
+            Ends A and B; position and velocity.
+        """
+        laps = self._laps(0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
+        if not laps:
+            return strip
+        moved = strip.copy()
+        moved[:, 0, 0] -= laps * self.period
+        return moved
+
+    def alongside(self, x: FloatArray, place: FloatArray) -> FloatArray:
+        """Return places along the track of a wire that closes on itself in the lap of strips near them.
+
+        Parameters
+        ----------
+        x : ndarray, shape (P,)
+            Where the strips are [m].
+        place : ndarray, shape (P,)
+            As its elements stand [m]; NaN stays.
+        """
+        return place + self.period * np.round((x - place) / self.period)
+
+    def _laps(self, x: float) -> int:
+        """Return how often a position of the track has gone round a wire that closes on itself; 0 on one that ends."""
+        return math.floor((x - self._starts[0]) / self.period) if self.period else 0
+
+    def _shift(self, a: list[float], b: list[float], laps: int) -> None:
+        """Move the ends of a strip by whole laps."""
+        a[0] += laps * self.period
+        b[0] += laps * self.period
+
+
+def height_polynomials(nodes: IntArray, static: StaticState, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return heights of the elements between successive nodes as polynomials of xi.
+
+    Returns
+    -------
+    rows : ndarray, shape (k, 4, 12)
+        Of the height above the static shape, over the nodal displacements of an element.
+    static : ndarray, shape (k, 4)
+        Of the static height [m].
+    """
+    pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
+    axes, length = frames(static.points[pairs[:, 0]], static.points[pairs[:, 1]])
+    rows = np.array([hermite_rows(axis, float(size)) for axis, size in zip(axes, length, strict=True)])
+    local = static.displacement[element_dofs(pairs)].copy()
+    # The static rotations count from a horizontal wire; the chord's own slope is in the reference height.
+    local[:, [4, 10]] += axes[:, 0, 2, None]
+    local[:, [5, 11]] -= axes[:, 0, 1, None]
+    height = np.einsum("kij,kj->ki", rows, local)
+    z = static.points[pairs, 2]
+    height[:, 0] += z[:, 0]
+    height[:, 1] += z[:, 1] - z[:, 0]
+    turn = turns(angles)[np.repeat(pairs, 2, axis=1)]
+    return np.einsum("kibj,kbjm->kibm", rows.reshape(-1, 4, 4, 3), turn).reshape(rows.shape), height
+
+
+def _intervals(
+    parts: Sequence[tuple[Interval, slice]], static: StaticState, modes: IntervalModes, angles: FloatArray
+) -> tuple[WireInterval, ...]:
+    motion = IntervalMotion(modes)
+    nodes = np.concatenate([parts[0][0].nodes[:1], *(part.nodes[1:] for part, _ in parts)])
+    rows, height = height_polynomials(nodes, static, angles)
+    result, first = [], 0
+    for part, span in parts:
+        count = len(part.nodes) - 1
+        here = slice(first, first + count)
+        sides, local = motion.rows(part, span)
+        by_node = local.reshape(count + 1, NODE_DOFS, -1)
+        of_element = np.concatenate([by_node[:-1], by_node[1:]], axis=1)
+        plan = np.einsum("nij,njm->nim", turns(angles[part.nodes])[:, :2, :2], by_node[:, :2])
+        result.append(
+            WireInterval(
+                first=first,
+                modes=span,
+                count=span.stop - span.start,
+                size=local.shape[1],
+                sides=sides,
+                ends=np.concatenate(sides),
+                plan=np.ascontiguousarray(plan.reshape(2 * (count + 1), -1)),
+                plan_static=static.positions[part.nodes, :2].ravel(),
+                height=rows[here] @ of_element,
+                height_static=height[here],
+            )
+        )
+        first += count
+    return tuple(result)

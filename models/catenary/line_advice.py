@@ -1,0 +1,142 @@
+"""Limits with a physical meaning: what a run may still do, but whose results deserve a second look.
+
+Every function returns a sentence for the user, empty where there is nothing to say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+from models.catenary.definition.line_definition import CatenaryDefinition, Contact
+from models.catenary.statics.elasticity import OPERATION_LIMIT, contact_wire_wave_speed
+from models.definition_files.parameter import FloatArray
+
+#: Contact force at which the stiffness of a law with an exponent is taken [N].
+_REFERENCE_FORCE: Final = 200.0
+#: Largest step over the relaxation time of wire and contact spring, and fewest steps per period of a mass on it.
+_LARGEST_SHARE: Final = 0.25
+_STEPS_PER_PERIOD: Final = 20.0
+#: Most droppers that are named one by one.
+_NAMED: Final = 8
+
+
+#: Longest delay of slack [s], and the rate of a dropper's elongation that it is told for [m/s].
+_LONGEST_DELAY: Final = 1e-3
+_STRETCHING: Final = 0.5
+
+
+class Named(Protocol):
+    """A dropper: its name and where it is."""
+
+    @property
+    def name(self) -> str:
+        """Return the name."""
+
+    @property
+    def x(self) -> float:
+        """Return the position along the track [m]."""
+
+
+def speed_warning(definition: CatenaryDefinition, speed: float) -> str:
+    """Say so if a train is too fast for the waves in the contact wire.
+
+    Lines are operated up to 0.7 of the wave speed; from the wave speed on no wave runs ahead of the strip, and the
+    wire's deflection grows as it would under a supersonic source. The wave speed is that of the longest span, the
+    lowest of the line.
+
+    Parameters
+    ----------
+    definition : CatenaryDefinition
+    speed : float
+        Of the train, either way [m/s].
+    """
+    C = contact_wire_wave_speed(definition)
+    ratio = abs(speed) / C
+    if ratio <= OPERATION_LIMIT:
+        return ""
+    told = f"the train's {3.6 * abs(speed):.0f} km/h are {ratio:.2f} of the contact wire's wave speed"
+    told += f", {3.6 * C:.0f} km/h"
+    if ratio < 1.0:
+        return f"{told}: lines are operated up to {OPERATION_LIMIT:g} of it (EN 50119)"
+    return f"{told}: no wave runs ahead of the strip, which small displacements do not describe; run slower"
+
+
+def longest_step(definition: CatenaryDefinition, head_mass: float = math.inf) -> float:
+    """Return the longest step for which exchanging force and position once per step is harmless [s].
+
+    Seen from the contact, a long wire is a damper: a force sends transverse waves both ways, F = 2 sqrt(T rho) v.
+    With the contact spring K it forms a system of relaxation time 2 sqrt(T rho) / K. Force and position that are
+    one step H apart act like a damping -K H across that spring, so their ratio H K / (2 sqrt(T rho)) says how much of
+    the wire's own damping is lost; a quarter is allowed. On the other side the collector head's mass m oscillates on
+    the spring with the period 2 pi sqrt(m / K), which twenty steps resolve (a phase error of less than one per cent).
+
+    Parameters
+    ----------
+    definition : CatenaryDefinition
+    head_mass : float
+        Mass next to the contact; without it only the wire counts [kg].
+    """
+    K = tangent_stiffness(definition.contact)
+    wire = definition.contact_wire
+    relaxation = 2.0 * math.sqrt(wire.tension * wire.mass) / K
+    period = 2.0 * math.pi * math.sqrt(head_mass / K)
+    return min(_LARGEST_SHARE * relaxation, period / _STEPS_PER_PERIOD)
+
+
+def tangent_stiffness(contact: Contact) -> float:
+    """Return dF/dp of F = K p^n at a usual contact force [N/m].
+
+    Examples
+    --------
+    >>> tangent_stiffness(Contact(stiffness=20000.0))
+    20000.0
+    """
+    n, K = contact.exponent, contact.stiffness
+    return n * K ** (1.0 / n) * _REFERENCE_FORCE ** (1.0 - 1.0 / n)
+
+
+def step_warning(definition: CatenaryDefinition, step: float, head_mass: float = math.inf) -> str:
+    """Say so if a step, of the coupling or inside a part, is longer than `longest_step` [s]."""
+    longest = longest_step(definition, head_mass)
+    if step <= longest:
+        return ""
+    return (
+        f"a step of {1e3 * step:.3g} ms is long for a contact stiffness of {definition.contact.stiffness:g} N/m: "
+        f"take {1e3 * longest:.2g} ms or less"
+    )
+
+
+def slack_warning(droppers: Sequence[Named], force: FloatArray) -> str:
+    """Say which droppers are slack at rest.
+
+    Parameters
+    ----------
+    droppers : sequence
+        In the order of ``force``.
+    force : ndarray, shape (n_droppers,)
+        Static tension [N].
+    """
+    slack = [d for d, f in zip(droppers, force.tolist(), strict=True) if f <= 0.0]
+    if not slack:
+        return ""
+    listed = ", ".join(f"{d.name} at {d.x:.2f} m" for d in slack[:_NAMED])
+    more = f" and {len(slack) - _NAMED} more" if len(slack) > _NAMED else ""
+    is_one = len(slack) == 1
+    return f"{'dropper' if is_one else 'droppers'} {listed}{more} {'is' if is_one else 'are'} slack at rest"
+
+
+def slack_law_warning(definition: CatenaryDefinition) -> str:
+    """Say so if droppers pull well before they are taut: N = max(0, k e + alpha k e') with a large alpha."""
+    alpha = definition.damping.of("dropper").alpha
+    hung = (("dropper", definition.dropper), ("hanger", definition.hanger))
+    named = [f"[{name}]" for name, item in hung if item is not None and item.slack_law == "tension"]
+    if not named or alpha <= _LONGEST_DELAY:
+        return ""
+    return (
+        f'with slack_law = "tension" and alpha = {alpha:g} s a dropper that lengthens at {_STRETCHING:g} m/s pulls '
+        f"{1e3 * alpha * _STRETCHING:.2g} mm before it is taut: give droppers a damping of their own, "
+        f'[damping.dropper] with alpha up to {_LONGEST_DELAY:g} s, or write slack_law = "elastic_only" in '
+        f"{' and '.join(named)}"
+    )

@@ -1,0 +1,567 @@
+"""The line as a dynamic system: displacements from its static shape, one step at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, fields
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+
+from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
+from models.catenary.contact_and_slack.local_problem import LocalForces, LocalProblem, LocalSolutionError, OpenContact
+from models.catenary.contact_and_slack.wire_response import Meeting, Reaction
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.linear_motion.compliance import Compliance
+from models.catenary.linear_motion.interval_modes import IntervalModes, interval_modes, slower_than
+from models.catenary.linear_motion.line_motion import LineMotion
+from models.catenary.linear_motion.sparse_products import Product, inner
+from models.catenary.meeting import FreeMotion
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_form
+from models.catenary.shape.line_matrices import (
+    compression_ratio,
+    dropper_rows,
+    dropper_stiffness,
+    pendulum_stiffness,
+    slack_delay,
+)
+from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
+from models.catenary.shape.wire_intervals import (
+    Interval,
+    attachments,
+    intervals,
+    plan_angles,
+    plan_rotation,
+    without_rounding,
+)
+from models.catenary.step.numba_engine import make_stepper
+from models.catenary.step.numpy_engine import Known, Stepper, local_motion
+from models.contact_law import CONTACT_LAWS
+from models.definition_files.parameter import BoolArray, FloatArray, IntArray, Snapshot
+from models.numerics.newmark import Newmark
+
+#: Step sizes whose factorisation is kept.
+_KEPT_STEPS = 3
+#: Intervals of the contact wires whose response is kept.
+_KEPT_INTERVALS = 12
+#: No forces on the contact wires.
+_NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
+
+
+@dataclass
+class CatenaryState:
+    """State of a line, changed in place by a step.
+
+    Attributes
+    ----------
+    motion : LineMotion
+    slack : ndarray of int
+        Slack droppers.
+    compensation : ndarray
+        What each of them lacks to the force that it would carry if it could push [N].
+    element : ndarray of int, shape (n_pantographs, n_sections)
+        Element of the contact wire met last.
+    impact_velocity : ndarray, shape (n_pantographs, n_sections)
+        Velocity at impact of the closed contacts [m/s], 0 where open.
+    loaded : ndarray of int, shape (k, 2)
+        Section and element of every force on a contact wire.
+    load : ndarray, shape (k, 2)
+        Its place on the element, xi, and its value [N].
+    """
+
+    motion: LineMotion
+    slack: IntArray
+    compensation: FloatArray
+    element: IntArray
+    impact_velocity: FloatArray
+    loaded: IntArray
+    load: FloatArray
+
+    def snapshot(self) -> Snapshot:
+        """Return copies of all arrays."""
+        return {name: getattr(self, name).copy() for name in self._arrays()} | self.motion.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over the arrays of a snapshot."""
+        self.motion.restore(snapshot)
+        for name in self._arrays():
+            setattr(self, name, snapshot[name].copy())
+
+    def _arrays(self) -> Iterator[str]:
+        return (item.name for item in fields(self) if item.name != "motion")
+
+
+@dataclass
+class ContactResult:
+    """Contacts of one step.
+
+    Attributes
+    ----------
+    force : ndarray, shape (n_pantographs, n_sections)
+        Contact force [N].
+    point : ndarray, shape (n_pantographs, n_sections, 3)
+        Point of contact on the wire, NaN where strip and wire do not cross [m].
+    """
+
+    force: FloatArray
+    point: FloatArray
+
+
+@dataclass
+class StripMotion:
+    """Strips at the end of a step, were there no contact force within it.
+
+    Attributes
+    ----------
+    strip : ndarray, shape (n_pantographs, 2, 2, 3)
+        End A, B; position, velocity; x, y, z.
+    compliance : ndarray, shape (n_pantographs,)
+        How far a strip gives way within the step per force [m/N]; 0 for prescribed strips.
+    """
+
+    strip: FloatArray
+    compliance: FloatArray
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What belongs to one step size; ``pull`` finds what a change of the attachments in it adds to droppers' pulls."""
+
+    stepper: Stepper
+    pull: Product
+    compliance: Compliance
+    local: LocalProblem
+    reactions: dict[tuple[int, int], Reaction] = field(default_factory=dict)
+
+
+class CatenaryModel:
+    """A line ready to step: static shape found, matrices in modes of intervals and displacements of attachments.
+
+    Parameters
+    ----------
+    definition : CatenaryDefinition
+
+    Raises
+    ------
+    EquilibriumError
+        If the line has no static equilibrium of the wanted shape, or none that it could move about.
+    ParameterError
+        If the definition leaves out all modes of the wires.
+    """
+
+    def __init__(self, definition: CatenaryDefinition) -> None:
+        self.definition = definition
+        self.mesh: CatenaryMesh = build_mesh(definition)
+        self.static: StaticState = find_form(definition, self.mesh)
+        self.dropper_stiffness = dropper_stiffness(definition, self.mesh, self.static.positions)
+        #: What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
+        self.rest_compensation = self.static.dropper_force - self.static.elastic_force
+        self.unilateral = 1.0 - compression_ratio(definition, self.mesh)
+        self.slack_delay = slack_delay(definition, self.mesh)
+        attached = attachments(self.mesh)
+        by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
+        self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.points)
+        #: Coordinates of the line.
+        with self._solvable("move in modes of its intervals"):
+            self.modes = self._modes([part for parts in by_wire for part in parts])
+        self.B = self._dropper_rows()
+        self._rest_load = self.B.T @ self.rest_compensation
+        #: Elastic forces of the droppers from the attachments' displacements; those of their dampers from velocities.
+        self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
+        alpha = definition.damping.of("dropper").alpha
+        self._damp = Product(alpha * sp.diags(self.dropper_stiffness) @ self.B)
+        #: Their pulls at the end of a step from the attachments' motion at its beginning; `_Step.pull` finds the rest.
+        self._pull = self._pulls()
+        #: What each of them pulls at.
+        self._stretch = [(row.indices, row.data) for row in self.B]
+        self.wires = tuple(self._wires(by_wire))
+        self.uplift_places = self.modes.place[self.mesh.support_nodes * NODE_DOFS + 2]
+        self._law = CONTACT_LAWS[definition.contact.law]
+        self._radii = definition.contact.wire_radius + definition.contact.strip_radius
+        self._steps: dict[float, _Step] = {}
+
+    def _pulls(self) -> Product:
+        """Return k (x - w v), w the delay of the slack: v turns to a1 dx - v in a step."""
+        k = self.dropper_stiffness
+        by_velocity = sp.csr_matrix(sp.diags(-k * self.slack_delay) @ self.B)
+        by_velocity.eliminate_zeros()
+        return Product(sp.hstack([sp.diags(k) @ self.B, by_velocity]))
+
+    def initial_state(self, pantographs: int = 1) -> CatenaryState:
+        """Return the line at rest in its static shape."""
+        shape = pantographs, len(self.wires)
+        return CatenaryState(
+            motion=LineMotion.at_rest(self.modes),
+            slack=np.flatnonzero(self.rest_compensation),
+            compensation=self.rest_compensation[self.rest_compensation > 0.0],
+            element=np.full(shape, -1),
+            impact_velocity=np.zeros(shape),
+            loaded=_NOWHERE,
+            load=_NOTHING,
+        )
+
+    def rehearse(self, step: float, strips: FloatArray) -> None:
+        """Take a step with a line at rest that is thrown away, so that the first real one need not lay anything out.
+
+        Factorisation, compiled code and the responses about the strips are there afterwards: a paced run must not wait.
+
+        Parameters
+        ----------
+        step : float
+            Time step [s].
+        strips : ndarray, shape (n_pantographs, 2, 2, 3)
+        """
+        with suppress(LocalSolutionError):  # the real step will tell, if it finds the same
+            self.step(self.initial_state(len(strips)), step, StripMotion(strips, np.zeros(len(strips))))
+
+    def step(self, state: CatenaryState, step: float, motion: StripMotion) -> ContactResult:
+        """Advance the line by one time step under moving strips.
+
+        Parameters
+        ----------
+        state : CatenaryState
+            Changed in place.
+        step : float
+            Time step [s].
+        motion : StripMotion
+            Strips at the end of the step.
+
+        Returns
+        -------
+        ContactResult
+
+        Raises
+        ------
+        LocalSolutionError
+            If slack and contact forces are not found.
+        EquilibriumError
+            If the line cannot make steps of this length.
+        """
+        now = self._step(step)
+        free_force = self._begin(now, state)
+        contacts, crossings = self._open_contacts(now, state, motion)
+        compliance = self._strip_compliance(contacts, motion)
+        forces = now.local.solve(free_force, contacts, compliance, state.slack)
+        self._apply(now, contacts, forces)
+        now.stepper.finish(state.motion)
+        self._note(state, contacts, forces)
+        return self._in_lap(self._result(now, state, contacts, crossings, forces), motion.strip)
+
+    def push(self, state: CatenaryState, step: float, forces: Sequence[tuple[int, float, float]]) -> None:
+        """Advance the line by one time step under given vertical forces on its contact wires.
+
+        Parameters
+        ----------
+        state : CatenaryState
+            Changed in place.
+        step : float
+            Time step [s].
+        forces : sequence of (section, x, force)
+            At the end of the step: wire section from 0, position along the track [m], force [N], positive up.
+
+        Raises
+        ------
+        LocalSolutionError
+            If the slack droppers are not found.
+        """
+        now = self._step(step)
+        pull = self._begin(now, state)
+        placed = [(s, *self.wires[s].locate(x), force) for s, x, force in forces]
+        for s, element, xi, force in placed:
+            interval = self.wires[s].interval(element)
+            point = self._reaction(now, s, interval).point(element - interval.first, xi)
+            now.stepper.apply(point, force)
+            columns = point.reaction.columns
+            pull[columns.dropper_index] += columns.dropper_force @ (force * point.load)
+        found = now.local.solve(pull, (), np.zeros((0, 0)), state.slack)
+        self._apply(now, (), found)
+        now.stepper.finish(state.motion)
+        state.slack, state.compensation = found.slack, found.compensation
+        state.loaded = np.array([(s, element) for s, element, _, _ in placed], dtype=np.int64).reshape(-1, 2)
+        state.load = np.array([(xi, force) for _, _, xi, force in placed]).reshape(-1, 2)
+
+    def contact_at_rest(self, state: CatenaryState, strips: FloatArray) -> ContactResult:
+        """Return the contacts of strips with the line as it stands, without advancing anything.
+
+        Parameters
+        ----------
+        strips : ndarray, shape (n_pantographs, 2, 2, 3)
+        """
+        result = self._empty_result(len(strips))
+        motion = partial(local_motion, motion=state.motion)
+
+        def positions(interval: WireInterval) -> list[float]:
+            return interval.positions(motion(interval)[0])
+
+        for p, strip in enumerate(strips):
+            for s, wire in enumerate(self.wires):
+                found = wire.find(strip, positions, int(state.element[p, s]))
+                if found is None:
+                    continue
+                state.element[p, s] = found.element
+                local, touch = motion(wire.interval(found.element)), wire.touch(found.element, found.xi)
+                rise, speed = local.dot(touch.row).tolist()
+                delta, rate = self._penetration(found.share, touch.height + rise, speed, strip)
+                law = self._law(delta, rate, max(rate, 0.0), self.definition.contact)
+                result.force[p, s] = law.scaled(found.engagement).force
+                result.point[p, s] = *touch.interval.at(found, local[0]), touch.height + rise
+        return self._in_lap(result, strips)
+
+    def dropper_force(self, state: CatenaryState) -> FloatArray:
+        """Return what every dropper carries under its law [N], shape (n_droppers,), its damper's part included.
+
+        By the law "tension" that is nothing where it is slack; by "elastic_only" what the damper, which knows no slack
+        there, pulls or pushes. `dropper_slack` says which ones are slack.
+        """
+        released, damper = self.spring_force(state), np.zeros(len(self.dropper_stiffness))
+        self._damp.add(state.motion.attached[1], damper)
+        together = self.slack_delay > 0.0  # spring and damper are released as one
+        released[together] += damper[together]
+        slack = state.slack
+        released[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, released[slack] + state.compensation)
+        return released + np.where(together, 0.0, damper)
+
+    def dropper_slack(self, state: CatenaryState) -> BoolArray:
+        """Return which droppers are slack, shape (n_droppers,): by the law "elastic_only" those whose spring is."""
+        slack = np.zeros(len(self.dropper_stiffness), dtype=np.bool_)
+        slack[state.slack] = True
+        return slack
+
+    def spring_force(self, state: CatenaryState) -> FloatArray:
+        """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""
+        force = self.static.elastic_force.copy()
+        self._tighten.add(state.motion.attached[0], force)
+        return force
+
+    def uplift(self, state: CatenaryState) -> FloatArray:
+        """Return the rise of the contact wire at the supports [m], shape (n_supports,)."""
+        return state.motion.attached[0].take(self.uplift_places)
+
+    def energy(self, state: CatenaryState) -> float:
+        """Return kinetic plus elastic energy from the static shape, droppers bilateral [J]."""
+        m, modes = state.motion, self.modes
+        (q, rate), (x, v) = m.modal, m.attached
+        # q' M_q q' + 2 q' G x' = q' (2 momentum - q')
+        kinetic = inner(rate, 2.0 * m.momentum - rate) + inner(v, modes.M @ v)
+        return 0.5 * (kinetic + inner(modes.eigenvalue * q, q) + inner(x, modes.K @ x))
+
+    def displacement(self, state: CatenaryState) -> FloatArray:
+        """Return the displacements and rotations of all nodes from the static shape [m, rad], shape (n, 6)."""
+        nodal = self.modes.nodal(state.motion.modal[0], state.motion.attached[0])
+        return np.asarray(plan_rotation(self._angles) @ nodal).reshape(-1, NODE_DOFS)[self.mesh.owner]
+
+    def set_velocity(self, state: CatenaryState, velocity: FloatArray) -> None:
+        """Give the nodes velocities.
+
+        Parameters
+        ----------
+        velocity : ndarray, shape (n, 6)
+            [m/s, rad/s]; what is held stays at rest.
+        """
+        modes, attached = self.modes, state.motion.attached
+        nodal = plan_rotation(self._angles).T @ velocity.ravel()
+        modal, momentum = state.motion.plain()
+        modal[1], attached[1] = modes.coordinates(nodal)
+        momentum[...] = modal[1] + modes.coupling @ (modes.turn @ attached[1])
+
+    def _modes(self, parts: Sequence[Interval]) -> IntervalModes:
+        """Return the line's coordinates and matrices, droppers included."""
+        static, Q = self.static, plan_rotation(self._angles)
+        stretch = dropper_rows(self.mesh, static.positions)
+        droppers = stretch.T @ sp.diags(self.dropper_stiffness) @ stretch
+        damping = self.definition.damping
+        C = static.matrices.C + damping.of("dropper").alpha * droppers
+        stiffness = static.matrices.K + droppers
+        if self.definition.dynamics.geometric_stiffness:
+            stiffness = stiffness + self._pendulums()  # not in C: alpha times it would be a damping that nothing has
+        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (stiffness, static.matrices.M, C))
+        K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
+        rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
+        modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel(), self.mesh.owner)
+        highest = self.definition.dynamics.highest_frequency
+        return slower_than(modes, highest) if highest else modes
+
+    def _pendulums(self) -> sp.csc_matrix:
+        """Return what the static tension of droppers and steady arms holds them back by; none where they are slack."""
+        mesh, static = self.mesh, self.static
+        tension = np.concatenate([static.dropper_force, static.arm_force])
+        return pendulum_stiffness(np.vstack([mesh.droppers, mesh.arms]), np.maximum(tension, 0.0), static.positions)
+
+    @contextmanager
+    def _solvable(self, doing: str) -> Iterator[None]:
+        """Say in words that matrices are not positive definite: their parts are too different, or it buckles."""
+        try:
+            yield
+        except np.linalg.LinAlgError as error:
+            raise EquilibriumError(
+                f"line '{self.definition.name}' cannot {doing}: {error}; check masses, tensions and stiffnesses"
+            ) from error
+
+    def _dropper_rows(self) -> sp.csr_matrix:
+        """Return the rows of dropper elongation over the attachments' displacements, which are in global axes."""
+        return dropper_rows(self.mesh, self.static.positions)[:, self.modes.attached].tocsr()
+
+    def _wires(self, by_wire: Sequence[Sequence[Interval]]) -> Iterator[ContactWire]:
+        spans = iter(self.modes.spans)
+        for chain, parts in zip(self.mesh.chains, by_wire, strict=True):
+            own = [(part, next(spans)) for part in parts]
+            if chain.component == "contact_wire":
+                period = self.definition.sections[chain.section].period
+                yield ContactWire(chain, own, self.static, self.modes, self._angles, period)
+
+    def _step(self, step: float) -> _Step:
+        found = self._steps.get(step)
+        if found is None:
+            found = self._new_step(step)
+            if len(self._steps) >= _KEPT_STEPS:
+                del self._steps[next(iter(self._steps))]
+            self._steps[step] = found
+        return found
+
+    def _new_step(self, step: float) -> _Step:
+        newmark = Newmark(step)
+        with self._solvable(f"make steps of {step:g} s"):
+            stepper = make_stepper(self.modes, newmark)
+        by_change = self.dropper_stiffness * (1.0 + newmark.a1 * self.slack_delay)
+        compliance = Compliance(stepper.factor, self.B, by_change)
+        local = LocalProblem(
+            unilateral=self.unilateral,
+            dropper_columns=compliance.dropper_columns,
+            velocity_factor=newmark.a1,
+            law=self._law,
+            parameters=self.definition.contact,
+        )
+        return _Step(stepper, Product(sp.diags(by_change) @ self.B), compliance, local)
+
+    def _begin(self, now: _Step, state: CatenaryState) -> FloatArray:
+        """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N].
+
+        What a dropper that is slack at rest lacks is part of the static state, so it acts at both ends of the step.
+        """
+        pressed = 2.0 * self._rest_load
+        for j, force in zip(state.slack.tolist(), state.compensation.tolist(), strict=True):
+            places, stretch = self._stretch[j]
+            pressed[places] -= force * stretch
+        known = []
+        for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
+            interval = self.wires[s].interval(element)
+            known.append(Known(self._reaction(now, s, interval), element - interval.first, xi, force))
+        now.stepper.begin(state.motion, pressed, known)
+        pull = self.static.elastic_force.copy()
+        self._pull.add(state.motion.attached.ravel(), pull)
+        now.pull.add(now.stepper.attached, pull)
+        return pull
+
+    def _open_contacts(
+        self, now: _Step, state: CatenaryState, motion: StripMotion
+    ) -> tuple[list[OpenContact], list[tuple[int, int, Meeting]]]:
+        contacts, crossings = [], []
+        for s, wire in enumerate(self.wires):
+            free = FreeMotion(wire, partial(self._reaction, now, s), now.stepper, state.motion)
+            for p, strip in enumerate(motion.strip):
+                met = free.meet(strip, int(state.element[p, s]))
+                if met is None:
+                    continue
+                crossings.append((p, s, met))
+                state.element[p, s] = met.crossing.element
+                height = met.point.touch.height + met.rise
+                delta, rate = self._penetration(met.crossing.share, height, met.rate, strip)
+                impact = float(state.impact_velocity[p, s])
+                # One that was closed stays among the candidates: other forces of the step may keep it so.
+                if delta > 0.0 or impact > 0.0:
+                    contacts.append(OpenContact(p, s, met, delta, rate, impact))
+                self._prepare(now, s, wire.next_interval(met.crossing.element))
+        return contacts, crossings
+
+    def _penetration(self, share: float, height: float, rate: float, strip: FloatArray) -> tuple[float, float]:
+        """Return penetration and its velocity of a strip, where a wire of some height crosses it."""
+        (z_a, v_a), (z_b, v_b) = strip[:, :, 2].tolist()
+        return z_a + share * (z_b - z_a) - (height - self._radii), v_a + share * (v_b - v_a) - rate
+
+    def _reaction(self, now: _Step, section: int, interval: WireInterval) -> Reaction:
+        """Return how a wire gives way about an interval; found once per interval that a strip visits."""
+        kept = now.reactions
+        found = kept.get((section, interval.first))
+        if found is None:
+            stepper, columns = now.stepper, now.compliance.units(interval.ends)
+            inverse = stepper.inverse[interval.modes]
+            found = Reaction(
+                interval=interval,
+                inverse=inverse,
+                yielding=inverse[:, None] * stepper.coupling(interval.modes, interval.ends),
+                columns=columns,
+                at_ends=columns.at(interval.ends),
+                slots=stepper.slots(interval.modes),
+                reached=np.arange(len(self.modes.attached))[columns.rows].astype(np.uint64),
+            )
+            while len(kept) >= _KEPT_INTERVALS * len(self.wires):
+                del kept[next(iter(kept))]
+            kept[(section, interval.first)] = found
+        return found
+
+    def _prepare(self, now: _Step, section: int, interval: WireInterval) -> None:
+        """Find a part of how a wire gives way about an interval before a strip gets there: no step shall take long."""
+        if (section, interval.first) not in now.reactions and now.compliance.prepare(interval.ends):
+            self._reaction(now, section, interval)
+
+    def _strip_compliance(self, contacts: Sequence[OpenContact], motion: StripMotion) -> FloatArray:
+        """Two contacts of one strip share its retreat."""
+        if len(contacts) == 1:
+            return motion.compliance[contacts[0].pantograph].reshape(1, 1)
+        owners = [c.pantograph for c in contacts]
+        return np.array([[motion.compliance[i] if i == j else 0.0 for j in owners] for i in owners]).reshape(
+            len(owners), len(owners)
+        )
+
+    def _apply(self, now: _Step, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
+        """Add what contact and compensation forces change within the step."""
+        stepper = now.stepper
+        for contact, force in zip(contacts, forces.contact, strict=True):
+            if force != 0.0:
+                stepper.apply(contact.meeting.point, force)
+        for j, compensation in zip(forces.slack.tolist(), forces.compensation.tolist(), strict=True):
+            column = now.local.dropper_columns[j]
+            stepper.attached[column.rows] -= compensation * column.values[:, 0]
+
+    def _note(self, state: CatenaryState, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
+        """Note the forces at the end of the step; the next one begins with them."""
+        state.slack, state.compensation = forces.slack, forces.compensation
+        state.impact_velocity[...] = 0.0
+        for contact, velocity, closed in zip(contacts, forces.velocity, forces.closed, strict=True):
+            if closed:
+                impact = contact.impact_velocity or max(velocity, 1e-6)
+                state.impact_velocity[contact.pantograph, contact.section] = impact
+        state.loaded, state.load = _NOWHERE, _NOTHING
+        if contacts:
+            places = [c.meeting.crossing for c in contacts]
+            state.loaded = np.array([(c.section, place.element) for c, place in zip(contacts, places, strict=True)])
+            state.load = np.array([(place.xi, f) for place, f in zip(places, forces.contact, strict=True)])
+
+    def _result(
+        self,
+        now: _Step,
+        state: CatenaryState,
+        contacts: Sequence[OpenContact],
+        crossings: Sequence[tuple[int, int, Meeting]],
+        forces: LocalForces,
+    ) -> ContactResult:
+        result = self._empty_result(len(state.element))
+        for contact, force in zip(contacts, forces.contact, strict=True):
+            result.force[contact.pantograph, contact.section] = force
+        for p, s, met in crossings:
+            now.stepper.place(met.crossing, met.point, state.motion, result.point[p, s])
+        return result
+
+    def _in_lap(self, result: ContactResult, strips: FloatArray) -> ContactResult:
+        """Move points of wires that close on themselves along with their strips, which travel on."""
+        for s, wire in enumerate(self.wires):
+            if wire.period:
+                result.point[:, s, 0] = wire.alongside(strips[:, :, 0, 0].mean(axis=1), result.point[:, s, 0])
+        return result
+
+    def _empty_result(self, pantographs: int) -> ContactResult:
+        shape = (pantographs, len(self.wires))
+        return ContactResult(np.zeros(shape), np.full((*shape, 3), np.nan))

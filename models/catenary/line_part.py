@@ -1,0 +1,288 @@
+"""A line between communication points: strips in, contact forces out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.line_energy import LineBalance
+from models.catenary.line_model import CatenaryModel, CatenaryState, ContactResult, StripMotion
+from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
+from models.catenary.statics.elasticity import contact_wire_wave_speed, elasticity
+from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
+from models.contact_law import application_point
+from models.definition_files.parameter import FloatArray, IntArray, Snapshot
+from models.numerics.energy_ledger import NO_BALANCE
+from models.numerics.extrapolation import StripExtrapolation
+from models.numerics.newmark import steps_within
+
+#: Force under which a line's elasticity is told [N].
+_PUSH = 100.0
+
+
+@dataclass(frozen=True)
+class Site:
+    """A support or dropper: its name, place along the track [m] and section, from 1.
+
+    Names count from 1 within a section, and say the section where there are several.
+    """
+
+    name: str
+    x: float
+    section: int
+
+
+@dataclass(frozen=True)
+class LineGeometry:
+    """Static geometry of a line, arrays over its supports and its droppers [m].
+
+    Attributes
+    ----------
+    support_x, support_y, support_z : ndarray, shape (n_supports,)
+        Contact wire at the supports.
+    support_messenger_z : ndarray, shape (n_supports,)
+    dropper_x, dropper_lower_y, dropper_lower_z, dropper_upper_z : ndarray, shape (n_droppers,)
+    dropper_length : ndarray, shape (n_droppers,)
+        Unstrained length.
+    support_section, dropper_section : ndarray, shape (n_supports,), (n_droppers,)
+        Number of the section, from 1.
+    """
+
+    support_x: FloatArray
+    support_y: FloatArray
+    support_z: FloatArray
+    support_messenger_z: FloatArray
+    dropper_x: FloatArray
+    dropper_lower_y: FloatArray
+    dropper_lower_z: FloatArray
+    dropper_upper_z: FloatArray
+    dropper_length: FloatArray
+    support_section: FloatArray
+    dropper_section: FloatArray
+
+
+class CatenaryPart:
+    """An overhead contact line that is told where strips are and tells the contact forces.
+
+    Parameters
+    ----------
+    definition : CatenaryDefinition
+    pantographs : int
+        Number of pantograph ports.
+
+    Attributes
+    ----------
+    contact_force : ndarray, shape (P,)
+        Resultant force on the strip [N].
+    contact_point : ndarray, shape (P, 3)
+        Its point of application; without contact the place where the strip crosses the wire, or the strip's middle [m].
+    section_force : ndarray, shape (P, n_sections)
+        Force per wire [N].
+    support_uplift : ndarray, shape (n_supports,)
+        Rise of the contact wire at the supports [m].
+    """
+
+    def __init__(self, definition: CatenaryDefinition, pantographs: int = 1) -> None:
+        self.definition = definition
+        mesh = build_mesh(definition)
+        self.section_count = len(definition.sections)
+        self.supports = _sites(mesh, mesh.support_nodes)
+        self.droppers = _sites(mesh, mesh.droppers[:, 0])
+        self.time = 0.0
+        self.contact_force = np.zeros(pantographs)
+        self.contact_point = np.zeros((pantographs, 3))
+        self.section_force = np.zeros((pantographs, self.section_count))
+        self.support_uplift = np.zeros(len(self.supports))
+        self._strips = [StripExtrapolation(definition.extrapolation_order) for _ in range(pantographs)]
+        self._motion = StripMotion(np.zeros((pantographs, 2, 2, 3)), np.zeros(pantographs))
+        self._model: CatenaryModel | None = None
+        self._state: CatenaryState | None = None
+        self._balance: LineBalance | None = None
+
+    @property
+    def model(self) -> CatenaryModel:
+        """Return the line, built (form finding, matrices) when first asked for.
+
+        Raises
+        ------
+        EquilibriumError
+            If the line has no static equilibrium of the wanted shape.
+        """
+        if self._model is None:
+            self._model = CatenaryModel(self.definition)
+        return self._model
+
+    @property
+    def state(self) -> CatenaryState:
+        """Return the line's state; at rest before the first initialisation."""
+        if self._state is None:
+            self._state = self.model.initial_state(len(self._strips))
+        return self._state
+
+    @property
+    def dropper_force(self) -> FloatArray:
+        """Return what every dropper carries under its law [N], shape (n_droppers,)."""
+        return self.model.dropper_force(self.state)
+
+    @property
+    def dropper_slack(self) -> FloatArray:
+        """Return 1 for every dropper that is slack by its law, 0 for the others, shape (n_droppers,)."""
+        return self.model.dropper_slack(self.state).astype(np.float64)
+
+    @property
+    def energy(self) -> FloatArray:
+        """Return the values of `energy_ledger.BALANCE` [J], shape (4,); 0 if the balance is not kept."""
+        return NO_BALANCE if self._balance is None else self._balance.balance(self.state)
+
+    @property
+    def contact_work(self) -> FloatArray:
+        """Return the work of the strips against the contacts [J], shape (P,); 0 if the balance is not kept."""
+        return np.zeros(len(self._strips)) if self._balance is None else self._balance.contact_work
+
+    @property
+    def geometry(self) -> LineGeometry:
+        """Return the static geometry."""
+        mesh, static = self.model.mesh, self.model.static
+        support = static.positions[mesh.support_nodes]
+        lower, upper = (static.positions[mesh.droppers[:, k]] for k in (0, 1))
+        return LineGeometry(
+            support[:, 0].copy(),
+            support[:, 1].copy(),
+            support[:, 2].copy(),
+            static.positions[mesh.sprung, 2],
+            lower[:, 0].copy(),
+            lower[:, 1].copy(),
+            lower[:, 2].copy(),
+            upper[:, 2].copy(),
+            static.unstrained_length,
+            (mesh.section[mesh.support_nodes] + 1).astype(np.float64),
+            (mesh.section[mesh.droppers[:, 0]] + 1).astype(np.float64),
+        )
+
+    @property
+    def period(self) -> FloatArray:
+        """Return the length after which a line that closes on itself repeats [m], shape (1,); 0 if it does not."""
+        return np.array([max(section.period for section in self.definition.sections)])
+
+    @property
+    def contact_wire_wave_speed(self) -> FloatArray:
+        """Return the speed of waves in the contact wire, taken for the longest span [m/s], shape (1,)."""
+        return np.array([contact_wire_wave_speed(self.definition)])
+
+    @property
+    def elasticity(self) -> FloatArray:
+        """Return the static elasticity at mid-span and at the support before it [m/N], shape (2,).
+
+        Under 100 N, in the span in the middle of the first section.
+        """
+        spans = self.definition.sections[0].spans
+        span = spans[len(spans) // 2]
+        return elasticity(self.model, np.array([(span.start + span.end) / 2.0, span.start]), _PUSH).value
+
+    @property
+    def contact_wire_ends(self) -> FloatArray:
+        """Return where the contact wires begin and end along the track [m], shape (2,)."""
+        ends = [wire.ends for wire in self.model.wires]
+        return np.array([min(first for first, _ in ends), max(last for _, last in ends)])
+
+    def check_strips(self, strips: FloatArray) -> None:
+        """Refuse strips that the line, just initialised with them, cannot be meant for; raises ``ParameterError``.
+
+        Parameters
+        ----------
+        strips : ndarray, shape (P, 2, 2, 3)
+        """
+        check_strips(wires_at_rest(self.model), strips, self.contact_force)
+
+    def start_warning(self, strips: FloatArray) -> str:
+        """Return which of the strips begins inside the wire, empty if none does; shape as of `check_strips`."""
+        return start_warning(wires_at_rest(self.model), strips, self.contact_force)
+
+    def initialise(self, time: float, strips: FloatArray) -> None:
+        """Put the line to rest at ``time`` and find the contacts of the strips with it.
+
+        Parameters
+        ----------
+        strips : ndarray, shape (P, 2, 2, 3)
+            Pantograph; end A, B; position, velocity; x, y, z.
+        """
+        self.time = time
+        self._state = self.model.initial_state(len(self._strips))
+        self.model.rehearse(self.definition.time_step, strips)
+        for extrapolation, strip in zip(self._strips, strips, strict=True):
+            extrapolation.start(time, strip)
+        contacts = self.model.contact_at_rest(self._state, strips)
+        self._balance = LineBalance(self.model, strips, contacts) if self.definition.monitor_energy else None
+        self._publish(strips, contacts)
+
+    def step(self, strips: FloatArray, step: float) -> None:
+        """Advance by ``step`` [s] under strips received for its beginning (or its end, if they have stepped already).
+
+        Parameters
+        ----------
+        strips : ndarray, shape (P, 2, 2, 3)
+        """
+        for extrapolation, strip in zip(self._strips, strips, strict=True):
+            extrapolation.receive(self.time, strip, step)
+        count = steps_within(step, self.definition.time_step)
+        start, h = self.time, step / count
+        motion, advance = self._motion, (self._balance or self.model).step
+        for k in range(1, count + 1):
+            for extrapolation, strip in zip(self._strips, motion.strip, strict=True):
+                extrapolation.at(start + k * h, strip)
+            result = advance(self.state, h, motion)
+        self.time = start + step
+        self._publish(motion.strip, result)
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state, bit for bit."""
+        result: Snapshot = {"time": np.array([self.time])}
+        result |= {f"line.{name}": value for name, value in self.state.snapshot().items()}
+        for p, extrapolation in enumerate(self._strips):
+            result |= {f"{p}.{name}": value for name, value in extrapolation.snapshot().items()}
+        if self._balance is not None:
+            result |= self._balance.snapshot()
+        outputs = ("contact_force", "contact_point", "section_force", "support_uplift")
+        return result | {name: getattr(self, name).copy() for name in outputs}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        self.time = float(snapshot["time"][0])
+        self.state.restore({n.removeprefix("line."): v for n, v in snapshot.items() if n.startswith("line.")})
+        for p, extrapolation in enumerate(self._strips):
+            extrapolation.restore({n.removeprefix(f"{p}."): v for n, v in snapshot.items() if n.startswith(f"{p}.")})
+        if self._balance is not None:
+            self._balance.restore(snapshot)
+        for name in ("contact_force", "contact_point", "section_force", "support_uplift"):
+            getattr(self, name)[...] = snapshot[name]
+
+    def _publish(self, strips: FloatArray, result: ContactResult) -> None:
+        self.section_force[...] = result.force
+        result.force.sum(axis=1, out=self.contact_force)
+        for place, *contact in zip(self.contact_point, result.force, result.point, strips, strict=True):
+            place[...] = application_point(*contact)
+        self.support_uplift[...] = self.model.uplift(self.state)
+
+
+def wires_at_rest(model: CatenaryModel) -> tuple[WireAtRest, ...]:
+    """Return the static shape of the contact wires, section by section."""
+    positions, chains = model.static.positions, model.mesh.chains
+    of_wire = (chain for chain in chains if chain.component == "contact_wire")
+    sections = model.definition.sections
+    return tuple(
+        WireAtRest(positions[chain.nodes], section.ends.working)
+        for chain, section in zip(of_wire, sections, strict=True)
+    )
+
+
+def _sites(mesh: CatenaryMesh, nodes: IntArray) -> tuple[Site, ...]:
+    sections = mesh.section[nodes]
+    several = bool(mesh.section.any())
+    found, counts = [], dict.fromkeys(sections.tolist(), 0)
+    for x, section in zip(mesh.points[nodes, 0].tolist(), sections.tolist(), strict=True):
+        counts[section] += 1
+        name = f"{counts[section]} of section {section + 1}" if several else str(counts[section])
+        found.append(Site(name, x, section + 1))
+    return tuple(found)

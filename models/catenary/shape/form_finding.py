@@ -1,0 +1,319 @@
+"""Static equilibrium and form finding.
+
+Either the wanted geometry is prescribed (the contact wire's height at every dropper, the auxiliary wire's at every
+hanger) and the droppers' lengths follow, or a dropper's unstrained length is given and the height follows. The
+unknowns are displacements and dropper forces. For given reference points this is one linear saddle-point system;
+the points are then moved to the solution and the system is solved again, until the deformed mesh is its reference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
+from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.line_matrices import (
+    Matrices,
+    assemble,
+    axial_stiffness,
+    compression_ratio,
+    dropper_lengths,
+    dropper_rows,
+    dropper_stiffness,
+    pendulum_stiffness,
+    steady_arm_tension,
+)
+from models.catenary.shape.line_mesh import CatenaryMesh
+from models.catenary.shape.wire_intervals import attachments
+from models.definition_files.parameter import FloatArray
+
+#: Form finding ends when no reference point moves by more than this [m].
+_TOLERANCE = 1e-9
+_MAX_ITERATIONS = 30
+#: Given lengths: droppers are let slack only once the first guess of the shape, far from equilibrium, is left behind.
+_TAUT_ITERATIONS = 3
+#: A point that moves by more than this has no shape to settle to [m]; numbers would overflow soon.
+_LOST = 1e5
+#: First guess of the droppers' forces [N]; only the path to the solution depends on it.
+_FIRST_FORCE = 80.0
+
+
+class EquilibriumError(ValueError):
+    """The line has no static equilibrium of the wanted shape; says which droppers, where."""
+
+
+@dataclass(frozen=True)
+class StaticState:
+    """Static equilibrium of a line.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        Reference positions, at the static shape [m].
+    displacement : ndarray, shape (6 n,)
+        Static displacement from the reference: axial stretch, rotations of the wires [m, rad].
+    dropper_force, dropper_length, unstrained_length : ndarray, shape (n_droppers,)
+        Tension [N], length under tension and without it [m].
+    arm_force : ndarray, shape (n_arms,)
+        Tension of the steady arms [N].
+    elastic_force : ndarray, shape (n_droppers,)
+        Stiffness times stretch [N]: the tension, but negative where a given length leaves the dropper slack.
+    matrices : Matrices
+        About ``points``.
+    residual : float
+        Largest unbalanced nodal force over the line's weight.
+    """
+
+    points: FloatArray
+    displacement: FloatArray
+    dropper_force: FloatArray
+    dropper_length: FloatArray
+    unstrained_length: FloatArray
+    arm_force: FloatArray
+    elastic_force: FloatArray
+    matrices: Matrices
+    residual: float
+
+    @property
+    def positions(self) -> FloatArray:
+        """Return the static positions of the nodes, shape (n, 3) [m]."""
+        return self.points + self.displacement.reshape(-1, NODE_DOFS)[:, :3]
+
+
+def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState:
+    """Find the dropper lengths that give the wanted contact-wire profile, or the profile that given lengths give.
+
+    Returns
+    -------
+    StaticState
+
+    Raises
+    ------
+    EquilibriumError
+        If a dropper would have to push to give the wanted profile, if the equations are singular, or if the iteration
+        does not settle.
+    """
+    points = mesh.points.copy()
+    movable = _movable(mesh)
+    unstretched = np.zeros(mesh.fixed.shape)
+    unstretched[:, :3] = movable
+    force = np.full(len(mesh.droppers), _FIRST_FORCE)
+    slack = np.zeros(len(mesh.droppers), dtype=bool)
+    for iteration in range(_MAX_ITERATIONS):
+        matrices = assemble(definition, mesh, points)
+        # Moving a reference point re-defines a wire's length, so it does not stretch the wire.
+        stretch = axial_stiffness(definition, mesh, points) @ sp.diags(unstretched.ravel())
+        # So do the guides act on moves of the reference alone, and vanish from the result with these.
+        guides = _swing(mesh, points, force) @ sp.diags(unstretched.ravel())
+        K = matrices.K - stretch + guides
+        conditions = _conditions(definition, mesh, points, slack)
+        displacement, force = _solve(definition, mesh, points, K, matrices.load, conditions)
+        move = np.where(movable, displacement.reshape(-1, NODE_DOFS)[:, :3], 0.0)
+        _check_move(definition, points, move)
+        now_slack = _slack(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
+        if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
+            # Without the guides: what is left of them is below the tolerance of the iteration, now it is gone.
+            displacement, force = _solve(definition, mesh, points, matrices.K, matrices.load, conditions)
+            return _static_state(definition, mesh, points, matrices, displacement, force, slack)
+        _straighten(mesh, points, move)
+        points = points + move
+        _carry_arms(mesh, points, move)
+        if iteration >= _TAUT_ITERATIONS:
+            slack = now_slack
+    raise EquilibriumError(
+        f"form finding of line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
+        f"a point still moves by {np.abs(move).max():.2g} m"
+    )
+
+
+def _check_move(definition: CatenaryDefinition, points: FloatArray, move: FloatArray) -> None:
+    """Stop where form finding leads nowhere."""
+    size = np.abs(move).max(axis=1)
+    worst = int(size.argmax())  # the first that is not a number, if there is one
+    if not size[worst] <= _LOST:
+        raise EquilibriumError(
+            f"line '{definition.name}' has no static equilibrium of the wanted shape: form finding moves the point at "
+            f"x = {points[worst, 0]:.2f} m by {size[worst]:.2g} m; check tensions, masses, pre-sag and dropper lengths"
+        )
+
+
+def _movable(mesh: CatenaryMesh) -> np.ndarray:
+    """Return which coordinates of the reference form finding may move.
+
+    Not x (the wires' stretch stays a displacement); not the lateral position of registered nodes, whose
+    displacement is what loads the steady arm; and not that of nodes between two attachments, which follow these on
+    a straight line.
+    """
+    movable = ~mesh.fixed[:, :3]
+    movable[:, 0] = False
+    movable[mesh.arms[:, 1], 1] = False
+    movable[~attachments(mesh), 1] = False
+    return movable[mesh.owner]
+
+
+def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
+    """Move the inner nodes of every interval so that the reference stays straight in plan between attachments."""
+    held = attachments(mesh)
+    for chain in mesh.chains:
+        fixed, x = held[chain.nodes], points[chain.nodes, 0]
+        move[chain.nodes, 1] = np.interp(x, x[fixed], move[chain.nodes[fixed], 1])
+
+
+def _carry_arms(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
+    """Move the registration ends with their wire, so that the arms keep angle and length."""
+    points[mesh.arms[:, 0], 2] += move[mesh.arms[:, 1], 2]
+
+
+@dataclass(frozen=True)
+class _Conditions:
+    """What holds at every dropper: rows @ d - flexibility * N = right.
+
+    Attributes
+    ----------
+    rows : sparse, shape (n_droppers, 6 n)
+    flexibility, right : ndarray, shape (n_droppers,)
+    """
+
+    rows: sp.csr_matrix
+    flexibility: FloatArray
+    right: FloatArray
+
+
+def _conditions(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, slack: np.ndarray
+) -> _Conditions:
+    """Return the droppers' conditions: wanted height of the lower end, or elongation of a given length by the force."""
+    lower = mesh.droppers[:, 0]
+    n = len(lower)
+    heights = sp.csr_matrix((np.ones(n), (np.arange(n), lower * NODE_DOFS + 2)), shape=(n, mesh.fixed.size))
+    given = ~np.isnan(mesh.given_length)
+    stiffness = dropper_stiffness(definition, mesh, points)
+    stiffness[slack] *= compression_ratio(definition, mesh)[slack]
+    limp = given & (stiffness == 0.0)
+    stiffness[limp] = 1.0  # N / 1 = 0
+    rows = sp.diags(np.where(given, 0.0, 1.0)) @ heights
+    rows = rows + sp.diags(np.where(given & ~limp, 1.0, 0.0)) @ dropper_rows(mesh, points)
+    too_short = np.where(limp, 0.0, np.nan_to_num(mesh.given_length) - dropper_lengths(mesh, points))
+    return _Conditions(
+        rows.tocsr(),
+        np.where(given, 1.0 / stiffness, 0.0),
+        np.where(given, too_short, mesh.target - points[lower, 2]),
+    )
+
+
+def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
+    """Return which droppers of given length are longer than the distance that they span."""
+    with np.errstate(invalid="ignore"):
+        result: np.ndarray = dropper_lengths(mesh, positions) < mesh.given_length
+    return result
+
+
+def _solve(
+    definition: CatenaryDefinition,
+    mesh: CatenaryMesh,
+    points: FloatArray,
+    K: sp.csc_matrix,
+    load: FloatArray,
+    conditions: _Conditions,
+) -> tuple[FloatArray, FloatArray]:
+    """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], R, D and right of the droppers' conditions."""
+    free = np.flatnonzero(~mesh.fixed.ravel())
+    B = dropper_rows(mesh, points)[:, free]
+    # Scaled so that the rows of the conditions compare with those of the stiffness.
+    scale = 1e4
+    D = sp.diags(-(scale**2) * conditions.flexibility)
+    system = sp.bmat([[K[free][:, free], scale * B.T], [scale * conditions.rows[:, free], D]], format="csc")
+    try:
+        solution = splu(system).solve(np.concatenate([load[free], scale * conditions.right]))
+    except RuntimeError as error:  # SuperLU's "Factor is exactly singular"
+        raise EquilibriumError(
+            f"line '{definition.name}' has no static equilibrium of the wanted shape: its equations are singular, as "
+            "they are where nothing holds a wire; check tensions, masses and droppers"
+        ) from error
+    displacement = np.zeros(load.size)
+    displacement[free] = solution[: len(free)]
+    displacement = displacement.reshape(-1, NODE_DOFS)[mesh.owner].ravel()
+    return displacement, solution[len(free) :] * scale
+
+
+def _swing(mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> sp.csc_matrix:
+    """Return the stiffness N/L of the droppers across their axes, as pendulums.
+
+    It guides the iteration where nothing but the droppers holds a wire laterally.
+    """
+    return pendulum_stiffness(mesh.droppers, np.maximum(force, 1.0), points)
+
+
+def _static_state(
+    definition: CatenaryDefinition,
+    mesh: CatenaryMesh,
+    points: FloatArray,
+    matrices: Matrices,
+    displacement: FloatArray,
+    force: FloatArray,
+    slack: np.ndarray,
+) -> StaticState:
+    _check_tension(definition, mesh, points, force)
+    arm_force = steady_arm_tension(definition, mesh, points, displacement)
+    _check_arms(definition, mesh, points, arm_force)
+    length = dropper_lengths(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
+    stiffness = dropper_stiffness(definition, mesh, points)
+    given = ~np.isnan(mesh.given_length)
+    unstrained = np.where(given, mesh.given_length, length - force / stiffness)
+    elastic = np.where(slack, stiffness * (length - unstrained), force)
+    force = np.where(slack, compression_ratio(definition, mesh) * elastic, force)
+    return StaticState(
+        points=points,
+        displacement=displacement,
+        dropper_force=force,
+        dropper_length=length,
+        unstrained_length=unstrained,
+        arm_force=arm_force,
+        elastic_force=elastic,
+        matrices=matrices,
+        residual=_residual(mesh, points, matrices, displacement, force),
+    )
+
+
+def weight(matrices: Matrices) -> float:
+    """Return the weight of the whole line [N]."""
+    up = np.zeros((matrices.load.size // NODE_DOFS, NODE_DOFS))
+    up[:, 2] = 1.0
+    return float(GRAVITY * (up.ravel() @ (matrices.M @ up.ravel())))
+
+
+def _check_tension(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> None:
+    slack = np.flatnonzero((force <= 0.0) & np.isnan(mesh.given_length))
+    if slack.size:
+        x = points[mesh.droppers[slack, 0], 0]
+        listed = ", ".join(f"{a:.2f} m ({f:.1f} N)" for a, f in list(zip(x, force[slack], strict=True))[:8])
+        raise EquilibriumError(
+            f"line '{definition.name}': {slack.size} dropper(s) would have to push to give the wanted profile: "
+            f"{listed}; reduce the pre-sag or the rise to the anchors, or move the droppers"
+        )
+
+
+def _check_arms(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> None:
+    """Refuse steady arms that push; one that nothing but its own weight presses has the sign of no wire's pull."""
+    arm = definition.steady_arm
+    if arm is None:
+        return
+    pushing = np.flatnonzero(force < -GRAVITY * arm.mass * arm.length)
+    if pushing.size:
+        x = points[mesh.arms[pushing, 1], 0]
+        listed = ", ".join(
+            f"the arm at {a:.2f} m pushes with {-f:.1f} N" for a, f in list(zip(x, force[pushing], strict=True))[:8]
+        )
+        raise EquilibriumError(f"line '{definition.name}': {listed}: it must pull; change its side or the stagger")
+
+
+def _residual(
+    mesh: CatenaryMesh, points: FloatArray, matrices: Matrices, displacement: FloatArray, force: FloatArray
+) -> float:
+    unbalanced = matrices.K @ displacement + dropper_rows(mesh, points).T @ force - matrices.load
+    translations = unbalanced.reshape(-1, NODE_DOFS)[:, :3][~mesh.fixed[:, :3]]
+    return float(np.abs(translations).max() / weight(matrices))

@@ -1,0 +1,97 @@
+"""``python -m models identify FILE``: the lumped model that fits a measured frequency response [section 3.4]."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from models.commands.physics_files import write_figure
+from models.commands.physics_options import print_table
+from models.definition_files.parameter import ParameterError
+from models.pantograph.identification import (
+    RESPONSE_KINDS,
+    IdentifiedModel,
+    Response,
+    identify,
+    read_response,
+)
+from models.pantograph.lumped.lumped_rig import chain_stiffness
+
+
+def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register the verb."""
+    parser = subparsers.add_parser("identify", help="fit a lumped pantograph to a frequency response")
+    parser.add_argument("response", type=Path, help="CSV file: frequency [Hz], real part, imaginary part")
+    parser.add_argument("--kind", choices=RESPONSE_KINDS, default="receptance", help="what the two parts are of")
+    parser.add_argument("--stages", type=int, default=3, help="number of masses (default 3)")
+    parser.add_argument(
+        "--fix",
+        action="append",
+        default=[],
+        type=_fixed,
+        metavar="NAME=VALUE",
+        help="known value: m3=7.75 (m, c, k; 1 is lowest)",
+    )
+    parser.add_argument("--plot", type=Path, default=None, help="PNG file for measured and fitted response")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Identify and print the values with their standard deviations."""
+    response = read_response(arguments.response, arguments.kind)
+    try:
+        model = identify(response, arguments.stages, _all_fixed(arguments.fix))
+    except ValueError as error:
+        raise ParameterError(str(error)) from error
+    print_table("Identified stages, bottom to top", ("value", "found", "standard deviation"), _rows(model))
+    print(f"root mean square misfit {100.0 * model.misfit:.3g} %")
+    if arguments.plot is not None:
+        write_figure(arguments.plot, _plot(response, model), 120)
+        print(f"plot: {arguments.plot}")
+    return 0
+
+
+def _all_fixed(given: Sequence[tuple[str, float]]) -> dict[str, float]:
+    if twice := [name for name, _ in given if sum(name == other for other, _ in given) > 1]:
+        raise ParameterError(f"--fix {twice[0]}: is given twice")
+    return dict(given)
+
+
+def _fixed(text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise argparse.ArgumentTypeError(f"'{text}': write NAME=VALUE")
+    try:
+        return name, float(value)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"'{text}': '{value}' is not a number") from error
+
+
+def _rows(model: IdentifiedModel) -> list[tuple[str, str, str]]:
+    rows = []
+    for letter, unit, values in (
+        ("m", "kg", model.masses),
+        ("c", "N s/m", model.dampings),
+        ("k", "N/m", model.stiffnesses),
+    ):
+        for i, value in enumerate(values, 1):
+            spread = model.deviations.get(f"{letter}{i}")
+            rows.append((f"{letter}{i} [{unit}]", f"{value:.6g}", "fixed" if spread is None else f"{spread:.2g}"))
+    return rows
+
+
+def _plot(response: Response, model: IdentifiedModel) -> Figure:
+    fitted = chain_stiffness(response.frequency, model.masses, model.dampings, model.stiffnesses)
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    axes = figure.subplots()
+    axes.semilogy(response.frequency, np.abs(1.0 / response.stiffness), ".", label="given")
+    axes.semilogy(response.frequency, np.abs(1.0 / fitted), label="identified")
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel("receptance [m/N]")
+    axes.grid(visible=True, alpha=0.4)
+    axes.legend()
+    return figure

@@ -1,0 +1,218 @@
+"""``python -m models pantograph NAME``: statics over the working height, modes, apparent mass of a pantograph."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from models.commands.physics_files import write_csv, write_figure
+from models.commands.physics_options import add_settings, finite, new_folder, print_table, settings, warn
+from models.definition_files.parameter import FloatArray, ParameterError
+from models.library import load_pantograph
+from models.pantograph.lumped import lumped_rig as lumped
+from models.pantograph.lumped.lumped_definition import LumpedDefinition
+from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+
+#: Significant digits of the tables: all that a double has.
+_DIGITS: Final = 17
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """What the command tells of a pantograph.
+
+    Attributes
+    ----------
+    title : str
+    static_columns : tuple of str
+        Names with units, strip height first.
+    statics : ndarray, shape (h, len(static_columns))
+    modes : tuple of (frequency [Hz], damping ratio)
+    frequency : ndarray, shape (f,)
+    apparent_mass : ndarray of complex, shape (f,)
+        [kg]
+    """
+
+    title: str
+    static_columns: tuple[str, ...]
+    statics: FloatArray
+    modes: tuple[tuple[float, float], ...]
+    frequency: FloatArray
+    apparent_mass: npt.NDArray[np.complex128]
+
+
+def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register the verb."""
+    parser = subparsers.add_parser("pantograph", help="statics over height, modes, apparent mass of a pantograph")
+    parser.add_argument("pantograph", help="name in the library, or a definition file")
+    parser.add_argument("--force", type=finite, default=157.5, help="contact force of the working point [N]")
+    parser.add_argument(
+        "--heights", type=finite, nargs=2, default=None, metavar=("FROM", "TO"), help="strip heights above rail [m]"
+    )
+    parser.add_argument("--height", type=finite, default=None, help="strip height of the working point [m]")
+    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
+    add_settings(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Analyse, print, and write if asked to."""
+    definition = load_pantograph(arguments.pantograph)
+    definition = definition.with_values(settings(arguments.set, "pantograph", definition))
+    result = (
+        _multibody(definition, arguments)
+        if isinstance(definition, MechanismDefinition)
+        else _lumped(definition, arguments)
+    )
+    print_table(
+        f"{arguments.pantograph}: {result.title}",
+        result.static_columns,
+        ([f"{v:.3f}" if i == 0 else f"{v:.2f}" for i, v in enumerate(row)] for row in result.statics),
+    )
+    print_table("Modes, strip free", ("frequency [Hz]", "damping [%]"), _mode_rows(result))
+    response_columns = ("frequency [Hz]", "magnitude [kg]", "phase [deg]")
+    print_table("Apparent mass of the strip", response_columns, _response_rows(result))
+    if arguments.out is not None:
+        folder = new_folder(arguments.out)
+        write(folder, result)
+        print(f"tables and plots: {folder}")
+    return 0
+
+
+def write(folder: Path, result: Characteristics) -> None:
+    """Write statics and response as CSV and the plots as PNG."""
+    write_csv(folder / "statics.csv", result.static_columns, list(result.statics.T), _DIGITS)
+    response = (result.frequency, result.apparent_mass.real, result.apparent_mass.imag)
+    names = ("frequency [Hz]", "apparent mass real [kg]", "apparent mass imaginary [kg]")
+    write_csv(folder / "apparent_mass.csv", names, response, _DIGITS)
+    write_figure(folder / "apparent_mass.png", _plot_response(result), 120)
+    write_figure(folder / "statics.png", _plot_statics(result), 120)
+
+
+def _heights(arguments: argparse.Namespace, reference: float) -> FloatArray:
+    low, high = arguments.heights or (reference - 0.5, reference + 0.5)
+    if not 0.0 < low < high:
+        raise ParameterError(f"--heights {low:g} {high:g}: give the lower one first, both above 0")
+    return np.linspace(low, high, 11)
+
+
+def _frequencies() -> FloatArray:
+    return np.linspace(0.1, 20.0, 400)
+
+
+def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Characteristics:
+    heights = _heights(arguments, definition.reference_height)
+    frequency = _frequencies()
+    return Characteristics(
+        definition.title,
+        ("strip height [m]", "contact force [N]"),
+        np.column_stack([heights, lumped.contact_force_over_height(definition, heights)]),
+        tuple((m.frequency, m.damping) for m in lumped.modes(definition)),
+        frequency,
+        lumped.apparent_mass(definition, frequency),
+    )
+
+
+def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -> Characteristics:
+    rig = Rig(definition)
+    reference = definition.operation.reference_height
+    statics = rig.statics(_heights(arguments, reference), arguments.force)
+    height = arguments.height if arguments.height is not None else reference
+    dynamics = rig.dynamics(height, _frequencies(), arguments.force)
+    warn([friction_warning(definition, dynamics, lambda d: Rig(d).dynamics(height, _frequencies(), arguments.force))])
+    unit = rig.lift_unit
+    columns = (
+        "strip height [m]",
+        f"lift for the weights [{unit}]",
+        f"lift for {arguments.force:g} N [{unit}]",
+        "contact force [N]",
+    )
+    return Characteristics(
+        definition.title,
+        columns,
+        np.column_stack([statics.height, statics.balance, statics.lift, statics.contact_force]),
+        tuple((m.frequency, m.damping) for m in dynamics.modes if m.eigenvalue.imag >= 0.0),
+        dynamics.frequency,
+        dynamics.apparent_mass,
+    )
+
+
+def friction_warning(
+    definition: MechanismDefinition, found: Dynamics, analysed: Callable[[MechanismDefinition], Dynamics]
+) -> str:
+    """Return what dry friction does to the modes, empty if there is none.
+
+    About rest its force changes with the speed as a damper's of friction over transition speed does: a strong one,
+    under which a mode creeps back instead of oscillating.
+
+    Parameters
+    ----------
+    definition : MechanismDefinition
+    found : Dynamics
+        With the friction.
+    analysed : callable
+        Gives the dynamics of the definition without it.
+    """
+    rubbing = [f for f in definition.forces if f.kind == "joint_friction" and f.friction > 0.0]
+    if not rubbing:
+        return ""
+    names = {f"force.{f.name}.{key}" for f in rubbing for key in ("force", "moment")}
+    without = {p.name: 0.0 for p in definition.parameters() if p.name in names}
+    free = _frequencies_of(analysed(definition.with_values(without)))
+    return (
+        f"dry friction in {', '.join(f.name for f in rubbing)}: the modes are those of small motions about rest, where "
+        f"it damps like a fluid; {len(_frequencies_of(found))} of them oscillate, without the friction {len(free)}: "
+        f"{', '.join(f'{f:.3f}' for f in free)} Hz"
+    )
+
+
+def _frequencies_of(dynamics: Dynamics) -> list[float]:
+    return [m.frequency for m in dynamics.modes if m.frequency > 0.0]
+
+
+def _mode_rows(result: Characteristics) -> list[tuple[str, str]]:
+    return [(f"{f:.3f}" if f > 0.0 else "-", f"{100.0 * d:.2f}") for f, d in result.modes]
+
+
+def _response_rows(result: Characteristics) -> list[tuple[str, str, str]]:
+    rows = []
+    for wanted in (0.5, 1.0, 2.0, 5.0, 7.5, 10.0, 15.0, 20.0):
+        i = int(np.argmin(np.abs(result.frequency - wanted)))
+        value = result.apparent_mass[i]
+        rows.append((f"{result.frequency[i]:.2f}", f"{abs(value):.3f}", f"{np.degrees(np.angle(value)):.1f}"))
+    return rows
+
+
+def _plot_response(result: Characteristics) -> Figure:
+    figure = Figure(figsize=(8, 6), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.semilogy(result.frequency, np.abs(result.apparent_mass))
+    upper.set_ylabel("apparent mass [kg]")
+    lower.plot(result.frequency, np.degrees(np.angle(result.apparent_mass)))
+    lower.set_ylabel("phase [deg]")
+    lower.set_xlabel("frequency [Hz]")
+    for axes in (upper, lower):
+        axes.grid(visible=True, alpha=0.4)
+    figure.suptitle(result.title)
+    return figure
+
+
+def _plot_statics(result: Characteristics) -> Figure:
+    count = len(result.static_columns) - 1
+    figure = Figure(figsize=(8, 2.5 * count), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(count, 1, sharex=True))
+    for axes, name, values in zip(panels, result.static_columns[1:], result.statics.T[1:], strict=True):
+        axes.plot(result.statics[:, 0], values)
+        axes.set_ylabel(name)
+        axes.grid(visible=True, alpha=0.4)
+    panels[-1].set_xlabel(result.static_columns[0])
+    figure.suptitle(result.title)
+    return figure

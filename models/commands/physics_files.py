@@ -1,0 +1,72 @@
+"""Files that the verbs write: each replaces the old one as a whole or leaves it, and every error names its file."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from models.definition_files.parameter import FloatArray, ParameterError
+
+#: What a file that is being written is called.
+_PART: Final = ".part"
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file in one go: readers see the old one or the new one, never half of it.
+
+    Raises
+    ------
+    OSError
+        That names the file, if it cannot be written; the old one is still there then.
+    """
+    # A device, such as /dev/null, would be replaced by a file for all users of the computer.
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EEXIST, "this is no file, and is left alone; choose another", str(path))
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART}")  # two commands do not mix
+    try:
+        with temporary.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file in one go."""
+    write_whole(path, text.encode())
+
+
+def write_csv(path: Path, names: Sequence[str], columns: Sequence[FloatArray], digits: int = 9) -> None:
+    """Write columns of numbers under their names, with so many significant digits."""
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt=f"%.{digits}g")
+    write_text(path, text.getvalue())
+
+
+def write_figure(path: Path, figure: Figure, dpi: int) -> None:
+    """Write a figure in the format that the ending of its name says.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format.
+    """
+    known = figure.canvas.get_supported_filetypes()
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in known:
+        raise ParameterError(f"{path}: a figure must be named .png or .svg, or another of {', '.join(sorted(known))}")
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=dpi)
+    write_whole(path, buffer.getvalue())

@@ -1,0 +1,182 @@
+"""``python -m models statics LINE``: static shape, droppers, elasticity, steady arms and wave figures of a line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from models.catenary import line_advice
+from models.catenary.definition.line_definition import Span
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_part import CatenaryPart
+from models.catenary.statics import elasticity as statics
+from models.commands import statics_plots
+from models.commands.physics_files import write_csv, write_figure, write_text
+from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
+from models.definition_files.parameter import ParameterError
+from models.library import load_line
+
+
+@dataclass(frozen=True)
+class LineStatics:
+    """What the command tells of a line: a section of it, and one span in detail."""
+
+    model: CatenaryModel
+    section: int
+    number: int
+    span: Span
+    profiles: tuple[statics.Profile, ...]
+    droppers: statics.Droppers
+    arms: statics.ArmLoads
+    elasticity: statics.Elasticity
+    waves: statics.Waves
+
+    @property
+    def span_droppers(self) -> statics.Droppers:
+        """Return the droppers (and hangers) of the span in detail."""
+        return statics.droppers(self.model, self.span.start, self.span.end, self.section)
+
+
+def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register the verb."""
+    parser = subparsers.add_parser("statics", help="static shape, droppers, elasticity and wave figures of a line")
+    parser.add_argument("line", help="name in the library, or a definition file")
+    parser.add_argument("--span", type=int, default=None, help="span in detail, from 1 (default: the middle one)")
+    parser.add_argument("--section", type=int, default=1, help="section of a line with overlaps, from 1 (default 1)")
+    parser.add_argument("--speed", type=positive, default=300.0, help="speed of the wave figures, km/h (default 300)")
+    parser.add_argument("--force", type=positive, default=100.0, help="force of the elasticity [N] (default 100)")
+    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
+    add_settings(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Analyse, print, and write if asked to."""
+    result = analyse(arguments)
+    print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
+    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result.span_droppers))
+    if arguments.out is not None:
+        folder = new_folder(arguments.out)
+        write(folder, result)
+        print(f"tables and plots: {folder}")
+    return 0
+
+
+def analyse(arguments: argparse.Namespace) -> LineStatics:
+    """Find the static state of the line and the elasticity of one span.
+
+    Raises
+    ------
+    ParameterError
+        If the line has no such section or span.
+    """
+    definition = load_line(arguments.line)
+    definition = definition.with_values(settings(arguments.set, "line", definition))
+    section = arguments.section - 1
+    if not 0 <= section < len(definition.sections):
+        raise ParameterError(f"--section {arguments.section}: the line has sections 1 to {len(definition.sections)}")
+    spans = definition.sections[section].spans
+    number = arguments.span if arguments.span is not None else (len(spans) + 1) // 2
+    if not 1 <= number <= len(spans):
+        raise ParameterError(f"--span {number}: the line has spans 1 to {len(spans)}")
+    span = spans[number - 1]
+    part = CatenaryPart(definition)
+    model = part.model
+    warn(
+        [
+            line_advice.speed_warning(definition, arguments.speed / 3.6),
+            line_advice.slack_warning(part.droppers, model.static.dropper_force),
+            line_advice.slack_law_warning(definition),
+        ]
+    )
+    return LineStatics(
+        model=model,
+        section=section,
+        number=number,
+        span=span,
+        profiles=statics.profiles(model, section),
+        droppers=statics.droppers(model, section=section),
+        arms=statics.arm_loads(model, section),
+        elasticity=statics.elasticity(model, statics.positions_in_span(span), arguments.force, section),
+        waves=statics.waves(definition, arguments.speed / 3.6, span.length),
+    )
+
+
+def summary(result: LineStatics) -> list[tuple[str, str]]:
+    """Return the figures of a line as rows: what, value with unit."""
+    e, w, span = result.elasticity, result.waves, result.span
+    return [
+        ("span in detail", f"{result.number}: {span.start:g} ... {span.end:g} m"),
+        *_profile_rows(result),
+        (f"elasticity at {e.force:g} N, minimum [mm/N]", f"{1e3 * e.minimum:.4f}"),
+        (f"elasticity at {e.force:g} N, maximum [mm/N]", f"{1e3 * e.maximum:.4f}"),
+        ("non-uniformity of elasticity u [%]", f"{100.0 * e.non_uniformity:.1f}"),
+        *_arm_rows(result),
+        ("law by which droppers slacken", result.model.definition.dropper.slack_law),
+        ("wave speed C [km/h]", f"{3.6 * w.speed:.1f}"),
+        ("limit of operation 0.7 C [km/h]", f"{3.6 * w.limit:.1f}"),
+        ("reflection factor r", f"{w.reflection:.4f}"),
+        (f"Doppler factor at {3.6 * w.train_speed:g} km/h", f"{w.doppler:.4f}"),
+        (f"amplification coefficient at {3.6 * w.train_speed:g} km/h", f"{w.amplification:.3f}"),
+    ]
+
+
+def write(folder: Path, result: LineStatics) -> None:
+    """Write tables as CSV and plots as PNG."""
+    _write_profiles(folder, result.profiles)
+    d, e, a = result.droppers, result.elasticity, result.arms
+    columns = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
+    write_csv(folder / "droppers.csv", columns, (d.x, d.length, d.force, d.is_hanger.astype(float)))
+    write_csv(folder / "elasticity.csv", ("x [m]", "elasticity [m/N]"), (e.x, e.value))
+    write_csv(folder / "steady_arms.csv", ("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift))
+    lines = [f'"{name}","{value}"' for name, value in summary(result)]
+    write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
+    plots = {
+        "profile": statics_plots.profile(result.profiles, result.droppers, result.span),
+        "elasticity": statics_plots.elasticity(result.elasticity, result.span),
+        "droppers": statics_plots.droppers(result.span_droppers, result.span),
+    }
+    for name, figure in plots.items():
+        write_figure(folder / f"{name}.png", figure, 150)
+
+
+_DROPPER_COLUMNS = ("from the support [m]", "length [m]", "tension [N]")
+
+
+def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
+    contact = next(p for p in result.profiles if p.component == "contact_wire")
+    z = contact.z[statics.within(contact, result.span)]
+    rows = [("contact wire, highest and lowest [m]", f"{z.max():.4f}, {z.min():.4f}")]
+    d = result.span_droppers
+    rows.append(("dropper lengths, longest and shortest [m]", f"{d.length.max():.4f}, {d.length.min():.4f}"))
+    rows.append(("dropper tensions, largest and smallest [N]", f"{d.force.max():.1f}, {d.force.min():.1f}"))
+    return rows
+
+
+def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
+    at = np.flatnonzero(np.abs(result.arms.x - result.span.start) < 0.1)
+    if not at.size:
+        return []
+    arm = int(at[0])
+    return [
+        (f"steady arm at {result.span.start:g} m, lateral load [N]", f"{result.arms.lateral[arm]:.1f}"),
+        (f"steady arm at {result.span.start:g} m, lift by its tension [N]", f"{result.arms.lift[arm]:.1f}"),
+        (f"steady arm at {result.span.start:g} m, stiffness N/l [N/m]", f"{result.arms.pendulum[arm]:.1f}"),
+    ]
+
+
+def _dropper_rows(droppers: statics.Droppers) -> Iterable[Sequence[str]]:
+    for x, length, force, hanger in zip(droppers.x, droppers.length, droppers.force, droppers.is_hanger, strict=True):
+        yield f"{x:.2f}{' (hanger)' if hanger else ''}", f"{length:.4f}", f"{force:.1f}"
+
+
+def _write_profiles(folder: Path, profiles: Sequence[statics.Profile]) -> None:
+    """Write every kind of wire to a file of its own, stitch wires one after the other."""
+    for component in dict.fromkeys(p.component for p in profiles):
+        same = [p for p in profiles if p.component == component]
+        columns = [np.concatenate(c) for c in zip(*((p.x, p.y, p.z) for p in same), strict=True)]
+        write_csv(folder / f"{component}.csv", ("x [m]", "y [m]", "z [m]"), columns)

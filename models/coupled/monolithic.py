@@ -1,0 +1,159 @@
+"""Monolithic coupling of a line with lumped pantographs: one system, one step, no communication.
+
+The yardstick of the co-simulation: the same equations and the same time integration, but contact force, line and
+pantographs are solved together at the end of every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.catenary.line_model import CatenaryModel, ContactResult, StripMotion
+from models.contact_law import application_point
+from models.definition_files.parameter import BoolArray, FloatArray
+from models.pantograph.lumped.lumped_definition import LumpedDefinition
+from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+
+
+@dataclass(frozen=True)
+class CoupledRecord:
+    """What a coupled run leaves: one row per time, the start included.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+    position : ndarray, shape (n, P)
+        Of the strips along the track [m].
+    contact_force : ndarray, shape (n, P)
+        Resultants [N].
+    contact_point : ndarray, shape (n, P, 3)
+        Where the resultants act [m]; without contact as `application_point` says; NaN at the start.
+    section_force : ndarray, shape (n, P, n_sections)
+        Per wire [N].
+    strip_height : ndarray, shape (n, P)
+        [m].
+    uplift : ndarray, shape (n, n_supports)
+        [m].
+    dropper_force : ndarray, shape (n, n_droppers)
+        What they carry under their law [N].
+    dropper_slack : ndarray of bool, shape (n, n_droppers)
+        Which ones are slack.
+    """
+
+    time: FloatArray
+    position: FloatArray
+    contact_force: FloatArray
+    contact_point: FloatArray
+    section_force: FloatArray
+    strip_height: FloatArray
+    uplift: FloatArray
+    dropper_force: FloatArray
+    dropper_slack: BoolArray
+
+
+class CoupledModel:
+    """A line and its pantographs as one system.
+
+    Parameters
+    ----------
+    line : CatenaryModel
+    pantographs : sequence of LumpedDefinition
+        Each with its own ``start_position``.
+    """
+
+    def __init__(self, line: CatenaryModel, pantographs: Sequence[LumpedDefinition]) -> None:
+        self.line = line
+        self.pantographs = [LumpedModel(p) for p in pantographs]
+        self.line_state = line.initial_state(len(self.pantographs))
+        self.states: list[LumpedState] = [p.initial_state(p.load(0.0, np.zeros(2))) for p in self.pantographs]
+        self.time = 0.0
+
+    def step(self, step: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """Advance by ``step`` to the time ``end``.
+
+        Returns
+        -------
+        force : ndarray, shape (P, n_sections)
+            Contact forces per wire at the end of the step [N].
+        point : ndarray, shape (P, 3)
+            Where their resultants act [m].
+        """
+        loads = [p.load(end, np.zeros(2)) for p in self.pantographs]
+        free = [p.free_response(s, step, load) for p, s, load in zip(self.pantographs, self.states, loads, strict=True)]
+        motion = StripMotion(
+            np.array([self._strip(i, end, d[-1], self._speed(i, step, d)) for i, d in enumerate(free)]),
+            np.array([p.compliance(step)[-1] for p in self.pantographs]),
+        )
+        result = self.line.step(self.line_state, step, motion)
+        force = result.force.sum(axis=1)
+        for i, (model, state) in enumerate(zip(self.pantographs, self.states, strict=True)):
+            model.advance(state, step, free[i] - force[i] * model.compliance(step))
+        self.time = end
+        return result.force, _points(result, motion.strip)
+
+    @property
+    def strips(self) -> FloatArray:
+        """Return the strips as they are, shape (P, 2, 2, 3): end A, B; position, velocity; x, y, z."""
+        states = enumerate(self.states)
+        return np.array([self._strip(i, self.time, s.displacement[-1], s.velocity[-1]) for i, s in states])
+
+    def contact_at_rest(self) -> tuple[FloatArray, FloatArray]:
+        """Return forces and points, as of `step`, of the strips with the line as it stands; nothing is advanced."""
+        strips = self.strips
+        result = self.line.contact_at_rest(self.line_state, strips)
+        return result.force, _points(result, strips)
+
+    def run(self, stop: float, step: float, progress: Callable[[float], None] | None = None) -> CoupledRecord:
+        """Run to ``stop`` [s] with a fixed step [s] and record every step."""
+        count = round(stop / step)
+        record = self._empty_record(count + 1, step)
+        for n in range(count + 1):
+            if n:
+                force, point = self.step(step, n * step)
+                record.section_force[n], record.contact_point[n] = force, point
+                record.contact_force[n] = force.sum(axis=1)
+            record.strip_height[n] = [self._height(i) for i in range(len(self.states))]
+            record.uplift[n] = self.line.uplift(self.line_state)
+            record.dropper_force[n] = self.line.dropper_force(self.line_state)
+            record.dropper_slack[n] = self.line.dropper_slack(self.line_state)
+            if progress is not None:
+                progress(n * step)
+        return record
+
+    def _speed(self, i: int, step: float, displacement: FloatArray) -> float:
+        return float(self.pantographs[i].velocity_of(self.states[i], step, displacement)[-1])
+
+    def _strip(self, i: int, time: float, rise: float, vz: float) -> FloatArray:
+        definition = self.pantographs[i].definition
+        half = 0.5 * definition.strip_length
+        x = definition.start_position + definition.speed * time
+        z = definition.reference_height + rise
+        ends = [[[x, definition.strip_offset + side, z], [definition.speed, 0.0, vz]] for side in (half, -half)]
+        return np.array(ends)
+
+    def _height(self, i: int) -> float:
+        return float(self.pantographs[i].definition.reference_height + self.states[i].displacement[-1])
+
+    def _empty_record(self, rows: int, step: float) -> CoupledRecord:
+        P = len(self.pantographs)
+        time = np.arange(rows, dtype=np.float64) * step
+        position = np.stack([p.definition.start_position + p.definition.speed * time for p in self.pantographs], 1)
+        line = self.line
+        return CoupledRecord(
+            time=time,
+            position=position,
+            contact_force=np.zeros((rows, P)),
+            contact_point=np.full((rows, P, 3), np.nan),
+            section_force=np.zeros((rows, P, len(line.wires))),
+            strip_height=np.zeros((rows, P)),
+            uplift=np.zeros((rows, len(line.uplift_places))),
+            dropper_force=np.zeros((rows, len(line.dropper_stiffness))),
+            dropper_slack=np.zeros((rows, len(line.dropper_stiffness)), dtype=np.bool_),
+        )
+
+
+def _points(result: ContactResult, strips: FloatArray) -> FloatArray:
+    return np.array([application_point(*each) for each in zip(result.force, result.point, strips, strict=True)])

@@ -1,0 +1,67 @@
+"""What a model shows to whoever couples it: parameters with unit and source, state as plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+#: A model's whole state, bit for bit: name -> array.
+Snapshot = dict[str, npt.NDArray[np.generic]]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a definition that a user may change.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name, the key of the definition file (``contact_wire.tension``).
+    value : float
+        Start value, in ``unit``.
+    unit : str
+        SI unit, a key of ``models.definition_files.si_units.SI`` that maps to itself.
+    description : str
+        What it is, in one line.
+    minimum, maximum : float or None
+        Allowed range, if there is one.
+    source : str
+        Where the start value comes from; begins with ``choice`` where the source leaves it open.
+    is_integer : bool
+        Whether only whole numbers make sense.
+    """
+
+    name: str
+    value: float
+    unit: str
+    description: str
+    minimum: float | None = None
+    maximum: float | None = None
+    source: str = ""
+    is_integer: bool = False
+
+
+class ParameterError(ValueError):
+    """A parameter value that the model cannot take; says name, value and allowed range."""
+
+
+class Definition(Protocol):
+    """A checked, frozen description of a line or a pantograph, in SI."""
+
+    @property
+    def name(self) -> str:
+        """Return the name, as in the library and in the FMU's name."""
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return every tunable number."""
+
+    def with_values(self, values: Mapping[str, float]) -> Definition:
+        """Return a copy with some parameters changed; raises ``ParameterError``."""

@@ -1,0 +1,424 @@
+"""Reading definition files: values with unit and source, every mistake reported at once.
+
+A definition (a line, a pantograph, a mechanism) is a TOML file in which a physical value is written
+with its unit and its source::
+
+    tension = [20, "kN", "Table 5.2"]
+    encumbrance = [1.2, "m", "choice: gives the printed first dropper"]
+
+Sources that begin with ``choice`` mark what the data leaves open.
+"""
+
+from __future__ import annotations
+
+import math
+import reprlib
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from models.definition_files.si_units import shown, to_si
+
+#: Longest message told in full [characters]: a value may be megabytes of nested lists; and most of them told.
+_LONGEST: Final = 400
+_MOST: Final = 100
+#: Deepest nesting of tables and lists; a definition needs five levels.
+_DEEPEST: Final = 20
+#: Magnitudes in SI beyond which no quantity of a line or pantograph lies, and squares and quotients stay finite.
+LARGEST: Final = 1e15
+SMALLEST: Final = 1e-15
+
+
+class _Shown(reprlib.Repr):
+    """Values as they are told: short, whatever is in them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlist = self.maxdict = self.maxlevel = 4
+        self.maxstring = self.maxother = self.maxlong = 80
+
+    def repr_int(self, x: int, level: int) -> str:
+        """Return a number; Python refuses to write out one of thousands of digits."""
+        return f"(a whole number of {x.bit_length()} bits)" if x.bit_length() > 1000 else super().repr_int(x, level)
+
+
+_shown = _Shown().repr
+
+
+def beyond_all(value: float) -> str:
+    """Return why a value in SI cannot be that of anything here, empty if it can."""
+    if not abs(value) <= LARGEST:
+        return f"is not finite, or larger than anything here can be ({LARGEST:g})"
+    return ""
+
+
+def in_its_unit(unit: str) -> str:
+    """Return what to do about a value out of range: most such values are in another unit."""
+    return "" if unit == "1" else ": check its size and its unit"
+
+
+def one_line(text: str) -> str:
+    """Return text on one line, without control characters, its middle left out if it is very long."""
+    if len(text) > _LONGEST:
+        half = _LONGEST // 2
+        text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
+    return "".join(map(_printed, text))
+
+
+def printable(text: str) -> str:
+    """Return text whose characters all print, lines kept: for what others have written, on its way to a terminal."""
+    return "".join(c if c == "\n" else _printed(c) for c in text)
+
+
+def _printed(c: str) -> str:
+    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake in a definition: where it is, what is wrong, what to do."""
+
+    file: str
+    key: str
+    text: str
+
+    def __str__(self) -> str:
+        parts = (self.file, self.key, self.text) if self.key else (self.file, self.text)
+        return ": ".join(map(one_line, parts))
+
+
+class DefinitionError(ValueError):
+    """A definition that cannot be used; lists every problem found, one per line."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        lines = [str(p) for p in self.problems[:_MOST]]
+        if len(self.problems) > _MOST:
+            lines.append(f"... and {len(self.problems) - _MOST} more problems")
+        super().__init__("\n".join(lines))
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A value as written in a definition, with where it comes from.
+
+    Attributes
+    ----------
+    value : float or tuple of float
+        The number(s) as written.
+    unit : str
+        The unit as written.
+    source : str
+        Table, figure or norm; ``choice: why`` where the data leaves it open.
+    """
+
+    value: float | tuple[float, ...]
+    unit: str
+    source: str
+
+    @property
+    def is_choice(self) -> bool:
+        """Whether the value was chosen because no source states it."""
+        return self.source.startswith("choice")
+
+
+@dataclass
+class _Log:
+    file: str
+    problems: list[Problem] = field(default_factory=list)
+    provenance: dict[str, Quantity] = field(default_factory=dict)
+
+
+class Table:
+    """One table of a definition file, read key by key.
+
+    Reading collects problems instead of stopping; ``finish`` on the root reports unknown keys and raises
+    them all. A value that could not be read comes back as its ``default`` (or NaN, empty), so that reading goes on.
+    """
+
+    def __init__(self, data: dict[str, Any], log: _Log, path: str = "") -> None:
+        self._data = data
+        self._log = log
+        self._path = path
+        self._known: set[str] = set()
+        self._children: list[Table] = []
+
+    @classmethod
+    def load(cls, path: Path) -> Table:
+        """Read a TOML file.
+
+        Raises
+        ------
+        DefinitionError
+            If the file is missing, not UTF-8 or not TOML (with the line).
+        """
+        name = str(path)
+        try:
+            data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise DefinitionError([Problem(name, "", f"cannot be read ({error.strerror})")]) from error
+        except UnicodeDecodeError as error:
+            raise DefinitionError([Problem(name, "", f"is not UTF-8 text (byte {error.start})")]) from error
+        except RecursionError as error:
+            raise _too_deep(name) from error
+        except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
+            raise DefinitionError([Problem(name, "", f"is not TOML: {error}")]) from error
+        if _is_deep(data):
+            raise _too_deep(name)
+        return cls(data, _Log(name))
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], name: str = "definition") -> Table:
+        """Wrap an already parsed mapping; ``name`` stands for the file in messages."""
+        return cls(data, _Log(name))
+
+    @property
+    def provenance(self) -> dict[str, Quantity]:
+        """Every quantity read so far, by its dotted key, as written."""
+        return self._log.provenance
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The mapping that the table was made from."""
+        return self._data
+
+    @property
+    def file(self) -> str:
+        """The file's name, for messages."""
+        return self._log.file
+
+    def key(self, name: str) -> str:
+        """Return the dotted path of ``name`` in this table."""
+        return f"{self._path}.{name}" if self._path else name
+
+    def has(self, name: str) -> bool:
+        """Whether the table has the key."""
+        return name in self._data
+
+    def names(self) -> tuple[str, ...]:
+        """Return the keys, in the order of the file."""
+        return tuple(self._data)
+
+    def problem(self, name: str, text: str) -> None:
+        """Record a problem with the key ``name``."""
+        self._log.problems.append(Problem(self._log.file, self.key(name) if name else self._path, text))
+
+    def quantity(
+        self,
+        name: str,
+        unit: str,
+        *,
+        default: float | None = None,
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
+        positive: bool = False,
+    ) -> float:
+        """Read ``name = [value, "unit", "source"]`` and return it in the SI unit ``unit``.
+
+        Parameters
+        ----------
+        default : float, optional
+            Returned when the key is absent; without it the key is required.
+        minimum, maximum : float
+            Allowed range, in SI.
+        positive : bool
+            Whether the value must be greater than zero.
+        """
+        entry = self._entry(name, required=default is None)
+        if entry is None:
+            return math.nan if default is None else default
+        values = self._numbers(name, entry, unit, length=1)
+        if values is None:
+            return math.nan if default is None else default
+        self._check_range(name, values, unit, minimum, maximum, positive)
+        return values[0]
+
+    def quantities(
+        self,
+        name: str,
+        unit: str,
+        *,
+        length: int | None = None,
+        default: Sequence[float] | None = None,
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
+        positive: bool = False,
+    ) -> tuple[float, ...]:
+        """Read ``name = [[v1, v2, ...], "unit", "source"]`` and return the values in SI."""
+        fallback = tuple(default) if default is not None else (math.nan,) * (length or 0)
+        entry = self._entry(name, required=default is None)
+        if entry is None:
+            return fallback
+        values = self._numbers(name, entry, unit, length=length, many=True)
+        if values is None:
+            return fallback
+        self._check_range(name, values, unit, minimum, maximum, positive)
+        return values
+
+    def integer(self, name: str, *, default: int | None = None, minimum: int = 0, maximum: int = 10**6) -> int:
+        """Read a whole number (a plain one, or ``[n, "1", "source"]``)."""
+        entry = self._entry(name, required=default is None)
+        fallback = default if default is not None else minimum
+        if entry is None:
+            return fallback
+        value = entry
+        if isinstance(entry, list):
+            numbers = self._numbers(name, entry, "1", length=1)
+            if numbers is None:
+                return fallback
+            value = int(numbers[0]) if numbers[0].is_integer() else numbers[0]
+        if isinstance(value, bool) or not isinstance(value, int):
+            self.problem(name, f"{_shown(value)} is not a whole number")
+            return fallback
+        if not minimum <= value <= maximum:
+            self.problem(name, f"{_shown(value)} is outside {minimum} ... {maximum}")
+            return fallback
+        return value
+
+    def text(self, name: str, *, default: str | None = None, choices: Iterable[str] | None = None) -> str:
+        """Read a string, if ``choices`` is given one of them."""
+        entry = self._entry(name, required=default is None)
+        if entry is None:
+            return default or ""
+        if not isinstance(entry, str):
+            self.problem(name, f"{_shown(entry)} is not a text in quotation marks")
+            return default or ""
+        allowed = list(choices) if choices is not None else None
+        if allowed is not None and entry not in allowed:
+            self.problem(name, f"'{entry}' is none of {', '.join(allowed)}")
+        return entry
+
+    def flag(self, name: str, *, default: bool | None = None) -> bool:
+        """Read ``true`` or ``false``."""
+        entry = self._entry(name, required=default is None)
+        if entry is None:
+            return bool(default)
+        if not isinstance(entry, bool):
+            self.problem(name, f"{_shown(entry)} is neither true nor false")
+            return bool(default)
+        return entry
+
+    def table(self, name: str) -> Table | None:
+        """Return the sub-table ``[name]``, None if it is absent."""
+        entry = self._entry(name, required=False)
+        if entry is None:
+            return None
+        if not isinstance(entry, dict):
+            self.problem(name, f"must be a table [{self.key(name)}]")
+            return None
+        return self._child(entry, self.key(name))
+
+    def required_table(self, name: str) -> Table:
+        """Return the sub-table ``[name]``; its absence is a problem and gives an empty table."""
+        table = self.table(name)
+        if table is None:
+            if name not in self._data:
+                self.problem(name, f"table [{self.key(name)}] is missing")
+            table = Table({}, _Log(self._log.file), self.key(name))  # its own log: one message is enough
+        return table
+
+    def tables(self, name: str) -> list[Table]:
+        """Return the array of tables ``[[name]]``, empty if absent."""
+        entry = self._entry(name, required=False)
+        if entry is None:
+            return []
+        if not isinstance(entry, list) or not all(isinstance(e, dict) for e in entry):
+            self.problem(name, f"must be an array of tables [[{self.key(name)}]]")
+            return []
+        return [self._child(e, f"{self.key(name)}[{i}]") for i, e in enumerate(entry, 1)]
+
+    def finish(self) -> None:
+        """Report keys that nothing read, and raise if there was any problem.
+
+        Raises
+        ------
+        DefinitionError
+            With every problem of the file.
+        """
+        self._report_unknown()
+        if self._log.problems:
+            # A rule that is read for every span reports its mistakes for every span.
+            raise DefinitionError(tuple(dict.fromkeys(self._log.problems)))
+
+    def _child(self, data: dict[str, Any], path: str) -> Table:
+        child = Table(data, self._log, path)
+        self._children.append(child)
+        return child
+
+    def _entry(self, name: str, *, required: bool) -> Any:
+        self._known.add(name)
+        if name not in self._data:
+            if required:
+                self.problem(name, "is missing")
+            return None
+        return self._data[name]
+
+    def _numbers(
+        self, name: str, entry: Any, unit: str, *, length: int | None, many: bool = False
+    ) -> tuple[float, ...] | None:
+        form = "[[v1, v2, ...]" if many else "[value"
+        if not (isinstance(entry, list) and len(entry) == 3 and all(isinstance(e, str) for e in entry[1:])):
+            self.problem(name, f'{_shown(entry)} must be written {form}, "unit", "source"]')
+            return None
+        raw, written_unit, source = entry
+        if not source.strip():
+            self.problem(name, "names no source; where none states the value, write 'choice: why'")
+        values = raw if many and isinstance(raw, list) else [raw]
+        if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
+            self.problem(name, f"{_shown(raw)} is not a number")
+            return None
+        if self._has_absurd(name, values):
+            return None
+        if length is not None and len(values) != length:
+            self.problem(name, f"has {len(values)} values where {length} are needed")
+            return None
+        try:
+            converted = tuple(to_si(float(v), written_unit, unit) for v in values)
+        except ValueError as error:
+            self.problem(name, str(error))
+            return None
+        if self._has_absurd(name, converted):
+            return None
+        written = tuple(float(v) for v in values) if many else float(values[0])
+        self._log.provenance[self.key(name)] = Quantity(written, written_unit, source)
+        return converted
+
+    def _has_absurd(self, name: str, values: Sequence[float]) -> bool:
+        for value in values:
+            if text := beyond_all(value):
+                self.problem(name, f"{_shown(value)} {text}")
+                return True
+        return False
+
+    def _check_range(
+        self, name: str, values: tuple[float, ...], unit: str, minimum: float, maximum: float, positive: bool
+    ) -> None:
+        for value in values:
+            if positive and value < SMALLEST:
+                self.problem(name, f"{shown(value, unit)} must be greater than 0")
+            elif not minimum <= value <= maximum:
+                text = f"{shown(value, unit)} is outside {minimum:g} ... {shown(maximum, unit)}"
+                self.problem(name, text + in_its_unit(unit))
+
+    def _report_unknown(self) -> None:
+        for name in self._data:
+            if name not in self._known:
+                known = ", ".join(sorted(self._known)) or "none"
+                self.problem(name, f"unknown key (known here: {known})")
+        for child in self._children:
+            child._report_unknown()
+
+
+def _too_deep(file: str) -> DefinitionError:
+    return DefinitionError([Problem(file, "", f"is not a definition: it is nested more than {_DEEPEST} levels")])
+
+
+def _is_deep(data: Any) -> bool:
+    """Whether values are nested deeper than allowed; found without recursion."""
+    level = [data]
+    for _ in range(_DEEPEST):
+        inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, (dict, list))]
+        level = [v for values in inner for v in values]
+    return bool(level)

@@ -1,0 +1,70 @@
+"""The energy balance of a part: what it was given must be what it holds and has lost.
+
+The trapezoidal rule keeps this balance exactly: over a step of length h, with d what the displacements change by,
+
+    E_n+1 - E_n = d . (f_n + f_n+1) / 2 - d . C d / h
+
+whatever the forces f are. So the drift, what the balance is off by, is rounding; more of it means that something
+other than a force has changed the state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.definition_files.field_schema import count
+from models.definition_files.parameter import FloatArray, Snapshot
+
+#: Names of the values of a balance, and what they are.
+BALANCE = (
+    ("stored", "kinetic and elastic energy, from the static state"),
+    ("dissipated", "energy lost in dampers"),
+    ("work", "work of all outer forces"),
+    ("drift", "stored and dissipated energy minus work: what the balance is off by"),
+)
+#: The values where no balance is kept: numbers, as hosts and comparisons of states have their troubles with NaN.
+NO_BALANCE = np.zeros(len(BALANCE))
+
+
+def monitoring() -> Any:
+    """Declare the number of a definition that says whether the balance is kept."""
+    return count("whether the energy balance is kept, for energy.* and contact.work: 0 no, 1 yes", default=0, maximum=1)
+
+
+@dataclass
+class Ledger:
+    """Sums over the steps made so far.
+
+    Attributes
+    ----------
+    at_contact : ndarray, shape (P,)
+        Work that the strip has done against each contact [J].
+    work, dissipated : float
+        Work of the outer forces, and energy lost [J].
+    """
+
+    at_contact: FloatArray
+    work: float = 0.0
+    dissipated: float = 0.0
+
+    def balance(self, stored: float) -> FloatArray:
+        """Return the values of `BALANCE` [J], shape (4,), from the energy that is held [J].
+
+        Examples
+        --------
+        >>> Ledger(np.zeros(1), work=5.0, dissipated=2.0).balance(3.5).tolist()
+        [3.5, 2.0, 5.0, 0.5]
+        """
+        return np.array([stored, self.dissipated, self.work, stored + self.dissipated - self.work])
+
+    def snapshot(self) -> Snapshot:
+        """Return the sums."""
+        return {"energy.sums": np.array([self.work, self.dissipated, *self.at_contact])}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over the sums of a snapshot."""
+        self.work, self.dissipated, *at_contact = snapshot["energy.sums"].tolist()
+        self.at_contact[...] = at_contact

@@ -1,0 +1,72 @@
+"""The energy balance of a lumped pantograph; see `models.numerics.energy_ledger`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.definition_files.parameter import FloatArray, Snapshot
+from models.numerics.energy_ledger import Ledger
+
+if TYPE_CHECKING:
+    from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+
+
+class LumpedBalance:
+    """Adds up, step by step, the work of all loads on the masses and what the dampers take.
+
+    Energy counts from where the springs carry the weights; the roof's motion is a load.
+
+    Parameters
+    ----------
+    model : LumpedModel
+    load : ndarray, shape (n,)
+        Load on the masses at the beginning, the contact force included [N].
+    force : float
+        Contact force at the beginning [N].
+    """
+
+    def __init__(self, model: LumpedModel, load: FloatArray, force: float) -> None:
+        self._model = model
+        self._load, self._force = load.copy(), force
+        self._ledger = Ledger(np.zeros(1))
+
+    @property
+    def contact_work(self) -> FloatArray:
+        """Return the work that the strip has done against the contact [J], shape (1,)."""
+        return self._ledger.at_contact
+
+    def add(self, step: float, change: FloatArray, load: FloatArray, force: float) -> None:
+        """Add a step.
+
+        Parameters
+        ----------
+        step : float
+            [s]
+        change : ndarray, shape (n,)
+            What the displacements have changed by [m].
+        load : ndarray, shape (n,)
+            Load at its end, the contact force included [N].
+        force : float
+            Contact force at its end [N].
+        """
+        ledger = self._ledger
+        ledger.work += 0.5 * float(change @ (self._load + load))
+        ledger.dissipated += float(change @ self._model.C @ change) / step
+        ledger.at_contact += 0.5 * (self._force + force) * change[-1]
+        self._load, self._force = load, force
+
+    def balance(self, state: LumpedState) -> FloatArray:
+        """Return the values of `models.numerics.energy_ledger.BALANCE` [J], shape (4,)."""
+        d, v, model = state.displacement, state.velocity, self._model
+        return self._ledger.balance(0.5 * float(v @ model.M @ v + d @ model.K @ d))
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state."""
+        return self._ledger.snapshot() | {"energy.load": self._load.copy(), "energy.force": np.array([self._force])}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        self._ledger.restore(snapshot)
+        self._load, self._force = snapshot["energy.load"].astype(np.float64), float(snapshot["energy.force"][0])

@@ -1,0 +1,165 @@
+"""What describes a pantograph on a test rig: statics over the working height, modes, response of the strip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.definition_files.parameter import FloatArray
+from models.pantograph.multibody.analysis.linearisation import (
+    ComplexArray,
+    Mode,
+    apparent_mass,
+    base_transmission,
+    linearise,
+    modes,
+    receptance,
+)
+from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium, settle_springs
+from models.pantograph.multibody.mechanism import Mechanism, MechanismError
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+
+
+@dataclass(frozen=True)
+class Statics:
+    """Statics over strip heights; rows that cannot be reached are left out.
+
+    Attributes
+    ----------
+    height : ndarray, shape (h,)
+        Of the strip above top of rail [m].
+    balance : ndarray, shape (h,)
+        Lifting value that the weights alone need [N or N.m].
+    lift : ndarray, shape (h,)
+        Lifting value that also carries the given contact force [N or N.m].
+    contact_force : ndarray, shape (h,)
+        Contact force with the definition's own lifting value [N].
+    """
+
+    height: FloatArray
+    balance: FloatArray
+    lift: FloatArray
+    contact_force: FloatArray
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """Small motions about an equilibrium.
+
+    Attributes
+    ----------
+    height, contact_force, lift : float
+        The equilibrium: strip height above top of rail [m], contact force [N], lifting value [N or N.m].
+    modes : tuple of Mode
+    frequency : ndarray, shape (f,)
+        [Hz]
+    receptance, apparent_mass, base_transmission : ndarray, shape (f,)
+        Of the contact point [m/N, kg, 1].
+    """
+
+    height: float
+    contact_force: float
+    lift: float
+    modes: tuple[Mode, ...]
+    frequency: FloatArray
+    receptance: ComplexArray
+    apparent_mass: ComplexArray
+    base_transmission: ComplexArray
+
+
+class Rig:
+    """A pantograph on a rig, its base where it is in operation.
+
+    Parameters
+    ----------
+    definition : MechanismDefinition
+
+    Attributes
+    ----------
+    base_height : float
+        Of the base's origin above top of rail [m].
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism cannot be assembled or balanced.
+    """
+
+    def __init__(self, definition: MechanismDefinition) -> None:
+        self.definition = definition
+        self.mechanism = Mechanism(definition)
+        self._start = settle_springs(self.mechanism)
+        self.base_height = definition.operation.reference_height - self.mechanism.strip_height(self._start)
+
+    @property
+    def lift_unit(self) -> str:
+        """Unit of the lifting value."""
+        lift = self.definition.lift_force
+        return "N.m" if lift is not None and lift.kind == "actuator_moment" else "N"
+
+    def statics(self, heights: FloatArray, contact_force: float = 157.5) -> Statics:
+        """Return the statics at strip heights above top of rail [m], going up and down from the reference height."""
+        reference = self.definition.operation.reference_height
+        up = sorted(h for h in heights.tolist() if h >= reference)
+        down = sorted((h for h in heights.tolist() if h < reference), reverse=True)
+        rows = sorted(self._sweep(up, contact_force) + self._sweep(down, contact_force))
+        columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+        return Statics(columns[0], columns[1], columns[2], columns[3])
+
+    def _sweep(self, heights: list[float], contact_force: float) -> list[tuple[float, float, float, float]]:
+        """Solve height after height until one is out of reach."""
+        rows = []
+        y = self._start
+        for height in heights:
+            above = height - self.base_height
+            try:
+                idle = equilibrium(self.mechanism, above, start=y)
+                loaded = equilibrium(self.mechanism, above, contact_force=contact_force, start=idle.y)
+                pressed = contact_force_at(self.mechanism, above, self.definition.lift, start=idle.y)
+            except (MechanismError, np.linalg.LinAlgError):
+                break
+            rows.append((height, idle.lift, loaded.lift, pressed.inputs.force))
+            y = idle.y
+        return rows
+
+    def dynamics(
+        self, height: float, frequencies: FloatArray, contact_force: float = 157.5, lateral: float = 0.0
+    ) -> Dynamics:
+        """Return modes and responses about an equilibrium.
+
+        Parameters
+        ----------
+        height : float
+            Of the strip's middle above top of rail [m].
+        frequencies : ndarray, shape (f,)
+            [Hz], greater than 0.
+        contact_force : float
+            Constant force on the strip [N].
+        lateral : float
+            y of its point of application, which is also where the response is taken [m].
+        """
+        found = equilibrium(
+            self.mechanism,
+            height - self.base_height,
+            contact_force=contact_force,
+            lateral=lateral,
+            start=self._start,
+        )
+        try:
+            model = linearise(self.mechanism, found.y, found.inputs)
+            return Dynamics(
+                height,
+                contact_force,
+                found.lift,
+                modes(self.mechanism, model),
+                np.asarray(frequencies, dtype=np.float64),
+                receptance(model, frequencies),
+                apparent_mass(model, frequencies),
+                base_transmission(self.mechanism, model, frequencies),
+            )
+        except np.linalg.LinAlgError as error:
+            raise MechanismError(
+                f"{self.definition.name}: its small motions about a strip height of {height:g} m have no solution "
+                f"({error}); look for a part that nothing holds, or joints that say the same twice"
+            ) from error

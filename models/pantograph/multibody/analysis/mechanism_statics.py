@@ -1,0 +1,231 @@
+"""Static equilibrium: which lifting moment (or force) holds the strip where, against which contact force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from models.definition_files.parameter import FloatArray
+from models.pantograph.multibody.analysis.linearisation import stiffness
+from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
+from models.pantograph.multibody.mechanism_assembly import assemble, coordinate, null_space, project
+
+_ITERATIONS: Final = 60
+#: Largest change of height from one solution to the next on the way to a distant one [m].
+_STAGE: Final = 0.05
+#: Residual load at which an equilibrium is accepted, relative to the weights.
+_BALANCED: Final = 1e-11
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A mechanism at rest.
+
+    Attributes
+    ----------
+    y : ndarray, shape (13 n,)
+        State.
+    inputs : Inputs
+        The lifting value, contact force and point that hold it.
+    strip_height : float
+        Of the strip's middle above the base's origin [m].
+    """
+
+    y: FloatArray
+    inputs: Inputs
+    strip_height: float
+
+    @property
+    def lift(self) -> float:
+        """Lifting force or moment [N or N.m]."""
+        return self.inputs.lift
+
+
+#: A condition: state -> value that must vanish.
+Condition = Callable[[FloatArray], float]
+
+
+def equilibrium(
+    mechanism: Mechanism,
+    strip_height: float | None = None,
+    *,
+    contact_force: float = 0.0,
+    lateral: float = 0.0,
+    start: FloatArray | None = None,
+) -> Equilibrium:
+    """Find the lifting value that balances the mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    strip_height : float, optional
+        Height of the strip's middle above the base's origin [m]; without it the coordinate that the assembly keeps
+        stays as written: the working configuration.
+    contact_force : float
+        Downward force on the strip [N].
+    lateral : float
+        y of its point of application [m].
+    start : ndarray, optional
+        State to start from; the assembled one by default.
+
+    Raises
+    ------
+    MechanismError
+        If there is none, or the height is out of reach.
+    """
+    y = assemble(mechanism) if start is None else start
+
+    def inputs(lift: float) -> Inputs:
+        return Inputs(lift=lift, force=contact_force, lateral=lateral)
+
+    if strip_height is None:
+        y, lift = _solve(mechanism, y, inputs, 0.0, _kept(mechanism, y))
+    else:
+        y, lift = _approach(mechanism, y, inputs, 0.0, strip_height)
+    return Equilibrium(y, inputs(lift), mechanism.strip_height(y))
+
+
+def contact_force_at(
+    mechanism: Mechanism, strip_height: float, lift: float, *, start: FloatArray | None = None
+) -> Equilibrium:
+    """Find the contact force that holds the strip's middle at a height [m] against a given lifting value."""
+    y = assemble(mechanism) if start is None else start
+
+    def inputs(force: float) -> Inputs:
+        return Inputs(lift=lift, force=force)
+
+    y, force = _approach(mechanism, y, inputs, 1e-6, strip_height)
+    return Equilibrium(y, inputs(force), mechanism.strip_height(y))
+
+
+def lift_over_height(mechanism: Mechanism, heights: FloatArray, contact_force: float = 0.0) -> tuple[Equilibrium, ...]:
+    """Return the equilibria at several strip heights above the base's origin, each found from the one before."""
+    y: FloatArray | None = None
+    found = []
+    for height in heights:
+        found.append(equilibrium(mechanism, float(height), contact_force=contact_force, start=y))
+        y = found[-1].y
+    return tuple(found)
+
+
+def weight_carrying_lengths(mechanism: Mechanism, y: FloatArray) -> FloatArray:
+    """Return the free lengths with which the springs set to carry the weights do so in a configuration.
+
+    The lifting element and the contact do nothing then.
+
+    Returns
+    -------
+    ndarray, shape (springs,)
+        In the order of the definition [m].
+
+    Raises
+    ------
+    MechanismError
+        If these springs cannot balance the weights.
+    """
+    lines = mechanism.forces.lines
+    kinematics = mechanism.kinematics(y)
+    vectors = mechanism.pool.evaluate(kinematics)
+    length, _, divisor = lines.lengths(vectors)
+    basis = null_space(mechanism, y)
+    W = mechanism.roots(kinematics.frames)
+
+    def reduce(loads: FloatArray) -> FloatArray:
+        reduced: FloatArray = basis.T @ (loads[:, None, :] @ W).ravel()
+        return reduced
+
+    per_newton = [reduce(lines.spread(np.eye(lines.count)[k] / divisor, vectors)) for k in lines.carries]
+    for k in lines.carries:
+        lines.free_length[k] = length[k]
+    missing = reduce(mechanism.loads(y, kinematics, Inputs()))
+    matrix = np.array(per_newton).T
+    tension = np.linalg.lstsq(matrix, -missing, rcond=None)[0]
+    if np.abs(matrix @ tension + missing).max() > 1e-8 * (1.0 + np.abs(missing).max()):
+        names = ", ".join(lines.names[k] for k in lines.carries)
+        raise MechanismError(f"{mechanism.definition.name}: the springs {names} cannot carry the weights alone")
+    lengths: FloatArray = length[lines.carries] - tension / lines.stiffness[lines.carries]
+    return lengths
+
+
+def settle_springs(mechanism: Mechanism) -> FloatArray:
+    """Give the springs that carry the weights their free lengths; return the working configuration at rest."""
+    y = assemble(mechanism)
+    lines = mechanism.forces.lines
+    if len(lines.carries):
+        lines.free_length[lines.carries] = weight_carrying_lengths(mechanism, y)
+    return equilibrium(mechanism, start=y).y
+
+
+def _approach(
+    mechanism: Mechanism, y: FloatArray, inputs_of: Callable[[float], Inputs], unknown: float, height: float
+) -> tuple[FloatArray, float]:
+    """Solve for a strip height, going there in stages."""
+    now = mechanism.strip_height(y)
+    stages = max(1, int(np.ceil(abs(height - now) / _STAGE)))
+    for target in np.linspace(now, height, stages + 1)[1:]:
+        y, unknown = _solve(mechanism, y, inputs_of, unknown, _height(mechanism, float(target)))
+    return y, unknown
+
+
+def _solve(
+    mechanism: Mechanism,
+    y: FloatArray,
+    inputs_of: Callable[[float], Inputs],
+    unknown: float,
+    condition: Condition,
+) -> tuple[FloatArray, float]:
+    """Newton's method in the motions that the joints allow, for the configuration and one unknown input.
+
+    The loads are linear in the unknown; each step is limited so that bodies turn and move by little.
+    """
+    scale = float(np.abs(mechanism.mass).sum() * mechanism.definition.gravity) or 1.0
+    for _ in range(_ITERATIONS):
+        basis = null_space(mechanism, y)
+        load = _reduced(mechanism, y, inputs_of(unknown), basis)
+        by_unknown = _reduced(mechanism, y, inputs_of(unknown + 1.0), basis) - load
+        gap = condition(y)
+        if np.abs(load).max() <= _BALANCED * scale and abs(gap) <= 1e-12:
+            return y, unknown
+        slope = _slope(mechanism, y, basis, condition)
+        K = stiffness(mechanism, y, inputs_of(unknown), basis)
+        system = np.block([[K, -by_unknown[:, None]], [slope[None, :], np.zeros((1, 1))]])
+        step = np.linalg.lstsq(system, np.append(load, -gap), rcond=1e-13)[0]
+        shifts, turns = mechanism.unscaled(basis @ step[:-1])
+        limit = min(1.0, 0.1 / max(float(np.abs(shifts).max()), float(np.abs(turns).max()), 1e-300))
+        y = project(mechanism, mechanism.moved(y, limit * (basis @ step[:-1])))
+        unknown += float(limit * step[-1])
+    raise MechanismError(
+        f"{mechanism.definition.name}: no static equilibrium found; strip at {mechanism.strip_height(y):.4g} m above "
+        f"the base, {abs(gap):.3g} m from where it is wanted, residual load {np.abs(load).max():.3g} N"
+    )
+
+
+def _reduced(mechanism: Mechanism, y: FloatArray, inputs: Inputs, basis: FloatArray) -> FloatArray:
+    """Return the loads' components along the basis, shape (d,)."""
+    kinematics = mechanism.kinematics(y)
+    loads = mechanism.loads(y, kinematics, inputs)
+    reduced: FloatArray = basis.T @ (loads[:, None, :] @ mechanism.roots(kinematics.frames)).ravel()
+    return reduced
+
+
+def _slope(mechanism: Mechanism, y: FloatArray, basis: FloatArray, condition: Condition) -> FloatArray:
+    """Return the condition's derivatives along the basis, by central differences."""
+    h = 1e-6
+    ahead = [condition(mechanism.moved(y, h * column)) for column in basis.T]
+    behind = [condition(mechanism.moved(y, -h * column)) for column in basis.T]
+    return (np.array(ahead) - np.array(behind)) / (2.0 * h)
+
+
+def _height(mechanism: Mechanism, height: float) -> Condition:
+    return lambda y: mechanism.strip_height(y) - height
+
+
+def _kept(mechanism: Mechanism, y: FloatArray) -> Condition:
+    choice = mechanism.definition.assembly
+    if not choice.body:
+        raise MechanismError(f"{mechanism.definition.name}: [assembly] names no body whose coordinate is kept")
+    kept = coordinate(mechanism, y, choice.body, choice.coordinate)
+    return lambda y: coordinate(mechanism, y, choice.body, choice.coordinate) - kept

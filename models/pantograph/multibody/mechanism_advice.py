@@ -1,0 +1,49 @@
+"""Warnings about a multibody pantograph under a wire: what a run may do, but whose results deserve a second look."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.definition_files.parameter import FloatArray
+from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at
+from models.pantograph.multibody.mechanism import Mechanism, MechanismError
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.working_height import Raised
+
+
+def working_height_warning(mechanism: Mechanism, standing: FloatArray, x: float, z: float) -> str:
+    """Say so if the lifting value that is for the reference height leaves less at the wire's; empty if it does not.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Of a pantograph, its springs settled.
+    standing : ndarray, shape (13 n,)
+        State with the strip at the reference height.
+    x, z : float
+        Where the wire is above the strip as it starts [m].
+    """
+    definition = mechanism.definition
+    raised = _raised(definition)
+    if not raised.is_under_another_height(x, z) or not raised.value:
+        return ""
+    above = mechanism.strip_height(standing)
+    at_reference = _force(mechanism, standing, above)
+    if at_reference is None or at_reference <= 0.0:
+        return ""  # it lifts nothing even there: the run tells
+    return raised.warning(z, _force(mechanism, standing, above + z - raised.reference), at_reference)
+
+
+def _raised(definition: MechanismDefinition) -> Raised:
+    lift, operation = definition.lift_force, definition.operation
+    is_moment = lift is not None and lift.kind == "actuator_moment"
+    parameter, unit = ("static_moment", "N.m") if is_moment else ("static_force", "N")
+    return Raised(parameter, definition.lift, unit, operation.reference_height, operation.start_position)
+
+
+def _force(mechanism: Mechanism, standing: FloatArray, height: float) -> float | None:
+    """Return the static contact force at a strip height above the base [N], None if there is no equilibrium."""
+    try:
+        return contact_force_at(mechanism, height, mechanism.definition.lift, start=standing).inputs.force
+    except (MechanismError, np.linalg.LinAlgError):
+        return None

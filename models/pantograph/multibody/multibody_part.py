@@ -1,0 +1,449 @@
+"""A multibody pantograph between communication points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from models.definition_files.parameter import FloatArray, Snapshot
+from models.numerics.energy_ledger import NO_BALANCE
+from models.numerics.extrapolation import ForceExtrapolation, lead_of
+from models.pantograph.multibody.analysis.mechanism_statics import equilibrium, settle_springs
+from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
+from models.pantograph.multibody.mechanism_advice import working_height_warning
+from models.pantograph.multibody.mechanism_assembly import project
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.multibody.mechanism_energy import MechanismBalance
+from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
+
+#: A contact point that wanders faster across the track than this has jumped, from wire to wire say [m/s].
+_FASTEST_SWEEP: Final = 5.0
+
+
+@dataclass
+class LateralExtrapolation:
+    """Lateral position of the contact over a step: linear through its last two values, held after a jump.
+
+    Attributes
+    ----------
+    times, values : ndarray, shape (2,)
+        Last value first [s, m].
+    rate : float
+        [m/s]
+    """
+
+    times: FloatArray = field(default_factory=lambda: np.zeros(2))
+    values: FloatArray = field(default_factory=lambda: np.zeros(2))
+    rate: float = 0.0
+
+    def start(self, time: float, value: float) -> None:
+        """Forget everything but one value."""
+        self.times[:] = time
+        self.values[:] = value
+        self.rate = 0.0
+
+    def receive(self, time: float, value: float) -> None:
+        """Take a value that holds at ``time``; one for the same time replaces the last."""
+        if time > self.times[0] + 1e-12:
+            self.times[1], self.values[1] = self.times[0], self.values[0]
+            self.times[0] = time
+        self.values[0] = value
+        elapsed = float(self.times[0] - self.times[1])
+        rate = float(self.values[0] - self.values[1]) / elapsed if elapsed > 0.0 else 0.0
+        self.rate = rate if abs(rate) <= _FASTEST_SWEEP else 0.0
+
+    def at(self, time: float) -> float:
+        """Return the position at ``time`` [m]."""
+        return float(self.values[0]) + self.rate * (time - float(self.times[0]))
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state."""
+        rate = np.array([self.rate])
+        return {"lateral.times": self.times.copy(), "lateral.values": self.values.copy(), "lateral.rate": rate}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        self.times[...] = snapshot["lateral.times"]
+        self.values[...] = snapshot["lateral.values"]
+        self.rate = float(snapshot["lateral.rate"][0])
+
+
+@dataclass
+class BaseMotion:
+    """The roof's vertical motion over a step: smooth, and at its end where the inputs lead.
+
+    A cubic joins where the base is to where its received height and velocity, and the trend of the velocity, will have
+    taken it by the end of the step; so the base never jumps, whatever the inputs do.
+
+    Attributes
+    ----------
+    now : ndarray, shape (2,)
+        Height and velocity of the base [m, m/s].
+    received : ndarray, shape (2,)
+        Velocity received last [m/s], and how long before this step that was (0: never) [s].
+    cubic : ndarray, shape (4,)
+        Coefficients of the present step, constant one first.
+    """
+
+    now: FloatArray = field(default_factory=lambda: np.zeros(2))
+    received: FloatArray = field(default_factory=lambda: np.zeros(2))
+    cubic: FloatArray = field(default_factory=lambda: np.zeros(4))
+
+    def start(self, base: FloatArray) -> None:
+        """Begin at a height and velocity."""
+        self.now[...] = base
+        self.received[...] = base[1], 0.0
+        self.cubic[...] = base[0], base[1], 0.0, 0.0
+
+    def receive(self, base: FloatArray, step: float) -> None:
+        """Plan the motion over a step from the height and velocity at its beginning, shape (2,)."""
+        z, v = float(base[0]), float(base[1])
+        since = float(self.received[1])
+        trend = (v - float(self.received[0])) / since if since > 0.0 else 0.0
+        end, end_speed = z + v * step + 0.5 * trend * step**2, v + trend * step
+        z0, v0 = float(self.now[0]), float(self.now[1])
+        mean = (end - z0) / step
+        self.cubic[...] = z0, v0, (3.0 * mean - 2.0 * v0 - end_speed) / step, (v0 + end_speed - 2.0 * mean) / step**2
+        self.received[...] = v, step
+
+    def at(self, tau: float) -> tuple[float, float, float]:
+        """Return height, velocity and acceleration at ``tau`` [s] after the step's beginning."""
+        a, b, c, d = self.cubic.tolist()
+        return (
+            a + tau * (b + tau * (c + tau * d)),
+            b + tau * (2.0 * c + 3.0 * tau * d),
+            2.0 * c + 6.0 * tau * d,
+        )
+
+    def finish(self, step: float) -> None:
+        """Move to the end of the step."""
+        self.now[...] = self.at(step)[:2]
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state."""
+        names = ("now", "received", "cubic")
+        return {f"base.{name}": getattr(self, name).copy() for name in names}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        for name in ("now", "received", "cubic"):
+            getattr(self, name)[...] = snapshot[f"base.{name}"]
+
+
+class MultibodyPantographPart:
+    """A multibody pantograph between communication points.
+
+    At first it stands in its working configuration (the written one, assembled) with the strip at the reference
+    height, held by the lifting value that balances the weights; the ramp of the raise leads from there to the full
+    value. The base stands at the height above the rails that this takes.
+
+    Parameters
+    ----------
+    definition : MechanismDefinition
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    strip : ndarray, shape (2, 2, 3)
+        End A (left), B (right); position, velocity; x, y, z.
+    observed : tuple of (name, unit, description)
+        What ``observation_values`` gives.
+    """
+
+    def __init__(self, definition: MechanismDefinition) -> None:
+        self.definition = definition
+        self.observed = _observed(definition)
+        self.time = 0.0
+        self.strip = np.zeros((2, 2, 3))
+        self._start_time = 0.0
+        self._force = ForceExtrapolation(definition.operation.extrapolation_order)
+        self._lateral = LateralExtrapolation()
+        self._base = BaseMotion()
+        self._y = np.zeros(0)
+        self._last: _Last | None = None
+        self._history: History | None = None
+        self._substep = definition.operation.time_step
+        self._observation = np.zeros(len(self.observed))
+        self._built: _Built | None = None
+        self._balance: MechanismBalance | None = None
+
+    def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
+        """Set the pantograph to rest (on its roof) at its reference height at ``time``.
+
+        Parameters
+        ----------
+        time : float
+            [s]
+        force : float
+            Contact force [N].
+        point : ndarray, shape (3,)
+            Its point of application [m].
+        base : ndarray, shape (2,)
+            Height and vertical velocity of the roof [m, m/s].
+
+        Raises
+        ------
+        MechanismError
+            If the mechanism cannot be assembled or balanced.
+        """
+        built = self._ready()
+        self.time = self._start_time = time
+        self._force.start(time, force)
+        self._lateral.start(time, float(point[1]))
+        self._base.start(base)
+        self._substep = self.definition.operation.time_step
+        self._history = None
+        self._y = built.standing.copy()
+        s = built.mechanism.split(self._y)
+        s.r[:, 2] += base[0]
+        s.v[:, 2] += base[1]
+        inputs = self._inputs(0.0)
+        self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
+        watched = self.definition.operation.monitor_energy
+        self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
+
+    def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
+        """Advance by ``step`` [s].
+
+        Parameters
+        ----------
+        force : float
+            Contact force received for the beginning of the step (or its end, if its point says so) [N].
+        point : ndarray, shape (3,)
+            Its point of application [m].
+        base : ndarray, shape (2,)
+            Height and vertical velocity of the roof at the beginning of the step [m, m/s].
+        step : float
+            [s]
+
+        Raises
+        ------
+        MechanismError
+            If the motion becomes singular.
+        """
+        built = self._ready()
+        values = (force, *point.tolist(), *base.tolist())
+        if not all(map(math.isfinite, values)):
+            raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
+        operation = self.definition.operation
+        expected = float(self.strip[:, 0, 0].mean())
+        self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
+        self._receive_lateral(force, point, expected, step)
+        self._base.receive(base, step)
+        elapsed = self.time - self._start_time
+        kinks = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
+        first, history = self._continuation()
+        done = built.integrator.advance(self._y, self._inputs, step, self._substep, kinks, first, history)
+        self._account(step, first, done)
+        self._y, self._substep, self._history = done.y, done.step, done.history
+        inputs = self._inputs(step)
+        self._base.finish(step)
+        self.time += step
+        self._remember(done.evaluation, inputs)
+
+    @property
+    def energy(self) -> FloatArray:
+        """Return the values of `energy_ledger.BALANCE` [J], shape (4,); 0 if the balance is not kept."""
+        return NO_BALANCE if self._balance is None else self._balance.balance(self._y)
+
+    @property
+    def contact_work(self) -> FloatArray:
+        """Return the work of the strip against the contact [J], shape (1,); 0 if the balance is not kept."""
+        return np.zeros(1) if self._balance is None else self._balance.contact_work
+
+    def observation_values(self) -> FloatArray:
+        """Return the values of ``observed``."""
+        return self._observation.copy()
+
+    def working_height_warning(self, x: float, z: float) -> str:
+        """Say so if the wire above the start, at (x, z) [m], is higher than the lifting value is for."""
+        built = self._ready()
+        return working_height_warning(built.mechanism, built.standing, x, z)
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state, bit for bit."""
+        return {
+            "time": np.array([self.time, self._start_time]),
+            "state": self._y.copy(),
+            "substep": np.array([self._substep]),
+            "strip": self.strip.copy(),
+            "observation": self._observation.copy(),
+            **(self._last.snapshot() if self._last is not None else {}),
+            **(_history_snapshot(self._history) if self._history is not None else {}),
+            **self._force.snapshot(),
+            **self._lateral.snapshot(),
+            **self._base.snapshot(),
+            **({} if self._balance is None else self._balance.snapshot()),
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        self.time, self._start_time = (float(t) for t in snapshot["time"])
+        self._y = snapshot["state"].astype(np.float64)
+        self._substep = float(snapshot["substep"][0])
+        self.strip[...] = snapshot["strip"]
+        self._observation[...] = snapshot["observation"]
+        self._last = _Last.restored(snapshot)
+        self._history = _restored_history(snapshot)
+        self._force.restore(snapshot)
+        self._lateral.restore(snapshot)
+        self._base.restore(snapshot)
+        if self._balance is not None:
+            self._balance.restore(snapshot)
+
+    def _ready(self) -> _Built:
+        if self._built is None:
+            self._built = _Built(self.definition)
+        return self._built
+
+    def _remember(self, evaluation: Evaluation, inputs: Inputs) -> None:
+        """Keep the equations of motion at the end of a step: they begin the next one."""
+        self._last = _Last(evaluation.acceleration, evaluation.response, inputs)
+        self._show(evaluation)
+
+    def _account(self, step: float, first: FloatArray | None, done: Advance) -> None:
+        """Add a step to the energy balance, if it is kept."""
+        if self._balance is None:
+            return
+        if first is None:
+            first = self._ready().mechanism.evaluate(self._y.copy(), self._inputs(0.0)).rates
+        self._balance.add(step, (self._y, first), (done.y, done.evaluation.rates), self._inputs)
+
+    def _continuation(self) -> tuple[FloatArray | None, History | None]:
+        """Return the rates at the step's beginning under the inputs just received, and those before as if these had
+        acted, as far as they follow from the last inputs.
+        """
+        last, inputs, history = self._last, self._inputs(0.0), self._history
+        if last is None or last.inputs.lift != inputs.lift or last.inputs.base[:2] != inputs.base[:2]:
+            return None, None
+        mechanism = self._ready().mechanism
+        first, change = mechanism.with_inputs(self._y, last.acceleration, last.response, last.inputs, inputs)
+        if history is not None:
+            history = History(history.step, history.middle + change, history.begin + change)
+        return first, history
+
+    def _receive_lateral(self, force: float, point: FloatArray, expected: float, step: float) -> None:
+        """Follow the contact point across the strip while there is contact."""
+        time = self.time + lead_of(float(point[0]), expected, self.definition.operation.speed, step)
+        if force > 0.0:
+            self._lateral.receive(time, float(point[1]))
+        else:
+            self._lateral.start(time, float(point[1]))
+
+    def _inputs(self, tau: float) -> Inputs:
+        """Return what acts ``tau`` [s] after the beginning of the step."""
+        time = self.time + tau
+        force = self._force.at(time)
+        return Inputs(self._base.at(tau), self._lift(time), force, self._lateral.at(time))
+
+    def _lift(self, time: float) -> float:
+        built = self._ready()
+        share = self.definition.operation.raised(time - self._start_time)
+        return built.balance + share * (self.definition.lift - built.balance)
+
+    def _show(self, evaluation: Evaluation) -> None:
+        """Bring strip and observations up to the state."""
+        built = self._ready()
+        mechanism, operation = built.mechanism, self.definition.operation
+        ends = mechanism.strip_ends(self._y)
+        track = operation.start_position + operation.speed * (self.time - self._start_time)
+        self.strip[...] = ends
+        self.strip[:, 0, 0] += track - built.strip_x
+        self.strip[:, 0, 2] += built.base_height
+        self.strip[:, 1, 0] += operation.speed
+        s, free = mechanism.split(self._y), slice(mechanism.driven, None)
+        bodies = np.stack([s.r[free, 2] + built.base_height, s.v[free, 2], evaluation.acceleration[free, 2]], axis=1)
+        across = ends[0] - ends[1]
+        length2 = float(across[0] @ across[0])
+        roll = math.atan2(across[0, 2], across[0, 1])
+        roll_rate = float(across[1, 2] * across[0, 1] - across[1, 1] * across[0, 2]) / length2
+        middle = 0.5 * float(ends[0, 0, 1] + ends[1, 0, 1])
+        # Along the strip, which may roll and yaw.
+        offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
+        values = evaluation.constraints
+        self._observation[:-6] = bodies.ravel()
+        self._observation[-6:] = (
+            roll,
+            roll_rate,
+            offset,
+            self._lift(self.time),
+            np.abs(values.violation).max(initial=0.0),
+            np.abs(values.rate).max(initial=0.0),
+        )
+
+
+class _Last(NamedTuple):
+    """The accelerations at the end of a step, their response to other inputs, and the inputs that acted."""
+
+    acceleration: FloatArray
+    response: FloatArray
+    inputs: Inputs
+
+    def snapshot(self) -> Snapshot:
+        """Return all of it."""
+        inputs = np.array([*self.inputs.base, *self.inputs[1:]])
+        return {"last.acceleration": self.acceleration, "last.response": self.response, "last.inputs": inputs}
+
+    @classmethod
+    def restored(cls, snapshot: Snapshot) -> _Last | None:
+        """Return what a snapshot holds."""
+        if "last.inputs" not in snapshot:
+            return None
+        z, vz, az, lift, force, lateral = snapshot["last.inputs"].tolist()
+        inputs = Inputs((z, vz, az), lift, force, lateral)
+        acceleration, response = (snapshot[f"last.{name}"].astype(np.float64) for name in ("acceleration", "response"))
+        return cls(acceleration, response, inputs)
+
+
+def _history_snapshot(history: History) -> Snapshot:
+    step = np.array([history.step])
+    return {"history.step": step, "history.middle": history.middle, "history.begin": history.begin}
+
+
+def _restored_history(snapshot: Snapshot) -> History | None:
+    if "history.step" not in snapshot:
+        return None
+    middle, begin = (snapshot[f"history.{name}"].astype(np.float64) for name in ("middle", "begin"))
+    return History(float(snapshot["history.step"][0]), middle, begin)
+
+
+class _Built:
+    """What is worked out once: the mechanism, where it stands, what balances it."""
+
+    def __init__(self, definition: MechanismDefinition) -> None:
+        if definition.strip is None:
+            raise MechanismError(f"{definition.name}: a pantograph needs a [strip]")
+        self.mechanism = Mechanism(definition)
+        operation = definition.operation
+        self.integrator = Integrator(self.mechanism, definition.tolerance, operation.time_step)
+        working = equilibrium(self.mechanism, start=settle_springs(self.mechanism))
+        self.standing = project(self.mechanism, working.y)
+        self.balance = working.lift
+        self.base_height = operation.reference_height - working.strip_height
+        self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
+
+
+def _observed(definition: MechanismDefinition) -> tuple[tuple[str, str, str], ...]:
+    driven = {j.body_j for j in definition.joints if j.kind == "prescribed_motion"}
+    kinds = (("z", "m", "height"), ("vz", "m/s", "vertical velocity"), ("az", "m/s2", "vertical acceleration"))
+    bodies = [
+        (f"{b.name}.{key}", unit, f"{text} of the centre of mass of {b.name}")
+        for b in definition.bodies
+        if b.name not in driven
+        for key, unit, text in kinds
+    ]
+    lift = definition.lift_force
+    moment = lift is not None and lift.kind == "actuator_moment"
+    return (
+        *bodies,
+        ("strip.roll", "rad", "roll of the collector strip, left end up"),
+        ("strip.roll_rate", "rad/s", "roll rate of the collector strip"),
+        ("strip.contact_y", "m", "contact point on the strip, from its middle to the left"),
+        ("lift.moment", "N.m", "lifting moment") if moment else ("lift.force", "N", "lifting force"),
+        ("joints.violation", "m", "largest constraint violation"),
+        ("joints.violation_rate", "m/s", "largest rate of constraint violation"),
+    )

@@ -13,7 +13,7 @@ from master.batch.study.study_outcome import Done, Outcome, as_data
 from master.batch.study.study_table import figures_table
 from master.evaluation.interval_coverage import shortfall
 from master.recording.recorder import Recording
-from master.report import run_page
+from master.report import page
 from master.report.comparison_page import comparison_page
 from master.results import run_difference, run_results
 from master.results.run_results import Results
@@ -62,7 +62,7 @@ def test_limits_that_nothing_was_held_to_are_named():
     assert found.unchecked.startswith("not checked: uplift at supports, for no support")
     assert "contact height range, for the height" in found.unchecked
     assert run_results.figures(bare)["quality"][0]["unchecked"] == found.unchecked
-    assert found.unchecked in run_page(bare)
+    assert found.unchecked in page(bare)
     between = made(interval=(110.0, 140.0), **LIMITS).assessments()[0]
     assert "uplift at supports" in between.unchecked
     assert "height" not in between.unchecked
@@ -75,7 +75,7 @@ def test_an_interval_that_takes_in_the_raising_is_warned_of(first, is_early):
     assert bool(found.early) == is_early
     if is_early:
         assert "the interval begin at 60 m or later" in found.early
-        assert found.early in run_page(made(interval=(first, 160.0)))
+        assert found.early in page(made(interval=(first, 160.0)))
 
 
 def test_a_record_that_goes_on_with_a_run_has_no_raising():
@@ -91,8 +91,8 @@ def test_a_badge_says_what_is_only_at_its_limit():
     at, below = made(mean=105.0), made(mean=104.0)
     least = 105.228 - at.assessments()[0].quality.mean
     at, below = made(mean=105.0 + least + 0.2), made(mean=105.0 + least - 0.2)
-    assert "passed, at the limit: mean force</span>" in run_page(at)
-    assert "at the limit:" not in run_page(below)
+    assert "passed, at the limit: mean force</span>" in page(at)
+    assert "at the limit:" not in page(below)
 
 
 def test_one_jump_of_a_position_does_not_stretch_the_end_of_an_interval():

@@ -25,7 +25,7 @@ from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source, load
 from master.recording.safe_files import LineFile, write_whole
 from master.results import run_results
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SERIES = ("timeseries.csv", "timeseries_5ms.csv")
 
 

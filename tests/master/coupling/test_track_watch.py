@@ -7,7 +7,7 @@ from master.coupling.network import Network
 from master.coupling.track_watch import TrackWatch
 from master.errors import RunError
 from master.system.contacts import Contact
-from tests.master.test_scenario_checks import pantograph, system
+from tests.master.scenario.test_scenario_checks import pantograph, system
 
 CONTACT = Contact(1, "line", "train", "line.contact")
 EXTENT = {"line": {"contact_wire.begin": 10.0, "contact_wire.end": 500.0}}

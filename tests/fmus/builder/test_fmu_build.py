@@ -100,7 +100,7 @@ def test_archive_holds_what_is_needed_and_no_more(toy_fmu, instantiate):
         names = set(package.namelist())
         definition = package.read("resources/definition.toml")
     private = {n.removeprefix(f"resources/openpanto_{guid}/") for n in names if f"openpanto_{guid}/" in n}
-    assert definition == (Path(__file__).parent / "toy" / "toy.toml").read_bytes()
+    assert definition == (Path(__file__).parents[1] / "toy" / "toy.toml").read_bytes()
     assert {"__init__.py", "models/definition_files/field_schema.py", "toy/law.py", "fmus/slave/adapter.py"} <= private
     assert not {"models/contact_law.py", "fmus/builder/fmu_build.py", "pythonfmu/builder.py", "conftest.py"} & private
     assert {"binaries/linux64/Toy.so", "binaries/win64/Toy.dll"} <= names

@@ -18,7 +18,7 @@ from master.report.html_markup import verdict
 from master.results.run_results import Results, figures, read
 from master.scenario.open_scenario import Overrides, open_scenario
 from master.system.contacts import Contact
-from tests.master.study.conftest import STUDY
+from tests.master.batch.study.conftest import STUDY
 
 CONTACT = Contact(1, "line", "train", "c")
 

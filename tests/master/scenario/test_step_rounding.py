@@ -11,7 +11,7 @@ from master.recording.checkpoint import scheme_options
 from master.scenario.step_rounding import adjustments, steps_in
 from master.ssp.run_settings import Coupling, Record, RunSettings
 from master.system.components import System
-from tests.master.test_limits import LINE
+from tests.master.scenario.test_scenario_advice import LINE
 
 
 def system(stop=0.5, step=1e-3, start=0.0, **settings):

@@ -17,7 +17,7 @@ from master.commands.main import main
 from master.recording import checkpoint
 from master.results import run_results
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 
 
 def go(toy, folder, *options):

@@ -19,7 +19,7 @@ from master.recording.recorder import load
 from master.results import folder_lock, run_results
 from master.results.folder_lock import LOCK, OWNER, FolderInUseError, claimed
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 HOLDER = """
 import sys, time
 from pathlib import Path

@@ -13,7 +13,7 @@ from master.commands import main as cli
 from master.commands.main import main
 from master.results import run_results
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCENARIOS = ROOT / "ssp_scenarios"
 
 

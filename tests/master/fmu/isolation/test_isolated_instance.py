@@ -17,7 +17,7 @@ from master.errors import SlaveError
 from master.fmu.instance import Instance
 from master.fmu.isolation import IsolatedInstance, Isolation
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 
 
 def advance(instance, inputs, time, value):

@@ -2,7 +2,7 @@
 
 import sys
 
-from master.commands.supervision import supervised
+from master.safety.supervision import supervised
 
 
 def _main() -> int:

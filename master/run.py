@@ -11,12 +11,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from master.commands.supervision import phase, unfinished
 from master.coupling.contact_loss_stop import ContactWatch
 from master.coupling.coupling_power import PowerObserver
 from master.coupling.coupling_schemes import make_algorithm
 from master.coupling.fmu_warnings import Caution, CautionObserver
-from master.coupling.interruption import heeded_at_once, interruptible
 from master.coupling.macro_steps import Observer, Outcome, TimeGrid, simulate
 from master.coupling.network import Network
 from master.coupling.real_time import Pacer
@@ -40,9 +38,11 @@ from master.recording.checkpoint import (
 from master.recording.recorder import Recorder, Recording, Source
 from master.results import run_results
 from master.results.run_results import Results
-from master.scenario.step_rounding import adjustments, is_recordable, record_of, steps_in
+from master.safety.interruption import heeded_at_once, interruptible
+from master.safety.supervision import phase, unfinished
 from master.system.components import Component, System, Variable
 from master.system.contacts import find_contacts
+from master.system.step_rounding import adjustments, is_recordable, record_of, steps_in
 
 
 @dataclass(frozen=True)

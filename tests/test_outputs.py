@@ -16,8 +16,8 @@ from fmus.builder import fmu_build as building
 from fmus.builder.fmu_build import BuildError
 from master.batch.calibration import store_value
 from master.errors import MasterError
-from master.recording import safe_files
-from master.recording.safe_files import PART, whole_file, write_whole
+from master.safety import safe_files
+from master.safety.safe_files import PART, whole_file, write_whole
 from master.ssp.pack import pack
 from models.commands import physics_files
 from models.definition_files.parameter import ParameterError
@@ -27,9 +27,9 @@ ROOT = Path(__file__).parents[1]
 WRITES = {"write_text", "write_bytes", "savefig", "savetxt", "write_table", "saving", "save", "savez", "to_csv"}
 #: Functions that may: they write beside the file's place, into memory, or into a temporary folder of their own.
 WHOLE = {
-    "master/results/folder_lock.py": {"_sign"},
+    "master/safety/folder_lock.py": {"_sign"},
     "master/results/run_results.py": {"write_forces"},
-    "master/recording/safe_files.py": {"write_whole"},
+    "master/safety/safe_files.py": {"write_whole"},
     "master/report/__init__.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Final
 
 from master.errors import MasterError
-from master.recording.safe_files import write_whole
-from master.results import folder_lock
+from master.safety import folder_lock
+from master.safety.safe_files import write_whole
 
 MAX_RUNS: Final = 12
 #: Files of a scenario in which values stand.

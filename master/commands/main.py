@@ -36,13 +36,13 @@ from master.results.run_results import Results
 from master.run import Manner, run
 from master.scenario import scenario_advice as limits
 from master.scenario.open_scenario import Overrides, find_parameter, open_scenario
-from master.scenario.step_rounding import adjustments
 from master.ssp.archive import SSD_NAME, Package, Sources
 from master.ssp.pack import left_out, pack
 from master.ssp.run_settings import SCHEMES, Calibration
 from master.ssp.ssd import read_structure
 from master.ssp.ssp_xml import Reader
 from master.system.components import System
+from master.system.step_rounding import adjustments
 
 #: Where an archive holds one Python for all its FMUs.
 RUNTIME: Final = "resources/runtime"

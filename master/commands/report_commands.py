@@ -12,15 +12,16 @@ from typing import Any, Final
 
 from master import report
 from master.errors import MasterError
-from master.recording.safe_files import write_whole
 from master.report import result_tables
 from master.report.charts.measured_charts import Comparison, compare_measured, read_measured
 from master.report.comparison_page import columns, comparison_page
 from master.report.film_file import FilmOptions, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
 from master.report.terminal_summary import Terminal
-from master.results import folder_lock, parquet_export, run_difference, run_results
+from master.results import parquet_export, run_difference, run_results
 from master.results.run_results import Results
+from master.safety import folder_lock
+from master.safety.safe_files import write_whole
 
 REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
 COMPARE_HELP: Final = "two or more runs side by side"

@@ -10,11 +10,11 @@ from typing import Literal, Protocol
 import numpy as np
 
 from master.arrays import FloatArray
-from master.commands.supervision import phase
 from master.coupling.coupling_schemes import Algorithm, initialise
-from master.coupling.interruption import heeded_at_once
 from master.coupling.network import Network
 from master.errors import MasterError, RunError
+from master.safety.interruption import heeded_at_once
+from master.safety.supervision import phase
 
 Status = Literal["complete", "interrupted", "failed", "incomplete"]
 

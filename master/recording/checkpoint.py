@@ -23,9 +23,9 @@ from master.coupling.coupling_schemes import Algorithm, initialise
 from master.coupling.macro_steps import TimeGrid
 from master.coupling.network import Network
 from master.errors import MasterError, RequestError, RunError, one_line
-from master.recording.safe_files import write_whole
-from master.scenario.step_rounding import steps_in
+from master.safety.safe_files import write_whole
 from master.system.components import Component, System
+from master.system.step_rounding import steps_in
 
 #: First bytes of every checkpoint; the digit is the format's version.
 MAGIC: Final = b"openpanto checkpoint 1\n"

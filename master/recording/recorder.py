@@ -17,7 +17,7 @@ import numpy as np
 from master.arrays import FloatArray
 from master.coupling.network import Network
 from master.errors import MasterError
-from master.recording.safe_files import LineFile, plain_cell, safe_cell
+from master.safety.safe_files import LineFile, plain_cell, safe_cell
 from master.system.variable_names import matcher
 
 #: Rows kept back before they are written, and the simulated time that they may span [s].

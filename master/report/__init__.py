@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from master.recording.safe_files import whole_file, write_whole
 from master.report.charts import static_charts
 from master.report.charts.measured_charts import Comparison, comparison_rows
 from master.report.charts.output_charts import has_contacts, output_plots, outputs_table
@@ -22,6 +21,7 @@ from master.report.result_tables import (
 from master.report.run_page import page
 from master.results import run_results
 from master.results.run_results import Results
+from master.safety.safe_files import whole_file, write_whole
 
 __all__ = [
     "FILTER_HEADS",

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
 from master.errors import MasterError
-from master.recording.safe_files import whole_file
 from master.report.charts.run_charts import COLOURS, GREY, MARK
 from master.report.moving_picture import Movie, Rider
+from master.safety.safe_files import whole_file
 
 _ELSEWHERE: Final = "another file with --film"
 _RATE: Final = 20

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from master.errors import MasterError
 from master.recording.recorder import Recording, header, load
-from master.recording.safe_files import whole_file
 from master.results.run_results import FORCES, TIMESERIES
+from master.safety.safe_files import whole_file
 
 
 def write_parquet(folder: Path) -> tuple[Path, ...]:

@@ -30,8 +30,9 @@ from master.evaluation.line_geometry import Geometry, Uplift, support_uplifts
 from master.evaluation.run_events import MOST_EVENTS, Event, find_events
 from master.recording.checkpoint import NAME as CHECKPOINT
 from master.recording.recorder import NUMBER_FORMAT, Recording, load
-from master.recording.safe_files import PART, safe_cell, write_whole
-from master.results import folder_lock, summary_schema
+from master.results import summary_schema
+from master.safety import folder_lock
+from master.safety.safe_files import PART, safe_cell, write_whole
 from master.system.contacts import Contact
 
 GENERATOR: Final = "openpanto master"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from master.errors import MasterError
-from master.recording.safe_files import cannot_write, whole_file
+from master.safety.safe_files import cannot_write, whole_file
 from master.ssp.archive import SSD_NAME, Sources
 from master.ssp.ssp_xml import XmlError, safe_root
 

@@ -174,7 +174,7 @@ def test_a_second_signal_ends_a_step_at_once(pair, tmp_path, started):
 
 GIL_HOLDER = """
 import ctypes, sys
-from master.commands.supervision import phase, supervised
+from master.safety.supervision import phase, supervised
 def work():
     with phase("loading"):
         ctypes.PyDLL(sys.argv[1]).fmi2Instantiate(b"a", 1, b"", sys.argv[2].encode(), None, 0, 0)

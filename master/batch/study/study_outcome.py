@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from master.batch.study.family import Family, Interval, Variant
 from master.batch.study.study_evaluation import Entry, entries
-from master.recording.safe_files import safe_cell
 from master.results.run_results import Results
+from master.safety.safe_files import safe_cell
 
 GENERATOR: Final = "openpanto study"
 #: Version of ``study.json`` and ``study.csv``; 1 says none.

@@ -12,9 +12,9 @@ from master.batch.study.family import VARIANTS, Family, Variant, folder_name
 from master.batch.study.study_outcome import GENERATOR, Done, Outcome, as_csv, as_data
 from master.batch.study.study_page import page
 from master.batch.study.variants import Runner, finished
-from master.commands.supervision import unfinished
 from master.errors import InterruptedRunError, MasterError, Problem, RequestError, ScenarioError
 from master.results import run_results
+from master.safety.supervision import unfinished
 
 JSON: Final = "study.json"
 CSV: Final = "study.csv"

@@ -19,8 +19,8 @@ from master.results import run_results
 from master.results.run_results import Results
 from master.run import run
 from master.scenario.open_scenario import Overrides, find_parameter, open_scenario
-from master.scenario.step_rounding import adjustments
 from master.system.components import System
+from master.system.step_rounding import adjustments
 
 #: Makes the observers of one run, and takes them away after it.
 Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]

@@ -12,9 +12,9 @@ from master.batch.verification import verification_page
 from master.batch.verification.case import Case
 from master.batch.verification.case_runs import Runs
 from master.batch.verification.verification_outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
-from master.commands.supervision import unfinished
 from master.errors import InterruptedRunError
 from master.results import run_results
+from master.safety.supervision import unfinished
 
 JSON: Final = "verify.json"
 PAGE: Final = "verify.html"

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from master.commands.supervision import die_with
 from master.errors import MasterError
 from master.fmu.instance import LONGEST_STATE, Group, Instance
 from master.fmu.isolation.channel import (
@@ -30,6 +29,7 @@ from master.fmu.isolation.channel import (
     Channel,
     EndedError,
 )
+from master.safety.supervision import die_with
 from master.system.components import Component, Fmu, Variable
 
 

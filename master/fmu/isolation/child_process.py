@@ -16,9 +16,9 @@ from pathlib import Path
 from threading import Thread
 from typing import IO, Final
 
-from master.commands.supervision import signal_text
 from master.errors import one_line
 from master.fmu.isolation.channel import Channel
+from master.safety.supervision import signal_text
 
 #: Seconds that a process has to be gone after its connection has ended.
 _ENDING_SECONDS: Final = 5.0

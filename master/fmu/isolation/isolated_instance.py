@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.coupling.interruption import heeded_at_once, is_wished
 from master.errors import SlaveError, one_line
 from master.fmu.instance import LONGEST_STATE
 from master.fmu.isolation.channel import (
@@ -27,6 +26,7 @@ from master.fmu.isolation.channel import (
 )
 from master.fmu.isolation.child import describe
 from master.fmu.isolation.child_process import Process
+from master.safety.interruption import heeded_at_once, is_wished
 from master.system.components import Component
 
 #: Seconds that an FMU has to load, or to get through a phase of its initialisation: many times what the longest line

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from master.coupling.coupling_schemes import Jacobi
-from master.coupling.interruption import interruptible
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.coupling.network import Network
 from master.errors import MasterError, SlaveError
+from master.safety.interruption import interruptible
 from master.ssp.ssp_units import Conversion
 from master.system.components import Connection
 

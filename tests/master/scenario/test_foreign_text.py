@@ -17,9 +17,9 @@ from master.fmu import fmi_log
 from master.fmu.fmu_description import read_fmu
 from master.fmu.instance import LONGEST_STATE, Instance
 from master.recording.recorder import Recorder, Source, load
-from master.recording.safe_files import plain_cell, safe_cell
 from master.report.result_tables import figures_table, plain_table
 from master.report.terminal_summary import Terminal, printable_json
+from master.safety.safe_files import plain_cell, safe_cell
 from master.system.components import Component
 
 #: Clear the screen; a title; the one-byte form of a control sequence; text that runs backwards; a bell.

@@ -8,9 +8,9 @@ import signal
 import pytest
 
 from master.commands.main import main
-from master.coupling import interruption
-from master.coupling.interruption import end_signals, heeded_at_once, interruptible
 from master.fmu.instance import Instance
+from master.safety import interruption
+from master.safety.interruption import end_signals, heeded_at_once, interruptible
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[3]
 SCRIPT = """
 import os, signal, sys, time
 from pathlib import Path
-from master.commands.supervision import phase, supervised, unfinished
+from master.safety.supervision import phase, supervised, unfinished
 def work():
 {work}
 sys.exit(supervised(work))
@@ -86,8 +86,7 @@ def test_output_goes_where_it_would_and_the_working_process_dies_with_its_parent
 def test_a_signal_that_comes_before_anybody_waits_is_heeded():
     """The child has begun to work before its parent has got to waiting for it."""
     slow = (
-        "import master.commands.supervision as s\nwake = s._wake_up\n"
-        "s._wake_up = lambda h: (time.sleep(1), wake(h))[1]\n"
+        "import master.safety.supervision as s\nwake = s._wake_up\ns._wake_up = lambda h: (time.sleep(1), wake(h))[1]\n"
     )
     code = script("os.kill(os.getppid(), signal.SIGTERM); time.sleep(30)").replace("def work", slow + "def work")
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60)
@@ -112,7 +111,7 @@ def test_nothing_that_is_only_in_unix_is_needed_to_import_the_master():
     for found in pkgutil.walk_packages(master.__path__, "master."):
         if not found.name.endswith("__main__"):
             importlib.import_module(found.name)
-    from master.commands.supervision import supervised
+    from master.safety.supervision import supervised
     sys.exit(supervised(lambda: 3))
     """
     command = [sys.executable, "-c", textwrap.dedent(code)]

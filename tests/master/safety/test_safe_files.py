@@ -19,11 +19,12 @@ import pytest
 
 from master.commands.main import main
 from master.errors import MasterError
-from master.recording import checkpoint, safe_files
+from master.recording import checkpoint
 from master.recording.checkpoint import Occasions
 from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source, load
-from master.recording.safe_files import LineFile, write_whole
 from master.results import run_results
+from master.safety import safe_files
+from master.safety.safe_files import LineFile, write_whole
 
 ROOT = Path(__file__).parents[3]
 SERIES = ("timeseries.csv", "timeseries_5ms.csv")

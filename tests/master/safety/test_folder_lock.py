@@ -16,14 +16,15 @@ import pytest
 from master.commands.main import main
 from master.recording import checkpoint
 from master.recording.recorder import load
-from master.results import folder_lock, run_results
-from master.results.folder_lock import LOCK, OWNER, FolderInUseError, claimed
+from master.results import run_results
+from master.safety import folder_lock
+from master.safety.folder_lock import LOCK, OWNER, FolderInUseError, claimed
 
 ROOT = Path(__file__).parents[3]
 HOLDER = """
 import sys, time
 from pathlib import Path
-from master.results.folder_lock import claimed
+from master.safety.folder_lock import claimed
 with claimed(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)

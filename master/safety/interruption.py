@@ -2,7 +2,7 @@
 
 A wish is heeded after the current step; where nothing would be lost it is heeded at once: while FMUs are loaded or
 initialised, and while the master waits for another process. What does not return at all, in native code, is ended from
-outside (`master.commands.supervision`).
+outside (`master.safety.supervision`).
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ import pytest
 
 from master.commands.main import main
 from master.recording.checkpoint import scheme_options
-from master.scenario.step_rounding import adjustments, steps_in
 from master.ssp.run_settings import Coupling, Record, RunSettings
 from master.system.components import System
+from master.system.step_rounding import adjustments, steps_in
 from tests.master.scenario.test_scenario_advice import LINE
 
 

@@ -21,7 +21,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
-from master.coupling.interruption import end_signals, raise_on_signals
+from master.safety.interruption import end_signals, raise_on_signals
 
 #: prctl(2): the signal that a process gets when its parent ends.
 _PR_SET_PDEATHSIG: Final = 1
@@ -251,8 +251,8 @@ def _wake_up(handle: Callable[[int, object], None]) -> int:
 def _mark(path: Path, key: str, status: str, reason: str) -> bool:
     """Mark a JSON file of a run that has ended; returns whether it was its own and still open."""
     from master.errors import MasterError
-    from master.recording.safe_files import write_whole
-    from master.results.folder_lock import claimed
+    from master.safety.folder_lock import claimed
+    from master.safety.safe_files import write_whole
 
     try:
         with claimed(path.parent):

@@ -1,0 +1,1 @@
+"""Nothing is lost and nobody is stuck: safe files, locks of folders, signals, supervision. Imports `errors` alone."""

@@ -26,10 +26,11 @@ from master.evaluation.en50367_limits import LimitChoice, OwnLimits
 from master.evaluation.energy_balance import Balance, drift_events, find_balances
 from master.evaluation.filters import BEFORE_CHOICE, ForceFilter
 from master.evaluation.following_pantograph import Following, followings
-from master.evaluation.line_geometry import Geometry, Uplift, support_uplifts
+from master.evaluation.line_geometry import Uplift, support_uplifts
 from master.evaluation.run_events import MOST_EVENTS, Event, find_events
 from master.recording.checkpoint import NAME as CHECKPOINT
-from master.recording.recorder import NUMBER_FORMAT, Recording, load
+from master.recording.recording import NUMBER_FORMAT, TIMESERIES, Recording, load
+from master.recording.static_geometry import Geometry
 from master.results import summary_schema
 from master.safety import folder_lock
 from master.safety.safe_files import PART, safe_cell, write_whole
@@ -40,7 +41,6 @@ GENERATOR: Final = "openpanto master"
 FORMAT: Final = 2
 SUMMARY: Final = "summary.json"
 GEOMETRY: Final = "geometry.json"
-TIMESERIES: Final = "timeseries.csv"
 FORCES: Final = "contact_force.csv"
 REPORT: Final = "report.html"
 _TABLES: Final = ("timeseries*.csv", "timeseries*.parquet", FORCES, "contact_force.parquet")

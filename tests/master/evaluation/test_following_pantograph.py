@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from master.evaluation.following_pantograph import followings, leading_first
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.system.contacts import Contact
 
 TIME = np.linspace(0.0, 1.0, 11)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from master import report
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.charts.run_charts import run_charts
 from master.report.run_inputs import inputs_of, quality_rows
 from master.results.run_results import Results

@@ -82,7 +82,6 @@ OUTSIDE_FMU = ("models.commands", "models.__main__")
 
 #: Imports and names that still break the rules: to be emptied, never to grow.
 OPEN: set[str] = {
-    "circle models.pantograph.lumped.lumped_energy -> models.pantograph.lumped.lumped_model",
     "init fmus.slave does not say its duty",
     "init master.batch does not say its duty",
     "init master.commands does not say its duty",
@@ -118,7 +117,6 @@ OPEN: set[str] = {
     "tier models.catenary: models.catenary.meeting -> models.catenary.contact_and_slack.wire_response",
     "tier models.catenary: models.catenary.meeting -> models.catenary.linear_motion.line_motion",
     "tier models.catenary: models.catenary.meeting -> models.catenary.step.numpy_engine",
-    "tier models.pantograph: models.pantograph.multibody.mechanism_definition -> models.pantograph.lumped.lumped_definition",  # noqa: E501
     "tier models: models.contact_law -> models.definition_files.parameter",
     "tier models: models.numerics.energy_ledger -> models.definition_files.field_schema",
     "tier models: models.numerics.energy_ledger -> models.definition_files.parameter",

@@ -13,7 +13,8 @@ from models.contact_law import application_point, engagement
 from models.coupled.monolithic import CoupledModel
 from models.library import load_pantograph
 from models.numerics.newmark import Newmark
-from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
+from models.pantograph.lumped.lumped_model import LumpedModel
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from tests.models.nodal_line import NodalLine
 
 START = 70.0

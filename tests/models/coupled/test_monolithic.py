@@ -10,7 +10,8 @@ from models.catenary.line_part import CatenaryPart
 from models.commands import main
 from models.coupled.monolithic import CoupledModel
 from models.numerics.newmark import Newmark
-from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
+from models.pantograph.lumped.lumped_model import LumpedModel
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from tests.models.nodal_line import NodalLine
 
 START, STOP = 60.0, 1.2

@@ -11,7 +11,7 @@ from models.catenary.line_model import CatenaryModel, StripMotion
 from models.catenary.line_part import CatenaryPart
 from models.contact_law import application_point, engagement
 from models.coupled.monolithic import CoupledModel
-from models.library import load_pantograph
+from models.library.catalogue import load_pantograph
 from models.numerics.newmark import Newmark
 from models.pantograph.lumped.lumped_model import LumpedModel
 from models.pantograph.lumped.lumped_part import LumpedPantographPart

@@ -7,7 +7,7 @@ from scipy.sparse.linalg import spsolve
 
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
-from models.commands import main
+from models.commands.physics_main import main
 from models.coupled.monolithic import CoupledModel
 from models.numerics.newmark import Newmark
 from models.pantograph.lumped.lumped_model import LumpedModel

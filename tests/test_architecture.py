@@ -84,13 +84,10 @@ OUTSIDE_FMU = ("models.commands", "models.__main__")
 OPEN: set[str] = {
     "circle models.pantograph.lumped.lumped_energy -> models.pantograph.lumped.lumped_model",
     "init fmus.slave does not say its duty",
-    "init master.batch does not say its duty",
     "init master.commands does not say its duty",
     "init master.coupling does not say its duty",
     "init master.fmu.isolation holds more than a docstring",
     "init master.recording does not say its duty",
-    "init master.report holds more than a docstring",
-    "init master.report.charts does not say its duty",
     "init master.results does not say its duty",
     "init master.scenario does not say its duty",
     "init master.system does not say its duty",

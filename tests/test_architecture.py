@@ -116,10 +116,6 @@ OPEN: set[str] = {
     "tier models.catenary: models.catenary.meeting -> models.catenary.linear_motion.line_motion",
     "tier models.catenary: models.catenary.meeting -> models.catenary.step.numpy_engine",
     "tier models.pantograph: models.pantograph.multibody.mechanism_definition -> models.pantograph.lumped.lumped_definition",  # noqa: E501
-    "tier models: models.contact_law -> models.definition_files.parameter",
-    "tier models: models.numerics.energy_ledger -> models.definition_files.field_schema",
-    "tier models: models.numerics.energy_ledger -> models.definition_files.parameter",
-    "tier models: models.numerics.extrapolation -> models.definition_files.parameter",
 }
 
 

@@ -18,7 +18,6 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from master import report
 from master.batch import calibration
 from master.commands import report_commands, study_command, verify_command
 from master.coupling.fmu_warnings import CautionObserver
@@ -29,6 +28,8 @@ from master.fmu.fmu_provision import write_runtime
 from master.fmu.isolation import INIT_TIMEOUT, Isolation
 from master.recording import checkpoint
 from master.recording.checkpoint import Continuation
+from master.report import report_files, result_tables
+from master.report.charts.output_charts import has_contacts, outputs_table
 from master.report.progress import ProgressObserver
 from master.report.terminal_summary import Terminal, printable_json
 from master.results import parquet_export, run_results
@@ -270,7 +271,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _tell_results(done: Results, options: argparse.Namespace) -> None:
     if not options.no_report:
-        report.write(done)
+        report_files.write(done)
     if options.parquet:
         parquet_export.write_parquet(done.folder)
     if options.json:
@@ -358,16 +359,16 @@ def _show(done: Results) -> None:
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
-        console.print(report.figures_table(assessments, heads, [done.evaluation.filter]))
+        console.print(result_tables.figures_table(assessments, heads, [done.evaluation.filter]))
     for assessment in assessments:
         _show_verdict(console, assessment, done.evaluation)
-    if not report.has_contacts(done):
-        console.print(report.outputs_table(done))
+    if not has_contacts(done):
+        console.print(outputs_table(done))
     elif done.not_judged:
         console.print(f"not judged: {done.not_judged}", style="yellow", markup=False, soft_wrap=True)
     elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
-    for line in filter(None, (report.calibration_line(done), report.uplift_line(done))):
+    for line in filter(None, (result_tables.calibration_line(done), result_tables.uplift_line(done))):
         console.print(line, markup=False, soft_wrap=True)
     for following in done.followings:
         console.print(following.sentence, markup=False, soft_wrap=True)
@@ -381,10 +382,10 @@ def _show_verdict(console: Console, assessment: Assessment, settings: Evaluation
         text = f"{assessment.contact.pantograph}: not judged: {assessment.withheld}"
         console.print(text, style="yellow", markup=False, soft_wrap=True)
     else:
-        console.print(report.verdict_table(assessment, settings.limits))
-    if rows := report.filter_rows(assessment.quality, settings.filter):
+        console.print(result_tables.verdict_table(assessment, settings.limits))
+    if rows := result_tables.filter_rows(assessment.quality, settings.filter):
         console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
-        console.print(report.plain_table(report.FILTER_HEADS, rows))
+        console.print(result_tables.plain_table(result_tables.FILTER_HEADS, rows))
     for warning in assessment.warnings:
         console.print(f"warning: {assessment.contact.pantograph}: {warning}", markup=False)
 

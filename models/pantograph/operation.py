@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from models.definition_files.field_schema import count, quantity
-from models.numerics.energy_ledger import monitoring
+from models.definition_files.field_schema import count, monitoring, quantity
 
 
 @dataclass(frozen=True, kw_only=True)

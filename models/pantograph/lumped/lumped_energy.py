@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import Ledger
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.numerics.newmark import Newmark
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 

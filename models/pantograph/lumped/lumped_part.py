@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation
 from models.numerics.newmark import steps_within

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 
 #: A contact point that wanders faster across the track than this has jumped, from wire to wire say [m/s].
 _FASTEST_SWEEP: Final = 5.0

@@ -22,7 +22,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.contact_and_slack.contact_wire import ContactWire, Crossing, WireInterval
+from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
+from models.catenary.contact_and_slack.crossing import Crossing
 from models.catenary.contact_and_slack.wire_response import Meeting, Point, Reaction
 from models.catenary.linear_motion.attachment_solver import Banded, Cyclic, Sparse, factorised
 from models.catenary.linear_motion.interval_modes import IntervalModes

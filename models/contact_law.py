@@ -15,7 +15,7 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 #: Below this penetration velocity an impact has no velocity to refer to [m/s].
 _SLOWEST_IMPACT = 1e-6

@@ -84,13 +84,10 @@ OUTSIDE_FMU = ("models.commands", "models.__main__")
 OPEN: set[str] = {
     "circle models.pantograph.lumped.lumped_energy -> models.pantograph.lumped.lumped_model",
     "init fmus.slave does not say its duty",
-    "init master.batch does not say its duty",
     "init master.commands does not say its duty",
     "init master.coupling does not say its duty",
     "init master.fmu.isolation holds more than a docstring",
     "init master.recording does not say its duty",
-    "init master.report holds more than a docstring",
-    "init master.report.charts does not say its duty",
     "init master.results does not say its duty",
     "init master.scenario does not say its duty",
     "init master.system does not say its duty",
@@ -119,10 +116,6 @@ OPEN: set[str] = {
     "tier models.catenary: models.catenary.meeting -> models.catenary.linear_motion.line_motion",
     "tier models.catenary: models.catenary.meeting -> models.catenary.step.numpy_engine",
     "tier models.pantograph: models.pantograph.multibody.mechanism_definition -> models.pantograph.lumped.lumped_definition",  # noqa: E501
-    "tier models: models.contact_law -> models.definition_files.parameter",
-    "tier models: models.numerics.energy_ledger -> models.definition_files.field_schema",
-    "tier models: models.numerics.energy_ledger -> models.definition_files.parameter",
-    "tier models: models.numerics.extrapolation -> models.definition_files.parameter",
 }
 
 

@@ -30,7 +30,7 @@ WHOLE = {
     "master/safety/folder_lock.py": {"_sign"},
     "master/results/run_results.py": {"write_forces"},
     "master/safety/safe_files.py": {"write_whole"},
-    "master/report/__init__.py": {"write"},
+    "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},
     "master/batch/verification/verification_page.py": {"_picture"},

@@ -10,10 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from master import report
 from master.errors import MasterError
 from master.evaluation.measured_force import Comparison, compare_measured, read_measured
-from master.report import result_tables
+from master.report import report_files, result_tables
+from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import columns, comparison_page
 from master.report.film_file import FilmOptions, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
@@ -49,7 +49,7 @@ def run_report(options: argparse.Namespace) -> int:
         measured = _measured(done, options.measured, options.contact) if options.measured else None
         run_results.write_forces(done)
         results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
-        print(report.write(done, measured))
+        print(report_files.write(done, measured))
         if options.parquet:
             print(*parquet_export.write_parquet(done.folder), sep="\n")
     _warn_of_open_runs([done])
@@ -84,7 +84,7 @@ def report_what_there_is(folder: Path) -> None:
     try:
         done = run_results.read(folder)
         run_results.write_forces(done)
-        report.write(done)
+        report_files.write(done)
     except MasterError:
         return  # it stopped before anything was recorded; the error itself is told by the caller
 
@@ -99,9 +99,7 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
 
 
 def _say_measured(measured: Comparison) -> None:
-    rows = result_tables.plain_table(
-        ("low-passed", "simulated", "measured", "difference"), report.comparison_rows(measured)
-    )
+    rows = result_tables.plain_table(("low-passed", "simulated", "measured", "difference"), comparison_rows(measured))
     console = Terminal(width=_WIDTH, highlight=False)
     console.print(rows)
     console.print(f"compared from {measured.start:.1f} m to {measured.end:.1f} m", markup=False)
@@ -147,7 +145,9 @@ def _show(
     console = Terminal(width=_WIDTH, highlight=False)
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
-    console.print(report.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs]))
+    console.print(
+        result_tables.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs])
+    )
     warnings = [f"{c.name}: {warning}" for c in found for warning in c.assessment.warnings]
     for note in (*run_difference.setting_notes(runs), *warnings):
         console.print(f"warning: {note}", markup=False)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from master import report
 from master.commands import report_commands
 from master.commands.command_options import (
     _add,
@@ -25,6 +24,7 @@ from master.errors import RequestError, RunError, UsageError
 from master.fmu.isolation import INIT_TIMEOUT, Isolation
 from master.recording import checkpoint
 from master.recording.checkpoint import Continuation
+from master.report import report_files
 from master.report.progress import ProgressObserver
 from master.report.terminal_summary import Terminal, _show, printable_json
 from master.results import parquet_export, results_folder
@@ -106,7 +106,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _tell_results(done: Results, options: argparse.Namespace) -> None:
     if not options.no_report:
-        report.write(done)
+        report_files.write(done)
     if options.parquet:
         parquet_export.write_parquet(done.folder)
     if options.json:

@@ -14,10 +14,19 @@ from typing import Any, Final
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from master import report
 from master.errors import printable
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import EvaluationSettings
+from master.report.charts.output_charts import has_contacts, outputs_table
+from master.report.result_tables import (
+    FILTER_HEADS,
+    calibration_line,
+    figures_table,
+    filter_rows,
+    plain_table,
+    uplift_line,
+    verdict_table,
+)
 from master.results.run_results import Results
 
 _WIDTH: Final = 80
@@ -51,16 +60,16 @@ def _show(done: Results) -> None:
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
-        console.print(report.figures_table(assessments, heads, [done.evaluation.filter]))
+        console.print(figures_table(assessments, heads, [done.evaluation.filter]))
     for assessment in assessments:
         _show_verdict(console, assessment, done.evaluation)
-    if not report.has_contacts(done):
-        console.print(report.outputs_table(done))
+    if not has_contacts(done):
+        console.print(outputs_table(done))
     elif done.not_judged:
         console.print(f"not judged: {done.not_judged}", style="yellow", markup=False, soft_wrap=True)
     elif not assessments:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
-    for line in filter(None, (report.calibration_line(done), report.uplift_line(done))):
+    for line in filter(None, (calibration_line(done), uplift_line(done))):
         console.print(line, markup=False, soft_wrap=True)
     for following in done.followings:
         console.print(following.sentence, markup=False, soft_wrap=True)
@@ -74,10 +83,10 @@ def _show_verdict(console: Console, assessment: Assessment, settings: Evaluation
         text = f"{assessment.contact.pantograph}: not judged: {assessment.withheld}"
         console.print(text, style="yellow", markup=False, soft_wrap=True)
     else:
-        console.print(report.verdict_table(assessment, settings.limits))
-    if rows := report.filter_rows(assessment.quality, settings.filter):
+        console.print(verdict_table(assessment, settings.limits))
+    if rows := filter_rows(assessment.quality, settings.filter):
         console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
-        console.print(report.plain_table(report.FILTER_HEADS, rows))
+        console.print(plain_table(FILTER_HEADS, rows))
     for warning in assessment.warnings:
         console.print(f"warning: {assessment.contact.pantograph}: {warning}", markup=False)
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from models.arrays import FloatArray, IntArray
 from models.catenary.contact_and_slack.crossing import Crossing, crossing, engagement
 from models.catenary.linear_motion.interval_modes import IntervalModes, IntervalMotion
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
@@ -21,7 +22,6 @@ from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.line_matrices import element_dofs
 from models.catenary.shape.line_mesh import Chain
 from models.catenary.shape.wire_intervals import Interval, turns
-from models.definition_files.parameter import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

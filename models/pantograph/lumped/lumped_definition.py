@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from models.definition_files import field_schema
-from models.definition_files.field_schema import count, quantity
+from models.definition_files.field_schema import count, monitoring, quantity
 from models.definition_files.parameter import Parameter
 from models.definition_files.toml_reader import Quantity, Table
-from models.numerics.energy_ledger import monitoring
 
 
 @dataclass(frozen=True, kw_only=True)

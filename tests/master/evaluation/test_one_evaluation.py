@@ -18,8 +18,8 @@ from master.evaluation.contact_quality import figures_of
 from master.evaluation.contact_signals import EvaluationSettings, contact_signals
 from master.evaluation.filters import BEFORE_CHOICE, DEFAULT, SETTLING, ForceFilter
 from master.recording.recorder import Recording, load
-from master.report import figure_rows
 from master.report.charts.run_charts import interval_shape
+from master.report.result_tables import figure_rows
 from master.results import results_folder, run_difference, run_results
 from master.results.run_results import Results
 from master.run import run

@@ -13,8 +13,8 @@ from master.batch.study.study_outcome import Done, Outcome, as_data
 from master.batch.study.study_table import figures_table
 from master.evaluation.interval_coverage import shortfall
 from master.recording.recorder import Recording
-from master.report import page
 from master.report.comparison_page import comparison_page
+from master.report.run_page import page
 from master.results import run_difference, run_summary
 from master.results.run_results import Results
 from master.system.contacts import Contact

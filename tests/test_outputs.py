@@ -41,7 +41,7 @@ WHOLE = {
     "fmus/loader/runtime.py": {"_archive", "_replace"},
 }
 #: Functions that are called ``write_text`` and ``save`` and are no writing by a file's name.
-HARMLESS = {"run_results.write_text", "slave.save", "self.save", "self._instance.save"}
+HARMLESS = {"results_folder.write_text", "slave.save", "self.save", "self._instance.save"}
 
 
 def writing_calls(path: Path):

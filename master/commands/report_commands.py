@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from master.errors import MasterError
+from master.evaluation.measured_force import Comparison, compare_measured, read_measured
 from master.report import report_files, result_tables
-from master.report.charts.measured_charts import Comparison, compare_measured, comparison_rows, read_measured
+from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import columns, comparison_page
 from master.report.film_file import FilmOptions, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
 from master.report.terminal_summary import Terminal
-from master.results import parquet_export, run_difference, run_results
+from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
 from master.results.run_results import Results
 from master.safety import folder_lock
 from master.safety.safe_files import write_whole
@@ -39,15 +40,15 @@ def add_report_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is wanted."""
-    run_results.identity(options.run)  # a folder that is none of ours is left alone
+    results_folder.identity(options.run)  # a folder that is none of ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
-        summary = {**done.summary, **run_results.figures(done), "format": run_results.FORMAT}
-        summary["settings"] = {**summary.get("settings", {}), "filter": run_results.filter_data(done.evaluation.filter)}
+        summary = {**done.summary, **run_summary.figures(done), "format": results_folder.FORMAT}
+        summary["settings"] = {**summary.get("settings", {}), "filter": run_summary.filter_data(done.evaluation.filter)}
         done = replace(done, summary=summary)
         measured = _measured(done, options.measured, options.contact) if options.measured else None
         run_results.write_forces(done)
-        run_results.write_json(done.folder / run_results.SUMMARY, summary)
+        results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
         print(report_files.write(done, measured))
         if options.parquet:
             print(*parquet_export.write_parquet(done.folder), sep="\n")

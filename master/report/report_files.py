@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from master.evaluation.measured_force import Comparison
 from master.report.charts import static_charts
-from master.report.charts.measured_charts import Comparison
 from master.report.charts.output_charts import has_contacts, output_plots
 from master.report.run_page import page
-from master.results import run_results
+from master.results import results_folder
 from master.results.run_results import Results
 from master.safety.safe_files import whole_file, write_whole
 
 
 def write(done: Results, measured: Comparison | None = None) -> Path:
     """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
-    path = done.folder / run_results.REPORT
+    path = done.folder / results_folder.REPORT
     write_whole(path, page(done, measured).encode())
     figures = static_charts.all_plots(done) if has_contacts(done) else output_plots(done)
     for name, figure in figures.items():

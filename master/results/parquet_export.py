@@ -6,7 +6,8 @@ from pathlib import Path
 
 from master.errors import MasterError
 from master.recording.recorder import Recording, header, load
-from master.results.run_results import FORCES, TIMESERIES
+from master.results.results_folder import FORCES
+from master.results.run_results import TIMESERIES
 from master.safety.safe_files import whole_file
 
 

@@ -22,7 +22,7 @@ from master.coupling.track_watch import TrackWatch
 from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
 from master.evaluation.interval_coverage import never_touched, shortfall
 from master.fmu.instance import Instance
-from master.fmu.isolation import IsolatedInstance, Isolation
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 from master.recording.checkpoint import NAME as CHECKPOINT
 from master.recording.checkpoint import (
     Checkpoint,
@@ -37,7 +37,7 @@ from master.recording.checkpoint import (
 from master.recording.recording import Recording
 from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
 from master.recording.static_geometry import GeometryObserver
-from master.results import run_results
+from master.results import results_folder, run_results, run_summary
 from master.results.run_results import Results
 from master.safety.interruption import heeded_at_once, interruptible
 from master.safety.supervision import phase, unfinished
@@ -99,11 +99,11 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
-    with run_results.claimed(folder):
+    with results_folder.claimed(folder):
         identity = _take_folder(system, folder, manner.continuation)
-        with unfinished(folder / run_results.SUMMARY, identity):
-            run_results.write_json(
-                folder / run_results.SUMMARY, {**_description(system, identity), "status": "running"}
+        with unfinished(folder / results_folder.SUMMARY, identity):
+            results_folder.write_json(
+                folder / results_folder.SUMMARY, {**_description(system, identity), "status": "running"}
             )
             return _run(system, folder, observers, manner, occasions, identity)
 
@@ -159,11 +159,11 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
     if continuation is not None:
         continuation.check(system)
         if continuation.is_same_run:
-            known = run_results.identity(folder)
+            known = results_folder.identity(folder)
             if not known or known != continuation.checkpoint.run:
                 raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
-    run_results.prepare(folder, None if continuation is None else Path(continuation.file))
+    results_folder.prepare(folder, None if continuation is None else Path(continuation.file))
     return uuid.uuid4().hex
 
 
@@ -178,7 +178,9 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
         cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
         outcome = Outcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
         if _is_still(folder, identity):
-            run_results.write_json(folder / run_results.SUMMARY, {**_description(system, identity), **_ending(outcome)})
+            results_folder.write_json(
+                folder / results_folder.SUMMARY, {**_description(system, identity), **_ending(outcome)}
+            )
         if is_interrupted:
             raise InterruptedRunError(_what_happened(outcome, folder)) from error
         raise
@@ -241,7 +243,7 @@ def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caut
 def _is_still(folder: Path, identity: str) -> bool:
     """Whether it is the run of this identity whose results lie in the folder."""
     with suppress(MasterError):
-        return run_results.identity(folder) == identity
+        return results_folder.identity(folder) == identity
     return False
 
 
@@ -259,7 +261,9 @@ class _Session:
         self.algorithm = make_algorithm(system.settings.coupling)
         whole = TimeGrid(system.start, system.step, system.step_count)
         self.grid = whole if manner.continuation is None else manner.continuation.grid(system)
-        self._geometry = GeometryObserver(system, lambda g: run_results.write_json(folder / run_results.GEOMETRY, g))
+        self._geometry = GeometryObserver(
+            system, lambda g: results_folder.write_json(folder / results_folder.GEOMETRY, g)
+        )
         self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
         self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
@@ -316,7 +320,7 @@ class _Session:
         summary = {
             **description,
             **_origin(self._manner.continuation),
-            **run_results.figures(done),
+            **run_summary.figures(done),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
@@ -325,14 +329,14 @@ class _Session:
             "scenario_warnings": list(self._system.warnings),
         }
         run_results.write_forces(done)
-        run_results.write_json(self._folder / run_results.SUMMARY, summary)
+        results_folder.write_json(self._folder / results_folder.SUMMARY, summary)
         return replace(done, summary=summary)
 
     def disown(self, error: ForeignResultsError) -> None:
         """Mark results that are not what was written, if they are this run's at all."""
         if _is_still(self._folder, self._identity):
             data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
-            run_results.write_json(self._folder / run_results.SUMMARY, data)
+            results_folder.write_json(self._folder / results_folder.SUMMARY, data)
 
     def recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
         """Read what was recorded.
@@ -405,18 +409,18 @@ def _performance(timing: Timing, simulated: float) -> dict[str, float]:
         "initialisation_time": timing.initialisation,
         "wall_time": timing.stepping,
         "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
-        "peak_memory": run_results.peak_memory(),
+        "peak_memory": run_summary.peak_memory(),
     }
 
 
 def _description(system: System, identity: str) -> dict[str, Any]:
     return {
-        "generator": run_results.GENERATOR,
-        "format": run_results.FORMAT,
+        "generator": results_folder.GENERATOR,
+        "format": results_folder.FORMAT,
         "run": identity,
         "scenario": system.name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": run_results.versions(),
+        "versions": run_summary.versions(),
         "settings": {
             "start": system.start,
             "stop": system.stop,

@@ -27,7 +27,8 @@ from pythonfmu.fmi2slave import Fmi2Slave
 from fmus.slave.model_description import describe
 from fmus.slave.ports import Port, Ports, Table
 from fmus.slave.saved_state import StateError, pack, unpack
-from models.definition_files.parameter import Definition, FloatArray, Parameter, Snapshot
+from models.arrays import FloatArray, Snapshot
+from models.definition_files.parameter import Definition, Parameter
 
 #: A step may begin this share of its length away from where the model is: hosts sum up time.
 _TIME_TOLERANCE = 1e-3

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from models.definition_files.parameter import Snapshot
+from models.arrays import Snapshot
 
 #: First bytes of every state; the digit is the format's version.
 MAGIC = b"openpanto state 1\n"

@@ -9,8 +9,9 @@ import numpy as np
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import Signals
 from master.evaluation.filters import SETTLING, ForceFilter
+from master.evaluation.measured_force import Comparison
 from master.report import html_markup
-from master.report.charts.measured_charts import Comparison, comparison_chart, comparison_rows
+from master.report.charts.measured_charts import comparison_chart, comparison_rows
 from master.report.charts.output_charts import HEADS, has_contacts, output_charts, output_rows
 from master.report.charts.run_charts import Chart, run_charts
 from master.report.moving_picture import Movie, make_movie

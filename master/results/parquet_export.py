@@ -6,7 +6,7 @@ from pathlib import Path
 
 from master.errors import MasterError
 from master.recording.recording import TIMESERIES, Recording, header, load
-from master.results.run_results import FORCES
+from master.results.results_folder import FORCES
 from master.safety.safe_files import whole_file
 
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import FloatArray, IntArray, Snapshot
 from models.catenary.line_model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.sparse_products import Product, inner
-from models.definition_files.parameter import FloatArray, IntArray, Snapshot
 from models.numerics.energy_ledger import Ledger
 
 #: A force on a strip: pantograph, share of the way from A to B, force [N].

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import BoolArray, FloatArray, IntArray, Snapshot
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.local_problem import LocalForces, LocalProblem, LocalSolutionError, OpenContact
 from models.catenary.contact_and_slack.wire_response import Meeting, Reaction
@@ -40,7 +41,6 @@ from models.catenary.shape.wire_intervals import (
 from models.catenary.step.numba_engine import make_stepper
 from models.catenary.step.numpy_engine import Known, Stepper, local_motion
 from models.contact_law import CONTACT_LAWS
-from models.definition_files.parameter import BoolArray, FloatArray, IntArray, Snapshot
 from models.numerics.newmark import Newmark
 
 #: Step sizes whose factorisation is kept.

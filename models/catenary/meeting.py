@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from models.arrays import FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.wire_response import Meeting
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.step.numpy_engine import ReactionOf, Stepper
-from models.definition_files.parameter import FloatArray
 
 
 class FreeMotion:

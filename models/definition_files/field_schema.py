@@ -52,6 +52,11 @@ def count(description: str, *, default: Any = dataclasses.MISSING, minimum: int 
     return dataclasses.field(default=default, metadata={_META: spec})
 
 
+def monitoring() -> Any:
+    """Declare the number of a definition that says whether the balance is kept."""
+    return count("whether the energy balance is kept, for energy.* and contact.work: 0 no, 1 yes", default=0, maximum=1)
+
+
 def read(cls: type[T], table: Table, **given: Any) -> T:
     """Fill a dataclass from a table; fields without a declared quantity come from ``given``."""
     values = dict(given)

@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from models.arrays import FloatArray, IntArray
+from models.catenary.contact_and_slack.crossing import Crossing, crossing, engagement
 from models.catenary.linear_motion.interval_modes import IntervalModes, IntervalMotion
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.line_matrices import element_dofs
 from models.catenary.shape.line_mesh import Chain
 from models.catenary.shape.wire_intervals import Interval, turns
-from models.contact_law import crossing, engagement
-from models.definition_files.parameter import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -97,27 +97,6 @@ class Touch(NamedTuple):
     modal: FloatArray
     ends: FloatArray
     height: float
-
-
-class Crossing(NamedTuple):
-    """Where a strip crosses a wire in plan.
-
-    Attributes
-    ----------
-    element : int
-        Of the wire.
-    xi : float
-        Share of the way along the element.
-    share : float
-        Share of the way along the strip.
-    engagement : float
-        How much of the contact acts.
-    """
-
-    element: int
-    xi: float
-    share: float
-    engagement: float = 1.0
 
 
 #: A strip farther than this from the ends of a wire does not meet it, however the wire moves [m].

@@ -28,10 +28,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
+from models.arrays import FloatArray, IntArray
 from models.catenary.contact_and_slack.wire_response import Meeting, Point
 from models.catenary.linear_motion.compliance import Columns
 from models.contact_law import ContactLaw, ContactParameters, NormalForce
-from models.definition_files.parameter import FloatArray, IntArray
 
 _MAX_ITERATIONS = 60
 #: Relative change of the contact forces at which a nonlinear contact law counts as solved.

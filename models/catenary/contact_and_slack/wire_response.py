@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from models.catenary.contact_and_slack.contact_wire import Crossing, Touch, WireInterval
+from models.arrays import FloatArray, IntArray
+from models.catenary.contact_and_slack.contact_wire import Touch, WireInterval
+from models.catenary.contact_and_slack.crossing import Crossing
 from models.catenary.linear_motion.compliance import Columns
-from models.definition_files.parameter import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.contact_and_slack.contact_wire import ContactWire, Crossing, Touch, WireInterval
+from models.arrays import FloatArray, IntArray
+from models.catenary.contact_and_slack.contact_wire import ContactWire, Touch, WireInterval
+from models.catenary.contact_and_slack.crossing import Crossing
 from models.catenary.contact_and_slack.wire_response import Meeting, Point, Reaction
 from models.catenary.linear_motion.attachment_solver import Banded
 from models.catenary.linear_motion.interval_modes import IntervalModes
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.step.numpy_engine import Known, ReactionOf, Stepper
-from models.definition_files.parameter import FloatArray, IntArray
 from models.numerics.kernel_cache import load_kernels
 from models.numerics.newmark import Newmark
 

@@ -22,13 +22,14 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from models.catenary.contact_and_slack.contact_wire import ContactWire, Crossing, WireInterval
+from models.arrays import FloatArray, IntArray
+from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
+from models.catenary.contact_and_slack.crossing import Crossing
 from models.catenary.contact_and_slack.wire_response import Meeting, Point, Reaction
 from models.catenary.linear_motion.attachment_solver import Banded, Cyclic, Sparse, factorised
 from models.catenary.linear_motion.interval_modes import IntervalModes
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.sparse_products import BlockProduct, Multiplier, Product, TransposedProduct
-from models.definition_files.parameter import FloatArray, IntArray
 from models.numerics.newmark import Newmark
 
 #: Ends of an interval that its modes in one plane move with.

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from master.evaluation.following_pantograph import followings, leading_first
+from master.evaluation.contact_positions import leading_first
+from master.evaluation.following_pantograph import followings
 from master.recording.recording import Recording
 from master.system.contacts import Contact
 

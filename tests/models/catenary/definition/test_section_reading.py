@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from models.catenary.contact_and_slack.crossing import STRIP_EDGE
 from models.catenary.line_model import CatenaryModel, StripMotion
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics.elasticity import arm_loads
 from models.catenary.step.numpy_engine import local_motion
-from models.contact_law import STRIP_EDGE
 from models.definition_files.toml_reader import DefinitionError
-from models.library import load_line
+from models.library.catalogue import load_line
 
 #: Half of the pan-head's working length [m].
 HALF_STRIP = 0.725

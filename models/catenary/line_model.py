@@ -38,8 +38,9 @@ from models.catenary.shape.wire_intervals import (
     plan_rotation,
     without_rounding,
 )
-from models.catenary.step.numba_engine import make_stepper
-from models.catenary.step.numpy_engine import Known, Stepper, local_motion
+from models.catenary.step.engine_choice import make_stepper
+from models.catenary.step.numpy_engine import Stepper, local_motion
+from models.catenary.step.step_engine import Known
 from models.contact_law import CONTACT_LAWS
 from models.numerics.newmark import Newmark
 

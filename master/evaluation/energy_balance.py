@@ -16,14 +16,11 @@ from typing import Final
 import numpy as np
 
 from master.arrays import FloatArray
+from master.evaluation.contact_positions import strip_centre
 from master.evaluation.run_events import Event
-from master.recording.recorder import Recording
-from master.system.contacts import Contact, strip_centre
+from master.recording.recording import Recording
+from master.system.contacts import Contact
 
-#: The parameter that makes an FMU keep its balance, what it tells then, and how often that is recorded [s].
-MONITOR: Final = "monitor_energy"
-VARIABLES: Final = ("*.energy.*", "*contact.work")
-INTERVAL: Final = 0.05
 DRIFT: Final = "energy drift"
 #: Largest drift of a part, as a share of the energy that has passed through it. The balance of the trapezoidal rule
 #: is exact: it leaves rounding, 1e-11; an integrator with error control leaves less than 1e-7.

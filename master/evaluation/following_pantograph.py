@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from master.evaluation.contact_assessment import Assessment
-from master.recording.recorder import Recording
-from master.system.contacts import leading_first, running_position
+from master.evaluation.contact_positions import leading_first, running_position
+from master.recording.recording import Recording
 
 
 @dataclass(frozen=True)

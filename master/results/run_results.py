@@ -19,16 +19,15 @@ from master.evaluation.en50367_limits import LimitChoice, OwnLimits
 from master.evaluation.energy_balance import EnergyBalance, drift_events, find_balances
 from master.evaluation.filters import BEFORE_CHOICE, ForceFilter
 from master.evaluation.following_pantograph import FollowerEffect, follower_effects
-from master.evaluation.line_geometry import Geometry, Uplift, support_uplifts
+from master.evaluation.line_geometry import Uplift, support_uplifts
 from master.evaluation.run_events import Event, find_events
-from master.recording.recorder import NUMBER_FORMAT, Recording, load
+from master.recording.recording import NUMBER_FORMAT, TIMESERIES, Recording, load
+from master.recording.static_geometry import Geometry
 from master.results import summary_schema
 from master.results.results_folder import FORCES, GEOMETRY, _summary, write_text
 from master.safety import folder_lock
 from master.safety.safe_files import safe_cell
 from master.system.contacts import Contact
-
-TIMESERIES: Final = "timeseries.csv"
 
 
 @dataclass(frozen=True)

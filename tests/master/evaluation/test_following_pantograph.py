@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from master.evaluation.following_pantograph import follower_effects, leading_first
-from master.recording.recorder import Recording
+from master.evaluation.contact_positions import leading_first
+from master.evaluation.following_pantograph import follower_effects
+from master.recording.recording import Recording
 from master.system.contacts import Contact
 
 TIME = np.linspace(0.0, 1.0, 11)

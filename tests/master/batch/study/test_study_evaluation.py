@@ -12,7 +12,7 @@ from master.batch.study.study_outcome import Done, Outcome, as_csv, differences
 from master.batch.study.study_page import page
 from master.batch.verification.quantities import QUANTITIES, Choice
 from master.evaluation.contact_assessment import slack_share
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.results.run_results import Results
 from master.system.contacts import Contact
 

@@ -13,7 +13,7 @@ from models.catenary.linear_motion.sparse_products import BlockProduct, Product,
 from models.catenary.step.numba_engine import CompiledStepper, KernelError, kernels, make_stepper
 from models.catenary.step.numpy_engine import Stepper, _by_blocks
 from models.coupled.monolithic import CoupledModel
-from models.library import load_line
+from models.library.catalogue import load_line
 from models.numerics.newmark import Newmark
 from tests.models.nodal_line import NodalLine
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -18,12 +17,12 @@ from master.coupling.fmu_warnings import Caution, CautionObserver
 from master.coupling.macro_steps import Observer, Outcome, TimeGrid, simulate
 from master.coupling.network import Network
 from master.coupling.real_time import Pacer
+from master.coupling.stopwatch import Stopwatch, Timing
 from master.coupling.track_watch import TrackWatch
 from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
 from master.evaluation.interval_coverage import never_touched, shortfall
-from master.evaluation.line_geometry import GeometryObserver
-from master.fmu.instance import Instance, Recordable
-from master.fmu.isolation import IsolatedInstance, Isolation
+from master.fmu.instance import Instance
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 from master.recording.checkpoint import NAME as CHECKPOINT
 from master.recording.checkpoint import (
     Checkpoint,
@@ -35,38 +34,16 @@ from master.recording.checkpoint import (
     steps_between,
     take,
 )
-from master.recording.recorder import Recorder, Recording, Source
+from master.recording.recording import Recording
+from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
+from master.recording.static_geometry import GeometryObserver
 from master.results import results_folder, run_results, run_summary
 from master.results.run_results import Results
 from master.safety.interruption import heeded_at_once, interruptible
 from master.safety.supervision import phase, unfinished
 from master.system.components import Component, System, Variable
 from master.system.contacts import find_contacts
-from master.system.step_rounding import adjustments, is_recordable, record_of, steps_in
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Which variables are recorded how often.
-
-    Attributes
-    ----------
-    every : int
-        Steps between rows.
-    names : dict
-        Variable names by component.
-    """
-
-    every: int
-    names: dict[str, list[str]]
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Wall time of a run [s]: initialization, and stepping with recording."""
-
-    initialisation: float
-    stepping: float
+from master.system.step_rounding import adjustments
 
 
 @dataclass(frozen=True)
@@ -270,63 +247,6 @@ def _is_still(folder: Path, identity: str) -> bool:
     return False
 
 
-def recording_plans(system: System) -> tuple[Plan, ...]:
-    """Return what is recorded how often besides the exchanged outputs; the plan for every step comes first.
-
-    Exchanged outputs are always recorded at every step, all other outputs too unless an entry of the settings says
-    otherwise, and local variables only if an entry names them; texts are not recorded.
-    """
-    by_rate: dict[int, dict[str, list[str]]] = {1: {}}
-    for component in system.components:
-        for variable in component.fmu.variables.values():
-            every = _steps_between_rows(component, variable, system)
-            if every:
-                by_rate.setdefault(every, {}).setdefault(component.name, []).append(variable.name)
-    return tuple(Plan(rate, by_rate[rate]) for rate in sorted(by_rate))
-
-
-def _steps_between_rows(component: Component, variable: Variable, system: System) -> int:
-    """Return how often a variable is recorded, 0 for never (or with the exchanged ones)."""
-    if not is_recordable(component, variable):
-        return 0
-    record = record_of(f"{component.name}.{variable.name}", system.settings.records)
-    if record is None:
-        return 1 if variable.causality == "output" else 0
-    return steps_in(record.every, system.step)
-
-
-def recording_name(plan: Plan, step: float) -> str:
-    """Return the name of a plan's file."""
-    return run_results.TIMESERIES if plan.every == 1 else f"timeseries_{1e3 * plan.every * step:g}ms.csv"
-
-
-class Stopwatch:
-    """Observer that measures the wall time of initialization and of stepping."""
-
-    def __init__(self) -> None:
-        self._created = time.perf_counter()
-        self._began: float | None = None
-        self._ended: float | None = None
-
-    def begin(self, start: float, network: Network) -> None:
-        """Stepping begins."""
-        self._began = time.perf_counter()
-
-    def observe(self, index: int, end: float, network: Network) -> None:
-        """Nothing to measure."""
-
-    def finish(self) -> None:
-        """Stepping has ended."""
-        self._ended = time.perf_counter()
-
-    @property
-    def timing(self) -> Timing:
-        """What was measured."""
-        ended = self._ended if self._ended is not None else time.perf_counter()
-        began = self._began if self._began is not None else ended
-        return Timing(began - self._created, ended - began)
-
-
 class _Session:
     """The observers of a run and what is made of them in the end."""
 
@@ -353,7 +273,7 @@ class _Session:
         self._pacer = None if manner.real_time is None else Pacer(self.grid, manner.real_time)
         made = self._take_up(manner.continuation)
         self._recorders = [
-            _recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
+            make_recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
         ]
 
     def _take_up(self, continuation: Continuation | None) -> int | None:
@@ -491,36 +411,6 @@ def _performance(timing: Timing, simulated: float) -> dict[str, float]:
         "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
         "peak_memory": run_summary.peak_memory(),
     }
-
-
-def _recorder(
-    system: System, network: Network, plan: Plan, folder: Path, made: int | None, is_steady: bool
-) -> Recorder:
-    """Return the recorder of a plan; ``made`` are the steps whose rows are in its file already."""
-    sources = [_exchanged(system, network)] if plan.every == 1 else []
-    units: dict[str, str] = {}
-    for component, slave in zip(system.components, network.slaves, strict=True):
-        units |= {f"{component.name}.{v.name}": v.unit for v in component.fmu.variables.values()}
-        names = plan.names.get(component.name, [])
-        if names and isinstance(slave, Recordable):
-            group = slave.group(names)
-            sources.append(Source([f"{component.name}.{n}" for n in names], group.values, group.read))
-    keep = 0 if made is None else made // plan.every + 1
-    return Recorder(folder / recording_name(plan, system.step), sources, units, plan.every, keep, is_steady)
-
-
-def _exchanged(system: System, network: Network) -> Source:
-    """Return the exchanged outputs as a source; of texts there is no column."""
-    texts = {f"{c.name}.{n}" for c in system.components for n in c.texts}
-    places = [i for i, name in enumerate(network.output_names) if name not in texts]
-    if len(places) == len(network.output_names):
-        return Source(network.output_names, network.outputs)
-    values = network.outputs[places]
-
-    def read() -> None:
-        values[:] = network.outputs[places]
-
-    return Source([network.output_names[i] for i in places], values, read)
 
 
 def _description(system: System, identity: str) -> dict[str, Any]:

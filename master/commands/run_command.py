@@ -21,7 +21,7 @@ from master.commands.command_options import (
 )
 from master.coupling.fmu_warnings import CautionObserver
 from master.errors import RequestError, RunError, UsageError
-from master.fmu.isolation import INIT_TIMEOUT, Isolation
+from master.fmu.isolation.isolated_instance import INIT_TIMEOUT, Isolation
 from master.recording import checkpoint
 from master.recording.checkpoint import Continuation
 from master.report import report_files

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from master.errors import MasterError
-from master.recording.recorder import Recording, header, load
+from master.recording.recording import TIMESERIES, Recording, header, load
 from master.results.results_folder import FORCES
-from master.results.run_results import TIMESERIES
 from master.safety.safe_files import whole_file
 
 

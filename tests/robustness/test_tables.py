@@ -18,7 +18,7 @@ from master.commands.main import main as master
 from master.errors import MasterError
 from master.evaluation.measured_force import read_measured
 from master.safety.safe_files import plain_cell, safe_cell
-from models.commands import main as models
+from models.commands.physics_main import main as models
 from models.definition_files.toml_reader import DefinitionError
 from models.pantograph.identification import read_response
 from tests.effort import count

@@ -13,7 +13,7 @@ from master.commands.main import main
 from master.errors import RequestError
 from master.evaluation.en50367_limits import LimitChoice
 from master.evaluation.interval_coverage import never_touched, shortfall
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.html_markup import verdict
 from master.results.run_results import Results, read
 from master.results.run_summary import figures

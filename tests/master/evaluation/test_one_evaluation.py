@@ -17,7 +17,7 @@ from master.evaluation.contact_assessment import assess_contacts
 from master.evaluation.contact_quality import figures_of
 from master.evaluation.contact_signals import EvaluationSettings, contact_signals
 from master.evaluation.filters import BEFORE_CHOICE, DEFAULT, SETTLING, ForceFilter
-from master.recording.recorder import Recording, load
+from master.recording.recording import Recording, load
 from master.report.charts.run_charts import interval_shape
 from master.report.result_tables import figure_rows
 from master.results import results_folder, run_difference, run_results
@@ -26,10 +26,10 @@ from master.run import run
 from master.scenario.open_scenario import Overrides, open_scenario
 from master.system.contacts import Contact
 from models.catenary.line_model import CatenaryModel
-from models.commands import main as physics
 from models.commands.couple_command import Evaluated, write_timeseries
+from models.commands.physics_main import main as physics
 from models.coupled.monolithic import CoupledModel
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 
 ROOT = Path(__file__).parents[3]
 CONTACT = Contact(1, "catenary", "pantograph", "catenary.pantograph[1].contact")

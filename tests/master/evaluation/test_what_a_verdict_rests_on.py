@@ -12,7 +12,7 @@ from master.batch.study.family import Family, Interval, Settings, Variant
 from master.batch.study.study_outcome import Done, Outcome, as_data
 from master.batch.study.study_table import figures_table
 from master.evaluation.interval_coverage import shortfall
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.comparison_page import comparison_page
 from master.report.run_page import page
 from master.results import run_difference, run_summary

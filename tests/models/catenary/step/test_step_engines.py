@@ -14,7 +14,7 @@ from models.catenary.step.engine_choice import kernels, make_stepper
 from models.catenary.step.numba_engine import CompiledStepper
 from models.catenary.step.numpy_engine import Stepper, _by_blocks
 from models.coupled.monolithic import CoupledModel
-from models.library import load_line
+from models.library.catalogue import load_line
 from models.numerics.kernel_cache import KernelError
 from models.numerics.newmark import Newmark
 from tests.models.nodal_line import NodalLine

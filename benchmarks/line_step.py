@@ -17,7 +17,7 @@ from timing import by_turns, on_one_thread, table
 from models.catenary.contact_and_slack import local_problem
 from models.catenary.line_model import CatenaryModel
 from models.coupled.monolithic import CoupledModel
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_model import LumpedModel
 
 STEP = 1e-3

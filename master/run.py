@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -18,12 +17,12 @@ from master.coupling.fmu_warnings import Caution, CautionObserver
 from master.coupling.macro_steps import Observer, Outcome, TimeGrid, simulate
 from master.coupling.network import Network
 from master.coupling.real_time import Pacer
+from master.coupling.stopwatch import Stopwatch, Timing
 from master.coupling.track_watch import TrackWatch
 from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
 from master.evaluation.interval_coverage import never_touched, shortfall
-from master.evaluation.line_geometry import GeometryObserver
-from master.fmu.instance import Instance, Recordable
-from master.fmu.isolation import IsolatedInstance, Isolation
+from master.fmu.instance import Instance
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 from master.recording.checkpoint import NAME as CHECKPOINT
 from master.recording.checkpoint import (
     Checkpoint,
@@ -35,38 +34,16 @@ from master.recording.checkpoint import (
     steps_between,
     take,
 )
-from master.recording.recorder import Recorder, Recording, Source
-from master.results import run_results
+from master.recording.recording import Recording
+from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
+from master.recording.static_geometry import GeometryObserver
+from master.results import results_folder, run_results, run_summary
 from master.results.run_results import Results
 from master.safety.interruption import heeded_at_once, interruptible
 from master.safety.supervision import phase, unfinished
 from master.system.components import Component, System, Variable
 from master.system.contacts import find_contacts
-from master.system.step_rounding import adjustments, is_recordable, record_of, steps_in
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Which variables are recorded how often.
-
-    Attributes
-    ----------
-    every : int
-        Steps between rows.
-    names : dict
-        Variable names by component.
-    """
-
-    every: int
-    names: dict[str, list[str]]
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Wall time of a run [s]: initialization, and stepping with recording."""
-
-    initialisation: float
-    stepping: float
+from master.system.step_rounding import adjustments
 
 
 @dataclass(frozen=True)
@@ -122,11 +99,11 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
         If checkpoint or continuation do not fit the system.
     """
     occasions = _occasions(system, manner)
-    with run_results.claimed(folder):
+    with results_folder.claimed(folder):
         identity = _take_folder(system, folder, manner.continuation)
-        with unfinished(folder / run_results.SUMMARY, identity):
-            run_results.write_json(
-                folder / run_results.SUMMARY, {**_description(system, identity), "status": "running"}
+        with unfinished(folder / results_folder.SUMMARY, identity):
+            results_folder.write_json(
+                folder / results_folder.SUMMARY, {**_description(system, identity), "status": "running"}
             )
             return _run(system, folder, observers, manner, occasions, identity)
 
@@ -182,11 +159,11 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
     if continuation is not None:
         continuation.check(system)
         if continuation.is_same_run:
-            known = run_results.identity(folder)
+            known = results_folder.identity(folder)
             if not known or known != continuation.checkpoint.run:
                 raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
-    run_results.prepare(folder, None if continuation is None else Path(continuation.file))
+    results_folder.prepare(folder, None if continuation is None else Path(continuation.file))
     return uuid.uuid4().hex
 
 
@@ -201,7 +178,9 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
         cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
         outcome = Outcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
         if _is_still(folder, identity):
-            run_results.write_json(folder / run_results.SUMMARY, {**_description(system, identity), **_ending(outcome)})
+            results_folder.write_json(
+                folder / results_folder.SUMMARY, {**_description(system, identity), **_ending(outcome)}
+            )
         if is_interrupted:
             raise InterruptedRunError(_what_happened(outcome, folder)) from error
         raise
@@ -264,65 +243,8 @@ def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caut
 def _is_still(folder: Path, identity: str) -> bool:
     """Whether it is the run of this identity whose results lie in the folder."""
     with suppress(MasterError):
-        return run_results.identity(folder) == identity
+        return results_folder.identity(folder) == identity
     return False
-
-
-def recording_plans(system: System) -> tuple[Plan, ...]:
-    """Return what is recorded how often besides the exchanged outputs; the plan for every step comes first.
-
-    Exchanged outputs are always recorded at every step, all other outputs too unless an entry of the settings says
-    otherwise, and local variables only if an entry names them; texts are not recorded.
-    """
-    by_rate: dict[int, dict[str, list[str]]] = {1: {}}
-    for component in system.components:
-        for variable in component.fmu.variables.values():
-            every = _steps_between_rows(component, variable, system)
-            if every:
-                by_rate.setdefault(every, {}).setdefault(component.name, []).append(variable.name)
-    return tuple(Plan(rate, by_rate[rate]) for rate in sorted(by_rate))
-
-
-def _steps_between_rows(component: Component, variable: Variable, system: System) -> int:
-    """Return how often a variable is recorded, 0 for never (or with the exchanged ones)."""
-    if not is_recordable(component, variable):
-        return 0
-    record = record_of(f"{component.name}.{variable.name}", system.settings.records)
-    if record is None:
-        return 1 if variable.causality == "output" else 0
-    return steps_in(record.every, system.step)
-
-
-def recording_name(plan: Plan, step: float) -> str:
-    """Return the name of a plan's file."""
-    return run_results.TIMESERIES if plan.every == 1 else f"timeseries_{1e3 * plan.every * step:g}ms.csv"
-
-
-class Stopwatch:
-    """Observer that measures the wall time of initialization and of stepping."""
-
-    def __init__(self) -> None:
-        self._created = time.perf_counter()
-        self._began: float | None = None
-        self._ended: float | None = None
-
-    def begin(self, start: float, network: Network) -> None:
-        """Stepping begins."""
-        self._began = time.perf_counter()
-
-    def observe(self, index: int, end: float, network: Network) -> None:
-        """Nothing to measure."""
-
-    def finish(self) -> None:
-        """Stepping has ended."""
-        self._ended = time.perf_counter()
-
-    @property
-    def timing(self) -> Timing:
-        """What was measured."""
-        ended = self._ended if self._ended is not None else time.perf_counter()
-        began = self._began if self._began is not None else ended
-        return Timing(began - self._created, ended - began)
 
 
 class _Session:
@@ -339,7 +261,9 @@ class _Session:
         self.algorithm = make_algorithm(system.settings.coupling)
         whole = TimeGrid(system.start, system.step, system.step_count)
         self.grid = whole if manner.continuation is None else manner.continuation.grid(system)
-        self._geometry = GeometryObserver(system, lambda g: run_results.write_json(folder / run_results.GEOMETRY, g))
+        self._geometry = GeometryObserver(
+            system, lambda g: results_folder.write_json(folder / results_folder.GEOMETRY, g)
+        )
         self._power = PowerObserver(self._contacts, network)
         self._contact_watch = ContactWatch(self._contacts, network)
         self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
@@ -349,7 +273,7 @@ class _Session:
         self._pacer = None if manner.real_time is None else Pacer(self.grid, manner.real_time)
         made = self._take_up(manner.continuation)
         self._recorders = [
-            _recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
+            make_recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
         ]
 
     def _take_up(self, continuation: Continuation | None) -> int | None:
@@ -396,7 +320,7 @@ class _Session:
         summary = {
             **description,
             **_origin(self._manner.continuation),
-            **run_results.figures(done),
+            **run_summary.figures(done),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
@@ -405,14 +329,14 @@ class _Session:
             "scenario_warnings": list(self._system.warnings),
         }
         run_results.write_forces(done)
-        run_results.write_json(self._folder / run_results.SUMMARY, summary)
+        results_folder.write_json(self._folder / results_folder.SUMMARY, summary)
         return replace(done, summary=summary)
 
     def disown(self, error: ForeignResultsError) -> None:
         """Mark results that are not what was written, if they are this run's at all."""
         if _is_still(self._folder, self._identity):
             data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
-            run_results.write_json(self._folder / run_results.SUMMARY, data)
+            results_folder.write_json(self._folder / results_folder.SUMMARY, data)
 
     def recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
         """Read what was recorded.
@@ -485,48 +409,18 @@ def _performance(timing: Timing, simulated: float) -> dict[str, float]:
         "initialisation_time": timing.initialisation,
         "wall_time": timing.stepping,
         "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
-        "peak_memory": run_results.peak_memory(),
+        "peak_memory": run_summary.peak_memory(),
     }
-
-
-def _recorder(
-    system: System, network: Network, plan: Plan, folder: Path, made: int | None, is_steady: bool
-) -> Recorder:
-    """Return the recorder of a plan; ``made`` are the steps whose rows are in its file already."""
-    sources = [_exchanged(system, network)] if plan.every == 1 else []
-    units: dict[str, str] = {}
-    for component, slave in zip(system.components, network.slaves, strict=True):
-        units |= {f"{component.name}.{v.name}": v.unit for v in component.fmu.variables.values()}
-        names = plan.names.get(component.name, [])
-        if names and isinstance(slave, Recordable):
-            group = slave.group(names)
-            sources.append(Source([f"{component.name}.{n}" for n in names], group.values, group.read))
-    keep = 0 if made is None else made // plan.every + 1
-    return Recorder(folder / recording_name(plan, system.step), sources, units, plan.every, keep, is_steady)
-
-
-def _exchanged(system: System, network: Network) -> Source:
-    """Return the exchanged outputs as a source; of texts there is no column."""
-    texts = {f"{c.name}.{n}" for c in system.components for n in c.texts}
-    places = [i for i, name in enumerate(network.output_names) if name not in texts]
-    if len(places) == len(network.output_names):
-        return Source(network.output_names, network.outputs)
-    values = network.outputs[places]
-
-    def read() -> None:
-        values[:] = network.outputs[places]
-
-    return Source([network.output_names[i] for i in places], values, read)
 
 
 def _description(system: System, identity: str) -> dict[str, Any]:
     return {
-        "generator": run_results.GENERATOR,
-        "format": run_results.FORMAT,
+        "generator": results_folder.GENERATOR,
+        "format": results_folder.FORMAT,
         "run": identity,
         "scenario": system.name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": run_results.versions(),
+        "versions": run_summary.versions(),
         "settings": {
             "start": system.start,
             "stop": system.stop,

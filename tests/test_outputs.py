@@ -30,7 +30,7 @@ WHOLE = {
     "master/safety/folder_lock.py": {"_sign"},
     "master/results/run_results.py": {"write_forces"},
     "master/safety/safe_files.py": {"write_whole"},
-    "master/report/__init__.py": {"write"},
+    "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},
     "master/batch/verification/verification_page.py": {"_picture"},
@@ -41,7 +41,7 @@ WHOLE = {
     "fmus/loader/runtime.py": {"_archive", "_replace"},
 }
 #: Functions that are called ``write_text`` and ``save`` and are no writing by a file's name.
-HARMLESS = {"run_results.write_text", "slave.save", "self.save", "self._instance.save"}
+HARMLESS = {"results_folder.write_text", "slave.save", "self.save", "self._instance.save"}
 
 
 def writing_calls(path: Path):

@@ -12,7 +12,7 @@ from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
 from models.pantograph.lumped.lumped_advice import working_height_warning
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, load_lumped
-from models.pantograph.lumped.lumped_model import LumpedPantographPart
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 
 
 class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
 from master.coupling.network import Network
 from master.errors import MasterError
-from master.fmu.instance import Cautious
 
 #: Magnitude beyond which no length, velocity or force of a line and a pantograph lies [SI].
 LARGEST: Final = 1e15
@@ -111,3 +110,13 @@ class CautionObserver:
                 component, _, variable = name.partition(".")
                 text = f"{variable} became {network.outputs[index]:.3g} at t = {time:.6g} s, larger than anything here"
                 self.add(Excess(component, f"{text} can be ({LARGEST:g}); the results mean nothing"))
+
+
+@runtime_checkable
+class Cautious(Protocol):
+    """A slave that may warn."""
+
+    name: str
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return its warnings so far, each once and on one line."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from master.errors import MasterError
-from master.recording.recorder import Recording, header, load
-from master.results.run_results import FORCES, TIMESERIES
+from master.recording.recording import TIMESERIES, Recording, header, load
+from master.results.results_folder import FORCES
 from master.safety.safe_files import whole_file
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from master.errors import Problem, RequestError, ScenarioError
-from master.evaluation import energy_balance as energy
 from master.fmu import fmu_provision
 from master.fmu.fmu_description import lacking_binary, read_fmu
 from master.scenario import scenario_checks
@@ -25,7 +24,7 @@ from master.ssp.ssm import NOTE
 from master.ssp.ssp_units import COMMON, conversion, split_quantity
 from master.ssp.ssp_xml import Reader
 from master.system.components import Component, Fmu, System, Variable, without
-from master.system.variable_names import matcher
+from master.system.variable_names import ENERGY_INTERVAL, ENERGY_MONITOR, ENERGY_VARIABLES, matcher
 
 DEFAULT_STEP = 1e-3
 #: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
@@ -338,14 +337,14 @@ def with_values(components: tuple[Component, ...], values: Mapping[str, str]) ->
 
 def _with_energy(components: tuple[Component, ...], settings: RunSettings) -> tuple[tuple[Component, ...], RunSettings]:
     """Make the components that can keep their energy balance do so, and record it."""
-    able = [energy.MONITOR in c.fmu.variables for c in components]
+    able = [ENERGY_MONITOR in c.fmu.variables for c in components]
     if not any(able):
-        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{energy.MONITOR}'; build them anew")
+        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{ENERGY_MONITOR}'; build them anew")
     watched = tuple(
-        replace(c, parameters={**c.parameters, energy.MONITOR: 1}) if can else c
+        replace(c, parameters={**c.parameters, ENERGY_MONITOR: 1}) if can else c
         for c, can in zip(components, able, strict=True)
     )
-    record = Record(variables=energy.VARIABLES, every=energy.INTERVAL)
+    record = Record(variables=ENERGY_VARIABLES, every=ENERGY_INTERVAL)
     return watched, settings.model_copy(update={"records": (*settings.records, record)})
 
 

@@ -14,6 +14,7 @@ from typing import Final
 
 from master.system.components import Component, System
 from master.system.contacts import find_contacts
+from master.system.pantograph_motion import final_position, pantographs, parameter_value
 
 #: What a run goes on for after the last pantograph has left the interval [s]: the filter looks that far ahead, and the
 #: waves that supports are lifted by leave late.
@@ -22,30 +23,6 @@ AFTER_INTERVAL: Final = 0.5
 _LIFTS: Final = ("static_force", "static_moment")
 #: A share of a step by which rounding may miss a communication point.
 _ROUNDING: Final = 1e-6
-
-
-def parameter_value(component: Component, name: str) -> float | None:
-    """Return the value that a Real parameter will have, None if there is no such parameter or no value."""
-    variable = component.fmu.variables.get(name)
-    if variable is None or variable.causality != "parameter" or variable.type != "Real":
-        return None
-    try:
-        value = float(component.parameters.get(name, variable.start or math.nan))
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
-
-
-def pantographs(system: System) -> tuple[Component, ...]:
-    """Return the components that are told a contact force, each once."""
-    names = dict.fromkeys(c.pantograph for c in find_contacts(system.connections))
-    return tuple(system.component(name) for name in names)
-
-
-def final_position(system: System, pantograph: Component) -> float | None:
-    """Return where a pantograph is at the stop time [m], None if its FMU does not tell start and speed."""
-    start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
-    return None if start is None or speed is None else start + speed * (system.stop - system.start)
 
 
 def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:

@@ -22,8 +22,8 @@ from master.ssp.ssd_elements import Component, Connection, Connector, Joint, Leg
 from master.ssp.ssp_enumerations import Items
 from master.ssp.ssp_units import Conversion
 from master.system.components import Component as SystemComponent
-from master.system.components import Connection as SystemConnection
 from master.system.components import Fmu, Variable
+from master.system.connections import Connection as SystemConnection
 
 #: Which FMI causalities a connector kind may stand for.
 _CAUSALITIES = {

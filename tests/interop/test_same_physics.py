@@ -11,7 +11,7 @@ import pytest
 from master.evaluation.energy_balance import DRIFT
 from master.recording import checkpoint
 from master.recording.checkpoint import Continuation
-from master.recording.recorder import load
+from master.recording.recording import load
 from master.run import Manner, run
 from master.scenario.open_scenario import Overrides, open_scenario
 from master.ssp.archive import extract

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from master.batch.calibration import Found, find_values
+from master.batch.calibration import CalibrationResult, find_values
 from master.batch.study.family import Calibration, Family, Interval, Variant
 from master.coupling.fmu_warnings import CautionObserver
 from master.coupling.macro_steps import Observer
 from master.errors import MasterError, RequestError
-from master.results import run_results
+from master.results import results_folder, run_results
 from master.results.run_results import Results
 from master.run import run
 from master.scenario.open_scenario import Overrides, find_parameter, open_scenario
@@ -75,7 +75,7 @@ class Runner:
 
 def finished(folder: Path, system: System) -> Results | None:
     """Return the results in a folder if they are those of just this system, complete."""
-    if not run_results.is_ours(folder):
+    if not results_folder.is_ours(folder):
         return None
     found = run_results.read(folder)
     return found if found.summary.get("status") == "complete" and _is_of(found.summary, system) else None
@@ -90,7 +90,7 @@ def _is_of(summary: dict[str, Any], system: System) -> bool:
     return bool(json.loads(json.dumps(wanted)) == [found, summary.get("settings")])
 
 
-def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, Found]:
+def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, CalibrationResult]:
     """Find the pantographs' parameters that give each the wanted mean force, by ``component.parameter``.
 
     Raises

@@ -10,7 +10,7 @@ import pytest
 from fmus.__main__ import main
 from fmus.builder.fmu_build import MARK, BuildError, build, content_hash, fingerprint, recipe
 from master.fmu import fmu_provision
-from models.library import line_path, pantograph_path
+from models.library.catalogue import line_path, pantograph_path
 from tests.fmus.support import Instance
 
 

@@ -8,7 +8,7 @@ from master.coupling.network import Network
 from master.errors import RunError
 from master.ssp.run_settings import Coupling
 from master.ssp.ssp_units import Conversion
-from master.system.components import Connection
+from master.system.connections import Connection
 
 OMEGA = 2.0
 

@@ -13,7 +13,7 @@ from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.coupling.network import Network
 from master.coupling.real_time import Pacer
-from master.system.components import Connection
+from master.system.connections import Connection
 
 
 class Clock:

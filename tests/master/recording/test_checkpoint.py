@@ -13,7 +13,7 @@ from master.coupling.coupling_schemes import Iterative, Jacobi
 from master.errors import MasterError, RequestError, RunError
 from master.recording import checkpoint
 from master.recording.checkpoint import Continuation, index_at, pack, unpack
-from master.recording.recorder import load
+from master.recording.recording import load
 from master.run import loaded
 from master.scenario.open_scenario import Overrides, open_scenario
 

@@ -7,8 +7,9 @@ from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.coupling.network import Network
 from master.errors import MasterError
-from master.recording.recorder import Recorder, Source, header, load
-from master.system.components import Connection
+from master.recording.recorder import Recorder, Source
+from master.recording.recording import header, load
+from master.system.connections import Connection
 from master.system.variable_names import matcher
 
 NAME = "clock.pantograph[1].contact.force"

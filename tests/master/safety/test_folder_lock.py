@@ -15,7 +15,7 @@ import pytest
 
 from master.commands.main import main
 from master.recording import checkpoint
-from master.recording.recorder import load
+from master.recording.recording import load
 from master.results import run_results
 from master.safety import folder_lock
 from master.safety.folder_lock import LOCK, OWNER, FolderInUseError, claimed
@@ -203,7 +203,7 @@ def test_rows_are_counted_before_a_run_is_complete(toy, tmp_path, capsys, monkey
             path.write_text("".join(lines[:-1] if rows < 0 else lines + more))
         return load(path)
 
-    monkeypatch.setattr("master.recording.recorder.load", changed)
+    monkeypatch.setattr("master.recording.recording.load", changed)
     assert go(toy, folder, "--stop", "0.1") == 1
     assert f"timeseries.csv has {101 + rows} rows, 101 were written: it was changed" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())
@@ -221,7 +221,7 @@ def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsy
             path.write_text(f"{text[:-1]}{'1' if text[-1] != '1' else '2'}\n")
         return load(path)
 
-    monkeypatch.setattr("master.recording.recorder.load", replaced)
+    monkeypatch.setattr("master.recording.recording.load", replaced)
     assert go(toy, folder, "--stop", "0.1") == 1
     assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())

@@ -21,7 +21,8 @@ from master.commands.main import main
 from master.errors import MasterError
 from master.recording import checkpoint
 from master.recording.checkpoint import Occasions
-from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source, load
+from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source
+from master.recording.recording import load
 from master.results import run_results
 from master.safety import safe_files
 from master.safety.safe_files import LineFile, write_whole

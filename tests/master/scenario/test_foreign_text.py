@@ -16,7 +16,8 @@ from master.errors import MasterError, SlaveError
 from master.fmu import fmi_log
 from master.fmu.fmu_description import read_fmu
 from master.fmu.instance import LONGEST_STATE, Instance
-from master.recording.recorder import Recorder, Source, load
+from master.recording.recorder import Recorder, Source
+from master.recording.recording import load
 from master.report.result_tables import figures_table, plain_table
 from master.report.terminal_summary import Terminal, printable_json
 from master.safety.safe_files import plain_cell, safe_cell

@@ -4,16 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from master.scenario.scenario_checks import (
-    empty_cells,
-    final_position,
-    half_empty_rows,
-    parameter_value,
-    problems,
-    stop_after_interval,
-)
+from master.scenario.scenario_checks import empty_cells, half_empty_rows, problems, stop_after_interval
 from master.ssp.run_settings import Interval, RunSettings
-from master.system.components import Component, Connection, Fmu, System, Variable
+from master.system.components import Component, Fmu, System, Variable
+from master.system.connections import Connection
+from master.system.pantograph_motion import final_position, parameter_value
 
 
 def parameter(name, start, unit="m", causality="parameter", kind="Real"):

@@ -7,7 +7,8 @@ import pytest
 
 from master.scenario.system_checks import Checker
 from master.ssp.run_settings import Annotations, RunSettings
-from master.ssp.ssd import Binding, Component, Connection, Connector, Structure
+from master.ssp.ssd import Component, Connection, Structure
+from master.ssp.ssd_elements import Binding, Connector
 from master.ssp.ssp_units import COMMON, Conversion
 from master.ssp.ssv import Parameter, ParameterSet
 from master.system.components import Fmu, Variable

@@ -7,10 +7,11 @@ import pytest
 
 from master.coupling.coupling_power import PowerObserver, power_residual
 from master.coupling.network import Network
+from master.evaluation.contact_positions import lateral_position
 from master.evaluation.line_geometry import indexed, support_uplifts
-from master.recording.recorder import Recording
-from master.system.components import Connection
-from master.system.contacts import Contact, find_contacts, lateral_position
+from master.recording.recording import Recording
+from master.system.connections import Connection
+from master.system.contacts import Contact, find_contacts
 
 
 def test_contacts_are_found_by_their_connections_in_the_order_of_the_ports():

@@ -19,7 +19,7 @@ from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics.elasticity import elasticity
 from models.coupled.monolithic import CoupledModel
 from models.definition_files.toml_reader import DefinitionError, Table
-from models.library import line_names, line_path, load_line
+from models.library.catalogue import line_names, line_path, load_line
 
 STEP, SPAN = 1e-3, 50.0
 #: Contact forces that differ by less are the same but for rounding [N].

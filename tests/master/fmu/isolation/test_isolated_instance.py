@@ -15,7 +15,7 @@ import pytest
 
 from master.errors import SlaveError
 from master.fmu.instance import Instance
-from master.fmu.isolation import IsolatedInstance, Isolation
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 
 ROOT = Path(__file__).parents[4]
 

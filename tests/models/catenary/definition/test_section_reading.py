@@ -9,7 +9,7 @@ from models.catenary.line_part import CatenaryPart
 from models.catenary.statics.elasticity import arm_loads
 from models.catenary.step.numpy_engine import local_motion
 from models.definition_files.toml_reader import DefinitionError
-from models.library import load_line
+from models.library.catalogue import load_line
 
 #: Half of the pan-head's working length [m].
 HALF_STRIP = 0.725

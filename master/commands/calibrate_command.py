@@ -72,7 +72,7 @@ def _filter_of(system: System) -> str:
     return run_results.filter_of(system.settings.filter.model_dump()).short
 
 
-def _found(system: System, task: Calibration) -> calibration.Found:
+def _found(system: System, task: Calibration) -> calibration.CalibrationResult:
     start = _start_value(system, task.parameter)
     return calibration.find_value(lambda value: _trial(system, task, value), task.mean_force, start, task.tolerance)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from master.errors import MasterError
-from master.evaluation.measured_force import Comparison, compare_measured, read_measured
+from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
 from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import columns, comparison_page
@@ -89,7 +89,7 @@ def report_what_there_is(folder: Path) -> None:
         return  # it stopped before anything was recorded; the error itself is told by the caller
 
 
-def _measured(done: Results, path: Path, contact: int) -> Comparison:
+def _measured(done: Results, path: Path, contact: int) -> MeasuredComparison:
     signals = [s for s in done.signals if s.contact.index == contact]
     if not signals:
         raise MasterError(
@@ -98,7 +98,7 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
     return compare_measured(signals[0], read_measured(path))
 
 
-def _say_measured(measured: Comparison) -> None:
+def _say_measured(measured: MeasuredComparison) -> None:
     rows = result_tables.plain_table(("low-passed", "simulated", "measured", "difference"), comparison_rows(measured))
     console = Terminal(width=_WIDTH, highlight=False)
     console.print(rows)
@@ -140,7 +140,7 @@ def run_compare(options: argparse.Namespace) -> int:
 
 
 def _show(
-    runs: Sequence[Results], pairs: Sequence[Sequence[run_difference.Comparison]], options: argparse.Namespace
+    runs: Sequence[Results], pairs: Sequence[Sequence[run_difference.RunDifference]], options: argparse.Namespace
 ) -> None:
     console = Terminal(width=_WIDTH, highlight=False)
     found = columns(runs)
@@ -158,7 +158,7 @@ def _show(
         console.print(f"report in {options.report}", markup=False, soft_wrap=True)
 
 
-def _as_json(c: run_difference.Comparison, first: Results, other: Results) -> Mapping[str, Any]:
+def _as_json(c: run_difference.RunDifference, first: Results, other: Results) -> Mapping[str, Any]:
     names = ("mean", "sigma", "minimum", "maximum")
     one, two = c.first.quality, c.second.quality
     difference = {n: getattr(two, n) - getattr(one, n) for n in names}

@@ -53,7 +53,7 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MeasuredComparison:
     """Measured and simulated low-passed force at the same instants.
 
     Attributes
@@ -213,7 +213,7 @@ def _checked(path: Path, over_time: bool, rows: Sequence[_Row], abscissa: FloatA
     return Measurement(path.name, over_time, abscissa, force)
 
 
-def compare_measured(s: Signals, measurement: Measurement) -> Comparison:
+def compare_measured(s: Signals, measurement: Measurement) -> MeasuredComparison:
     """Put a measurement beside a simulated contact; both are low-passed with the run's filter.
 
     The measured force is brought to the simulation's instants, then filtered as the simulated one is.
@@ -234,7 +234,7 @@ def compare_measured(s: Signals, measurement: Measurement) -> Comparison:
         )
     filtered = _filtered(s, measurement, there, known)
     texts = _part(s, both), _coarse(s, measurement, there, both)
-    return Comparison(
+    return MeasuredComparison(
         measurement.source, s.contact.pantograph, s.position[both], s.filtered[both], filtered[both], *texts
     )
 

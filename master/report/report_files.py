@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from master.evaluation.measured_force import Comparison
+from master.evaluation.measured_force import MeasuredComparison
 from master.report.charts import static_charts
 from master.report.charts.output_charts import has_contacts, output_plots
 from master.report.run_page import page
@@ -13,7 +13,7 @@ from master.results.run_results import Results
 from master.safety.safe_files import whole_file, write_whole
 
 
-def write(done: Results, measured: Comparison | None = None) -> Path:
+def write(done: Results, measured: MeasuredComparison | None = None) -> Path:
     """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
     path = done.folder / results_folder.REPORT
     write_whole(path, page(done, measured).encode())

@@ -71,8 +71,8 @@ def _show(done: Results) -> None:
         console.print("no contact-quality figures: the run has no contact force in the interval of interest")
     for line in filter(None, (calibration_line(done), uplift_line(done))):
         console.print(line, markup=False, soft_wrap=True)
-    for following in done.followings:
-        console.print(following.sentence, markup=False, soft_wrap=True)
+    for effect in done.follower_effects:
+        console.print(effect.sentence, markup=False, soft_wrap=True)
     for line in _closing_lines(done):
         console.print(line, markup=False, soft_wrap=True)
 

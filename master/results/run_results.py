@@ -16,9 +16,9 @@ from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, force_table
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits
-from master.evaluation.energy_balance import Balance, drift_events, find_balances
+from master.evaluation.energy_balance import EnergyBalance, drift_events, find_balances
 from master.evaluation.filters import BEFORE_CHOICE, ForceFilter
-from master.evaluation.following_pantograph import Following, followings
+from master.evaluation.following_pantograph import FollowerEffect, follower_effects
 from master.evaluation.line_geometry import Uplift, support_uplifts
 from master.evaluation.run_events import Event, find_events
 from master.recording.recording import NUMBER_FORMAT, TIMESERIES, Recording, load
@@ -133,15 +133,15 @@ class Results:
         return tuple(sorted((*found, *drifts), key=lambda e: (e.time, e.kind, e.what)))
 
     @property
-    def balances(self) -> tuple[Balance, ...]:
+    def balances(self) -> tuple[EnergyBalance, ...]:
         """The energy balances that were recorded."""
         return find_balances(self.recordings, self.contacts)
 
     @property
-    def followings(self) -> tuple[Following, ...]:
+    def follower_effects(self) -> tuple[FollowerEffect, ...]:
         """Every pantograph beside the one ahead of it."""
         assessments = self.assessments()
-        return followings(self.recordings[0], assessments) if assessments else ()
+        return follower_effects(self.recordings[0], assessments) if assessments else ()
 
 
 def read(folder: Path) -> Results:

@@ -23,7 +23,7 @@ def figures(done: Results) -> dict[str, Any]:
         "filter": done.evaluation.filter.sentence,
         "judged_by": done.evaluation.limits.title,
         "quality": [_assessed(a) for a in done.assessments()],
-        "following": [asdict(f) for f in done.followings],
+        "following": [asdict(f) for f in done.follower_effects],
         "uplift": [asdict(u) for u in done.uplifts],
         "events": [asdict(e) for e in events[:MOST_EVENTS]],
         "events_left_out": max(0, len(events) - MOST_EVENTS),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from master.batch.calibration import Found, find_values
+from master.batch.calibration import CalibrationResult, find_values
 from master.batch.study.family import Calibration, Family, Interval, Variant
 from master.coupling.fmu_warnings import CautionObserver
 from master.coupling.macro_steps import Observer
@@ -91,7 +91,7 @@ def _is_of(summary: dict[str, Any], system: System) -> bool:
     return bool(json.loads(json.dumps(wanted)) == [found, summary.get("settings")])
 
 
-def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, Found]:
+def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, CalibrationResult]:
     """Find the pantographs' parameters that give each the wanted mean force, by ``component.parameter``.
 
     Raises

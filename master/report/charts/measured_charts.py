@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from master.evaluation.measured_force import Comparison
+from master.evaluation.measured_force import MeasuredComparison
 from master.report.charts.run_charts import Axes, Chart, Curve, curve_trace
 
 
-def comparison_rows(c: Comparison) -> list[tuple[str, ...]]:
+def comparison_rows(c: MeasuredComparison) -> list[tuple[str, ...]]:
     """Return mean, sigma, extremes of both and their difference, and the correlation."""
     figures = (
         ("mean force [N]", np.mean),
@@ -25,7 +25,7 @@ def comparison_rows(c: Comparison) -> list[tuple[str, ...]]:
     return rows
 
 
-def comparison_chart(c: Comparison) -> Chart:
+def comparison_chart(c: MeasuredComparison) -> Chart:
     """Return both forces over track position."""
     traces = [
         curve_trace(c.position, c.simulated, Curve(0, f"simulated, {c.pantograph}", 2.2)),

@@ -45,7 +45,7 @@ def test_change_of_wires(pair):
 
 
 def test_followers_are_compared_with_the_one_ahead(pair):
-    (following,) = pair.followings
+    (following,) = pair.follower_effects
     assert (following.leading, following.trailing) == ("leading", "trailing")
     assert following.distance == pytest.approx(30.0)
     assert following.sigma < 0.0

@@ -42,7 +42,6 @@ from master.results.run_results import Results
 from master.safety.interruption import heeded_at_once, interruptible
 from master.safety.supervision import phase, unfinished
 from master.system.components import Component, System, Variable
-from master.system.contacts import find_contacts
 from master.system.step_rounding import adjustments
 
 
@@ -261,7 +260,7 @@ class _Session:
         self._identity = identity
         self._network = network
         self._folder = folder
-        self._contacts = find_contacts(system.connections)
+        self._contacts = system.contacts
         self._plans = recording_plans(system)
         self.algorithm = make_algorithm(system.settings.coupling)
         whole = TimeGrid(system.start, system.step, system.step_count)
@@ -433,7 +432,7 @@ def _description(system: System, identity: str) -> dict[str, Any]:
             **system.settings.model_dump(mode="json"),
         },
         "components": [_component(c) for c in system.components],
-        "contacts": [asdict(c) for c in find_contacts(system.connections)],
+        "contacts": [c.as_data() for c in system.contacts],
     }
 
 

@@ -47,7 +47,7 @@ def run_report(options: argparse.Namespace) -> int:
         summary["settings"] = {**summary.get("settings", {}), "filter": run_summary.filter_data(done.evaluation.filter)}
         done = replace(done, summary=summary)
         measured = _measured(done, options.measured, options.contact) if options.measured else None
-        run_results.write_forces(done)
+        results_folder.write_forces(done.folder, done.signals)
         results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
         print(report_files.write(done, measured))
         if options.parquet:
@@ -83,7 +83,7 @@ def report_what_there_is(folder: Path) -> None:
     """Write the report of a run that stopped, if it has left anything to report on."""
     try:
         done = run_results.read(folder)
-        run_results.write_forces(done)
+        results_folder.write_forces(done.folder, done.signals)
         report_files.write(done)
     except MasterError:
         return  # it stopped before anything was recorded; the error itself is told by the caller

@@ -23,7 +23,7 @@ from master.recording import checkpoint
 from master.recording.checkpoint import Occasions
 from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source
 from master.recording.recording import load
-from master.results import run_results
+from master.results import results_folder, run_results
 from master.safety import safe_files
 from master.safety.safe_files import LineFile, write_whole
 
@@ -230,14 +230,14 @@ def test_a_folder_of_a_run_killed_at_once_is_taken_over(toy, tmp_path):
 
 
 def test_no_room_for_the_summary_leaves_the_rows(toy, tmp_path, monkeypatch, capsys):
-    folder, write = tmp_path / "out", run_results.write_whole
+    folder, write = tmp_path / "out", results_folder.write_whole
 
     def full(path, data):
         if b'"quality"' in data:
             raise safe_files.cannot_write(path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
         write(path, data)
 
-    monkeypatch.setattr(run_results, "write_whole", full)
+    monkeypatch.setattr(results_folder, "write_whole", full)
     assert go(toy, folder, "--stop", "0.2") == 1
     assert "What was written before is in" in " ".join(capsys.readouterr().err.split())
     assert len(load(folder / SERIES[0]).time) == 201

@@ -21,16 +21,9 @@ from master.errors import ForeignResultsError, InterruptedRunError, MasterError,
 from master.evaluation.interval_coverage import not_judgeable
 from master.fmu.isolation.isolated_instance import Isolation
 from master.fmu.loading import loaded_fmus
-from master.recording.checkpoint import (
-    Checkpoint,
-    CheckpointObserver,
-    Continuation,
-    Occasions,
-    Remembering,
-    index_at,
-    steps_between,
-    take,
-)
+from master.recording.checkpoint import Checkpoint
+from master.recording.checkpoint_writer import CheckpointObserver, Occasions, Remembering, index_at, steps_between, take
+from master.recording.continuation import Continuation
 from master.recording.recorder import RERUN_ADVICE
 from master.recording.recording import Recording
 from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans

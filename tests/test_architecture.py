@@ -85,7 +85,6 @@ OPEN: set[str] = {
     "init fmus.slave does not say its duty",
     "init master.commands does not say its duty",
     "init master.coupling does not say its duty",
-    "init master.fmu.isolation holds more than a docstring",
     "init master.recording does not say its duty",
     "init master.results does not say its duty",
     "init master.scenario does not say its duty",
@@ -97,12 +96,6 @@ OPEN: set[str] = {
     "init models.catenary.statics does not say its duty",
     "init models.catenary.step does not say its duty",
     "init models.definition_files does not say its duty",
-    "room models.catenary: meeting is in no tier",
-    "tier models.catenary: models.catenary.line_model -> models.catenary.meeting",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.contact_and_slack.contact_wire",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.contact_and_slack.wire_response",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.linear_motion.line_motion",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.step.numpy_engine",
 }
 
 

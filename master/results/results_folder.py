@@ -18,7 +18,7 @@ import numpy as np
 from master.errors import MasterError, RequestError
 from master.evaluation.contact_signals import Signals, force_table
 from master.recording.checkpoint import NAME as CHECKPOINT
-from master.recording.checkpoint import Continuation
+from master.recording.continuation import Continuation
 from master.recording.recording import NUMBER_FORMAT
 from master.recording.static_geometry import Geometry
 from master.results import summary_schema

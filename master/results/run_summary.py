@@ -16,7 +16,7 @@ from master.coupling.stopwatch import Timing
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.filters import ForceFilter
 from master.evaluation.run_events import MOST_EVENTS
-from master.recording.checkpoint import Continuation
+from master.recording.continuation import Continuation
 from master.results.results_folder import FORMAT, GENERATOR
 from master.results.run_results import Results
 from master.system.components import Component, System, Variable

@@ -19,7 +19,6 @@ from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.interval_modes import IntervalModes, interval_modes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.sparse_products import Product, inner
-from models.catenary.meeting import FreeMotion
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_form
 from models.catenary.shape.line_matrices import (
@@ -38,8 +37,10 @@ from models.catenary.shape.wire_intervals import (
     plan_rotation,
     without_rounding,
 )
-from models.catenary.step.numba_engine import make_stepper
-from models.catenary.step.numpy_engine import Known, Stepper, local_motion
+from models.catenary.step.engine_choice import make_stepper
+from models.catenary.step.meeting import FreeMotion
+from models.catenary.step.numpy_engine import Stepper, local_motion
+from models.catenary.step.step_engine import Known
 from models.contact_law import CONTACT_LAWS
 from models.numerics.newmark import Newmark
 

@@ -1,16 +1,10 @@
-"""The step of a line in compiled kernels, where numba is there: the same figures, two to three times as fast.
-
-``OPENPANTO_KERNEL=numpy`` keeps to NumPy and SciPy; ``numba`` insists on the kernels; by default they are used if
-numba is installed.
-"""
+"""The step of a line in compiled kernels, where numba is there: the same figures, two to three times as fast."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,55 +16,12 @@ from models.catenary.contact_and_slack.wire_response import Meeting, Point, Reac
 from models.catenary.linear_motion.attachment_solver import Banded
 from models.catenary.linear_motion.interval_modes import IntervalModes
 from models.catenary.linear_motion.line_motion import LineMotion
-from models.catenary.step.numpy_engine import Known, ReactionOf, Stepper
-from models.numerics.kernel_cache import load_kernels
+from models.catenary.step.numpy_engine import Stepper
+from models.catenary.step.step_engine import Known, ReactionOf
 from models.numerics.newmark import Newmark
 
-if TYPE_CHECKING:  # an FMU carries what is imported, and this is never imported by its name
-    from models.catenary.step import step_kernels as _  # noqa: F401
 
-_SWITCH = "OPENPANTO_KERNEL"
-#: Read now: an FMU's folder may be gone when a second instance asks for the kernels.
-_SOURCE = Path(__file__).with_name("step_kernels.py").read_bytes()
-
-
-class KernelError(RuntimeError):
-    """The compiled kernels were asked for and are not to be had."""
-
-
-def make_stepper(modes: IntervalModes, newmark: Newmark) -> Stepper:
-    """Return the fastest stepper that this machine has for a line.
-
-    Raises
-    ------
-    KernelError
-        If the environment asks for kernels that cannot be had, or for ones that do not exist.
-    """
-    wanted = os.environ.get(_SWITCH, "auto")
-    if wanted not in ("auto", "numpy", "numba"):
-        raise KernelError(f"{_SWITCH} is '{wanted}'; use auto, numpy or numba")
-    if wanted == "numpy":
-        return Stepper(modes, newmark)
-    try:
-        return CompiledStepper(modes, newmark, kernels())
-    except (ImportError, _UnsuitedError) as error:
-        if wanted == "numba":
-            raise KernelError(f"{_SWITCH} is 'numba', but {error}") from error
-        return Stepper(modes, newmark)
-
-
-def kernels() -> ModuleType:
-    """Return the compiled kernels.
-
-    Raises
-    ------
-    ImportError
-        If numba is not installed, or no folder takes their source.
-    """
-    return load_kernels("kernels", _SOURCE)
-
-
-class _UnsuitedError(Exception):
+class UnsuitedError(Exception):
     """A line that the kernels are not made for: it is too short."""
 
 
@@ -91,7 +42,7 @@ class CompiledStepper(Stepper):
 
     def _set_up(self, coupling: sp.csr_matrix) -> None:
         if coupling.shape[1] < self.kernels.ENDS:
-            raise _UnsuitedError("the line has too few intervals for them")
+            raise UnsuitedError("the line has too few intervals for them")
         modes, newmark = self.modes, self.newmark
         self._band = _Twisted(self.factor) if isinstance(self.factor, Banded) and _Twisted.suits(self.factor) else None
         units = self.units = _Units(self, coupling)

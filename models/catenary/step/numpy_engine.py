@@ -16,8 +16,7 @@ intervals. It is added between the two products, where it costs next to nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,38 +24,16 @@ import scipy.sparse as sp
 from models.arrays import FloatArray, IntArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.crossing import Crossing
-from models.catenary.contact_and_slack.wire_response import Meeting, Point, Reaction
+from models.catenary.contact_and_slack.wire_response import Meeting, Point
 from models.catenary.linear_motion.attachment_solver import Banded, Cyclic, Sparse, factorised
 from models.catenary.linear_motion.interval_modes import IntervalModes
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.sparse_products import BlockProduct, Multiplier, Product, TransposedProduct
+from models.catenary.step.step_engine import Known, ReactionOf
 from models.numerics.newmark import Newmark
 
 #: Ends of an interval that its modes in one plane move with.
 _ENDS_IN_PLANE = 6
-#: How a wire gives way about an interval.
-ReactionOf = Callable[[WireInterval], Reaction]
-
-
-class Known(NamedTuple):
-    """A force on a contact wire that is known before a step.
-
-    Attributes
-    ----------
-    reaction : Reaction
-        Of the interval that it acts on.
-    element : int
-        Of the interval.
-    xi : float
-        Share of the way along the element.
-    force : float
-        Positive up [N].
-    """
-
-    reaction: Reaction
-    element: int
-    xi: float
-    force: float
 
 
 class Stepper:

@@ -280,7 +280,7 @@ def meet(
 ):  # fmt: skip
     """Find where a strip crosses an interval of a wire at the end of a step, forces found inside the step left out.
 
-    The same as `models.catenary.meeting.FreeMotion` does.
+    The same as `models.catenary.step.meeting.FreeMotion` does.
 
     Parameters
     ----------

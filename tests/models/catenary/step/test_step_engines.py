@@ -10,10 +10,12 @@ from models.catenary.linear_motion.attachment_solver import CUT, Banded, Sparse,
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.interval_modes import slower_than
 from models.catenary.linear_motion.sparse_products import BlockProduct, Product, TransposedProduct
-from models.catenary.step.numba_engine import CompiledStepper, KernelError, kernels, make_stepper
+from models.catenary.step.engine_choice import kernels, make_stepper
+from models.catenary.step.numba_engine import CompiledStepper
 from models.catenary.step.numpy_engine import Stepper, _by_blocks
 from models.coupled.monolithic import CoupledModel
 from models.library.catalogue import load_line
+from models.numerics.kernel_cache import KernelError
 from models.numerics.newmark import Newmark
 from tests.models.nodal_line import NodalLine
 

@@ -8,7 +8,8 @@ from models.arrays import FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.wire_response import Meeting
 from models.catenary.linear_motion.line_motion import LineMotion
-from models.catenary.step.numpy_engine import ReactionOf, Stepper
+from models.catenary.step.numpy_engine import Stepper
+from models.catenary.step.step_engine import ReactionOf
 
 
 class FreeMotion:

@@ -33,7 +33,6 @@ WHOLE = {
     "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},
-    "master/batch/verification/verification_page.py": {"_picture"},
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_whole", "write_csv", "write_figure"},
     "models/numerics/kernel_cache.py": None,

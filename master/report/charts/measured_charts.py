@@ -16,7 +16,8 @@ from master.arrays import BoolArray, FloatArray
 from master.errors import MasterError, one_line
 from master.evaluation.contact_signals import Signals
 from master.evaluation.filters import low_pass
-from master.report.charts.run_charts import Axes, Chart, Curve, curve_trace
+from master.report.charts.chart import Axis, Chart, Curve, stroke
+from master.report.charts.force_charts import TRACK
 
 _TITLE: Final = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")
 _POSITIONS: Final = ("x", "position", "track position", "distance", "chainage", "km")
@@ -290,9 +291,9 @@ def comparison_rows(c: Comparison) -> list[tuple[str, ...]]:
 
 def comparison_chart(c: Comparison) -> Chart:
     """Return both forces over track position."""
-    traces = [
-        curve_trace(c.position, c.simulated, Curve(0, f"simulated, {c.pantograph}", 2.2)),
-        curve_trace(c.position, c.measured, Curve(1, "measured", 1.6)),
-    ]
-    layout = Axes("track position of the contact [m]", "contact force, low-passed [N]").layout()
-    return Chart("measured_force", "Contact force, measured and simulated", {"data": traces, "layout": layout})
+    curves = (
+        Curve(f"simulated, {c.pantograph}", c.position, c.simulated, stroke(0, 2.2)),
+        Curve("measured", c.position, c.measured, stroke(1, 1.6)),
+    )
+    y = Axis("contact force, low-passed", "N")
+    return Chart("measured_force", "Contact force, measured and simulated", TRACK, y, curves)

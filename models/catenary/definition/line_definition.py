@@ -6,12 +6,13 @@ A line has one or more *sections*, mechanically independent wires; each section 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from models.contact_law import CONTACT_LAWS
 from models.definition_files import field_schema
-from models.definition_files.field_schema import count, monitoring, quantity
+from models.definition_files.field_schema import count, monitoring, part, quantity, text
 from models.definition_files.parameter import Parameter
 from models.definition_files.toml_reader import Quantity
 
@@ -24,8 +25,6 @@ GRAVITY = 9.81
 SHEAR_RATIO = 2.6
 #: Shortest internal step [s]: a thousandth of the usual one, below which a run would never end.
 SHORTEST_STEP = 1e-6
-#: Most spans of a section, droppers of a span and droppers of a section.
-MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +76,12 @@ class Dropper:
     compression_ratio: float = quantity(
         "1", "stiffness in compression over that in tension", default=0.0, minimum=0.0, maximum=1.0
     )
-    slack_law: SlackLaw = "tension"
+    slack_law: SlackLaw = text(default="tension", choices=SLACK_LAWS)
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield that nothing says how stiff it is."""
+        if self.stiffness is None and (self.area is None or self.youngs_modulus is None):
+            yield "stiffness", "give either stiffness, or area and youngs_modulus"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,17 +131,15 @@ COMPONENTS = ("contact_wire", "messenger_wire", "stitch_wire", "auxiliary_wire",
 
 
 @dataclass(frozen=True, kw_only=True)
-class Damping:
-    """Damping C = alpha K + beta M, of the whole line or of a component type where it has its own."""
+class Damping(Rayleigh):
+    """Damping of the whole line, and of a component type where it has its own."""
 
-    alpha: float = quantity("s", "damping: factor of the stiffness matrix", minimum=0.0, maximum=10.0)
-    beta: float = quantity("1/s", "damping: factor of the mass matrix", minimum=0.0, maximum=100.0)
-    contact_wire: Rayleigh | None = None
-    messenger_wire: Rayleigh | None = None
-    stitch_wire: Rayleigh | None = None
-    auxiliary_wire: Rayleigh | None = None
-    steady_arm: Rayleigh | None = None
-    dropper: Rayleigh | None = None
+    contact_wire: Rayleigh | None = part(Rayleigh, default=None)
+    messenger_wire: Rayleigh | None = part(Rayleigh, default=None)
+    stitch_wire: Rayleigh | None = part(Rayleigh, default=None)
+    auxiliary_wire: Rayleigh | None = part(Rayleigh, default=None)
+    steady_arm: Rayleigh | None = part(Rayleigh, default=None)
+    dropper: Rayleigh | None = part(Rayleigh, default=None)
 
     def of(self, component: str) -> Rayleigh:
         """Return the damping of one of ``COMPONENTS``."""
@@ -149,7 +151,7 @@ class Damping:
 class Contact:
     """Contact of collector strip and contact wire; ``law`` is one of ``CONTACT_LAWS``."""
 
-    law: str = "continuous"
+    law: str = text(default="continuous", choices=CONTACT_LAWS)
     stiffness: float = quantity(
         "N/m", "contact stiffness (N/m^n for an exponent n)", default=20000.0, minimum=100.0, maximum=1e10
     )
@@ -277,7 +279,10 @@ class Section:
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:
-    """Static heights of the wires."""
+    """Static heights of the wires.
+
+    The parabola of the pre-sag lies between the supports, or between the first and the last dropper of a span.
+    """
 
     contact_wire_height: float = quantity("m", "height of the contact wire at the supports", minimum=2.0, maximum=10.0)
     encumbrance: float = quantity("m", "messenger wire above contact wire at the supports", minimum=0.05, maximum=5.0)
@@ -287,6 +292,7 @@ class Profile:
     auxiliary_height: float | None = quantity(
         "m", "auxiliary wire above the contact wire", default=None, minimum=0.01, maximum=3.0
     )
+    pre_sag_between: str = text(default="supports", choices=("supports", "droppers"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,33 +303,30 @@ class CatenaryDefinition:
     ----------
     name : str
     type : {"simple", "stitched", "compound"}
-    pre_sag_between : {"supports", "droppers"}
-        Whether the pre-sag parabola begins at the supports or at the first and last dropper of the span.
     time_step : float
         Longest internal step [s].
     provenance : mapping
         Dotted key -> quantity as written in the file.
     """
 
-    name: str
-    title: str
-    type: LineType
-    profile: Profile
-    contact_wire: Wire
-    messenger_wire: Wire
-    dropper: Dropper
-    clamps: Clamps
-    damping: Damping
-    contact: Contact
-    mesh: Mesh
+    name: str = text()
+    title: str = text(default="")
+    type: LineType = text(choices=LINE_TYPES)
+    profile: Profile = part(Profile)
+    contact_wire: Wire = part(Wire)
+    messenger_wire: Wire = part(Wire)
+    dropper: Dropper = part(Dropper)
+    clamps: Clamps = part(Clamps, default=Clamps())
+    damping: Damping = part(Damping)
+    contact: Contact = part(Contact, default=Contact())
+    mesh: Mesh = part(Mesh, default=Mesh())
     sections: tuple[Section, ...]
-    stitch_wire: StitchWire | None = None
-    auxiliary_wire: Wire | None = None
-    hanger: Dropper | None = None
-    steady_arm: SteadyArm | None = None
-    messenger_support: MessengerSupport | None = None
-    dynamics: Dynamics = field(default_factory=Dynamics)
-    pre_sag_between: str = "supports"
+    stitch_wire: StitchWire | None = part(StitchWire, default=None)
+    auxiliary_wire: Wire | None = part(Wire, default=None)
+    hanger: Dropper | None = part(Dropper, default=None)
+    steady_arm: SteadyArm | None = part(SteadyArm, default=None)
+    messenger_support: MessengerSupport | None = part(MessengerSupport, default=None)
+    dynamics: Dynamics = part(Dynamics, default=Dynamics())
     extrapolation_order: int = count(
         "order of the extrapolation of the strip inside a step: 0 held, 1 velocity, 2 acceleration",
         default=2, minimum=0, maximum=2,

@@ -1,34 +1,19 @@
-"""Line reading."""
+"""Reading a line's definition file, and checking what its tables say of one another."""
 
 from __future__ import annotations
 
+import dataclasses
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
 from models.catenary.definition.line_definition import (
-    COMPONENTS,
     LINE_TYPES,
-    SHORTEST_STEP,
-    SLACK_LAWS,
     CatenaryDefinition,
-    Clamps,
-    Contact,
-    Damping,
-    Dropper,
-    Dynamics,
-    Mesh,
-    MessengerSupport,
-    Profile,
-    Rayleigh,
     Section,
-    SteadyArm,
-    StitchWire,
-    Wire,
 )
-from models.catenary.definition.section_reading import _read_section
-from models.contact_law import CONTACT_LAWS
+from models.catenary.definition.section_reading import read_section
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
 
@@ -46,45 +31,13 @@ def load(path: Path) -> CatenaryDefinition:
 
 def read(table: Table) -> CatenaryDefinition:
     """Read a line's definition from a parsed table; raises ``DefinitionError``."""
-    line_type = table.text("type", choices=LINE_TYPES)
-    stitch = table.table("stitch_wire")
-    auxiliary = table.table("auxiliary_wire")
-    arm = table.table("steady_arm")
-    support = table.table("messenger_support")
-    hanger = table.table("hanger")
-    profile_table = table.required_table("profile")
-    profile = field_schema.read(Profile, profile_table)
-    sections = tuple(
-        _read_section(t, has_arms=arm is not None, has_hangers=line_type == "compound")
-        for t in table.tables("section") or [table]
-    )
-    _check_type(table, line_type, stitch, auxiliary, profile)
-    definition = CatenaryDefinition(
-        name=table.text("name"),
-        title=table.text("title", default=""),
-        type=line_type,  # type: ignore[arg-type]
-        profile=profile,
-        contact_wire=field_schema.read(Wire, table.required_table("contact_wire")),
-        messenger_wire=field_schema.read(Wire, table.required_table("messenger_wire")),
-        dropper=_read_dropper(table.required_table("dropper")),
-        clamps=field_schema.read(Clamps, table.table("clamps") or Table.from_dict({})),
-        damping=_read_damping(table.required_table("damping")),
-        contact=_read_contact(table.table("contact") or Table.from_dict({})),
-        mesh=field_schema.read(Mesh, table.table("mesh") or Table.from_dict({})),
-        sections=sections,
-        stitch_wire=field_schema.read(StitchWire, stitch) if stitch is not None else None,
-        auxiliary_wire=field_schema.read(Wire, auxiliary) if auxiliary is not None else None,
-        hanger=_read_dropper(hanger) if hanger is not None else None,
-        steady_arm=field_schema.read(SteadyArm, arm) if arm is not None else None,
-        messenger_support=field_schema.read(MessengerSupport, support) if support is not None else None,
-        dynamics=field_schema.read(Dynamics, table.table("dynamics") or Table.from_dict({})),
-        pre_sag_between=profile_table.text("pre_sag_between", default="supports", choices=("supports", "droppers")),
-        time_step=table.quantity("time_step", "s", default=1e-3, minimum=SHORTEST_STEP, maximum=0.1),
-        provenance=table.provenance,
-    )
-    _check_stitch(table, definition)
-    _check_auxiliary(table, profile)
-    _check_periodic(table, definition)
+    line = field_schema.read(CatenaryDefinition, table, sections=(), provenance=table.provenance)
+    has_arms, has_hangers = line.steady_arm is not None, line.type == "compound"
+    tables = table.tables("section") or [table]
+    sections = tuple(read_section(t, has_arms=has_arms, has_hangers=has_hangers) for t in tables)
+    definition = dataclasses.replace(line, sections=sections)
+    for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic):
+        check(table, definition)
     table.finish()
     return definition
 
@@ -122,7 +75,8 @@ def _any_between(x: Sequence[float], low: float, high: float) -> bool:
     return after < len(x) and x[after] < high
 
 
-def _check_auxiliary(table: Table, profile: Profile) -> None:
+def _check_auxiliary(table: Table, definition: CatenaryDefinition) -> None:
+    profile = definition.profile
     height = profile.auxiliary_height
     if height is not None and height >= profile.encumbrance:
         text = f"{height:g} m: the auxiliary wire must lie below the encumbrance, {profile.encumbrance:g} m"
@@ -144,36 +98,15 @@ def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:
         table.problem("stitch_wire", f"{text} closes; take type 'simple' or 'compound'")
 
 
-def _check_type(table: Table, line_type: str, stitch: Table | None, auxiliary: Table | None, profile: Profile) -> None:
-    if line_type not in LINE_TYPES:
+def _check_type(table: Table, definition: CatenaryDefinition) -> None:
+    if definition.type not in LINE_TYPES:
         return  # said already
-    if (line_type == "stitched") != (stitch is not None):
+    stitched, compound = definition.type == "stitched", definition.type == "compound"
+    if stitched != (definition.stitch_wire is not None):
         table.problem("stitch_wire", "a table [stitch_wire] is needed for type 'stitched', and only for it")
-    if (line_type == "compound") != (auxiliary is not None):
+    if compound != (definition.auxiliary_wire is not None):
         table.problem("auxiliary_wire", "a table [auxiliary_wire] is needed for type 'compound', and only for it")
-    if (line_type == "compound") != table.has("hanger"):
+    if compound != table.has("hanger"):
         table.problem("hanger", "a table [hanger] is needed for type 'compound', and only for it")
-    if (line_type == "compound") != (profile.auxiliary_height is not None):
+    if compound != (definition.profile.auxiliary_height is not None):
         table.problem("profile.auxiliary_height", "is needed for type 'compound', and only for it")
-
-
-def _read_dropper(table: Table) -> Dropper:
-    dropper = field_schema.read(
-        Dropper, table, slack_law=table.text("slack_law", default="tension", choices=SLACK_LAWS)
-    )
-    if dropper.stiffness is None and (dropper.area is None or dropper.youngs_modulus is None):
-        table.problem("stiffness", "give either stiffness, or area and youngs_modulus")
-    return dropper
-
-
-def _read_contact(table: Table) -> Contact:
-    return field_schema.read(Contact, table, law=table.text("law", default="continuous", choices=CONTACT_LAWS))
-
-
-def _read_damping(table: Table) -> Damping:
-    own = {name: table.table(name) for name in COMPONENTS}
-    return Damping(
-        alpha=table.quantity("alpha", "s", minimum=0.0, maximum=10.0),
-        beta=table.quantity("beta", "1/s", minimum=0.0, maximum=100.0),
-        **{name: field_schema.read(Rayleigh, t) for name, t in own.items() if t is not None},
-    )

@@ -1,4 +1,4 @@
-"""Section reading."""
+"""Reading a section of a line: spans, droppers, supports and stagger, the ends of the wires or the ring they form."""
 
 from __future__ import annotations
 
@@ -8,16 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from models.catenary.definition.line_definition import (
-    MAX_DROPPERS,
-    MAX_HUNG,
-    MAX_SPANS,
-    EndSpans,
-    Section,
-    Span,
-    Support,
-)
+from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
 from models.definition_files.toml_reader import Table
+
+#: Most spans of a section, droppers of a span and droppers of a section.
+MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 
 
 @dataclass(frozen=True)
@@ -28,7 +23,8 @@ class _Hung:
     lengths: tuple[float, ...] = ()
 
 
-def _read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
+def read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
+    """Read the spans of a section, what hangs in them, its supports and its ends, or that it is a ring."""
     spans_table = table.required_table("spans")
     boundaries = _read_boundaries(spans_table)
     droppers = _read_hung(spans_table, boundaries, "droppers", "listed")

@@ -20,9 +20,9 @@ LANES, ENDS = 8, 6
 INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
 #: What `meet` returns where there is no crossing.
 NOWHERE, BEFORE, BEYOND = -1, -2, -3
-#: An interval of a contact wire, as `unpacked` returns it: ``slots``, where the amplitudes of its modes are in the table,
-#: ``ends``, the places of its attachments' displacements, and ``reached``, the displacements that loads at these reach,
-#: all unsigned; ``plan`` to ``height_static`` of the `WireInterval`; ``yielding``, ``at_ends`` and the values of
+#: An interval of a contact wire, as `unpacked` returns it: ``slots``, where the amplitudes of its modes are in the
+#: table, ``ends``, the places of its attachments' displacements, and ``reached``, the displacements that loads at these
+#: reach, all unsigned; ``plan`` to ``height_static`` of the `WireInterval`; ``yielding``, ``at_ends`` and the values of
 #: ``columns`` of the `IntervalResponse`.
 Interval = namedtuple(
     "Interval",

@@ -24,16 +24,9 @@ from master.evaluation.interval_coverage import never_touched, shortfall
 from master.fmu.instance import Instance
 from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 from master.recording.checkpoint import NAME as CHECKPOINT
-from master.recording.checkpoint import (
-    Checkpoint,
-    CheckpointObserver,
-    Continuation,
-    Occasions,
-    Remembering,
-    index_at,
-    steps_between,
-    take,
-)
+from master.recording.checkpoint import Checkpoint
+from master.recording.checkpoint_writer import CheckpointObserver, Occasions, Remembering, index_at, steps_between, take
+from master.recording.continuation import Continuation
 from master.recording.recording import Recording
 from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
 from master.recording.static_geometry import GeometryObserver

@@ -23,14 +23,15 @@ from master.coupling.fmu_warnings import CautionObserver
 from master.errors import RequestError, RunError, UsageError
 from master.fmu.isolation.isolated_instance import INIT_TIMEOUT, Isolation
 from master.recording import checkpoint
-from master.recording.checkpoint import Continuation
+from master.recording.continuation import Continuation
 from master.report import report_files
 from master.report.progress import ProgressObserver
 from master.report.terminal_summary import Terminal, _show, printable_json
 from master.results import parquet_export, results_folder
 from master.results.run_results import Results
 from master.run import Manner, run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.ssp.archive import Package
 from master.system.components import System
 from master.system.step_rounding import adjustments

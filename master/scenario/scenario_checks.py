@@ -15,14 +15,13 @@ from typing import Final
 from master.system.components import Component, System
 from master.system.contacts import find_contacts
 from master.system.pantograph_motion import final_position, pantographs, parameter_value
+from master.system.step_rounding import ROUNDING
 
 #: What a run goes on for after the last pantograph has left the interval [s]: the filter looks that far ahead, and the
 #: waves that supports are lifted by leave late.
 AFTER_INTERVAL: Final = 0.5
 #: Parameters that lift a pantograph, in N or N.m.
 _LIFTS: Final = ("static_force", "static_moment")
-#: A share of a step by which rounding may miss a communication point.
-_ROUNDING: Final = 1e-6
 
 
 def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
@@ -83,7 +82,7 @@ def stop_after_interval(system: System) -> float | str:
         if speed <= 0.0:
             return f"{pantograph.name}.speed = {speed:g} m/s never leads to the end of the interval, {end:g} m"
         times.append((end - start) / speed)
-    steps = math.ceil((max(0.0, *times) + AFTER_INTERVAL) / system.step - _ROUNDING)
+    steps = math.ceil((max(0.0, *times) + AFTER_INTERVAL) / system.step - ROUNDING)
     return system.start + steps * system.step
 
 

@@ -18,7 +18,8 @@ from master.errors import MasterError, RequestError
 from master.results import results_folder, run_results
 from master.results.run_results import Results
 from master.run import run
-from master.scenario.open_scenario import Overrides, find_parameter, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides, find_parameter
 from master.system.components import System
 from master.system.step_rounding import adjustments
 

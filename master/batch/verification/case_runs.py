@@ -14,7 +14,8 @@ from master.coupling.macro_steps import Observer
 from master.errors import InterruptedRunError, MasterError
 from master.results.run_results import Results
 from master.run import run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.system.components import System
 
 #: Folder of the runs within the verification's folder.

@@ -12,10 +12,13 @@ from master.commands.main import main
 from master.coupling.coupling_schemes import Iterative, Jacobi
 from master.errors import MasterError, RequestError, RunError
 from master.recording import checkpoint
-from master.recording.checkpoint import Continuation, index_at, pack, unpack
+from master.recording.checkpoint import pack, unpack
+from master.recording.checkpoint_writer import index_at
+from master.recording.continuation import Continuation
 from master.recording.recording import load
 from master.run import loaded
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 
 def go(scenario, folder, *options):
@@ -163,7 +166,7 @@ def test_fmus_that_cannot_serialise_are_named(toy):
 def test_a_checkpoint_of_another_version_is_refused_in_one_sentence(tmp_path):
     path = tmp_path / "checkpoint.state"
     path.write_bytes(b"openpanto checkpoint 0\nwhatever came then")
-    with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 1: begin the run anew"):
+    with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 2: start the run again"):
         checkpoint.read(path)
     path.write_bytes(b"something else")
     with pytest.raises(MasterError, match="is not a checkpoint"):

@@ -20,7 +20,7 @@ import pytest
 from master.commands.main import main
 from master.errors import MasterError
 from master.recording import checkpoint
-from master.recording.checkpoint import Occasions
+from master.recording.checkpoint_writer import Occasions
 from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source
 from master.recording.recording import load
 from master.results import run_results

@@ -31,7 +31,8 @@ from fmus.slave.ports import Ports, Table
 from fmus.slave.saved_state import SavedState, StateError
 from fmus.slave.slave_failures import AdapterError, SlaveFailures, clean, explain
 from fmus.slave.variable_values import VariableValues
-from models.definition_files.parameter import Definition, FloatArray, Parameter, Snapshot
+from models.arrays import FloatArray, Snapshot
+from models.definition_files.parameter import Definition, Parameter
 
 #: A step may begin this share of its length away from where the model is: hosts sum up time.
 _TIME_TOLERANCE = 1e-3

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
+from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition, load
 from models.catenary.line_advice import slack_law_warning, slack_warning, speed_warning, step_warning
 from models.catenary.line_part import CatenaryPart
-from models.definition_files.parameter import FloatArray
 
 #: An unconnected port is a strip far below the wire, which touches nothing.
 _FAR_BELOW = -100.0

@@ -9,7 +9,7 @@ from typing import ClassVar
 from fmus.slave.adapter import Adapter
 from fmus.slave.lumped_slave import pantograph_ports
 from fmus.slave.ports import Ports
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition, load
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 
 #: The first bytes; the digit is the format's version.
 MAGIC = b"openpanto arrays 1\n"

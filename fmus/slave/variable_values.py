@@ -11,7 +11,7 @@ import numpy as np
 
 from fmus.slave.ports import Port, Table
 from fmus.slave.slave_failures import AdapterError
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 #: Beyond every value reference: no value is out of date.
 _NOTHING = sys.maxsize

@@ -10,9 +10,10 @@ from master.arrays import BoolArray, FloatArray
 from master.batch.study.family import Interval
 from master.batch.study.study_evaluation import Entry, section_forces
 from master.batch.study.study_outcome import Done, Outcome
+from master.evaluation.contact_positions import track_position
 from master.evaluation.contact_signals import contact_signals
 from master.evaluation.filters import settled
-from master.evaluation.line_geometry import Geometry
+from master.recording.static_geometry import Geometry
 from master.report.charts.run_charts import (
     Axes,
     Chart,
@@ -24,7 +25,6 @@ from master.report.charts.run_charts import (
     shares,
 )
 from master.results.run_results import Results
-from master.system.contacts import track_position
 
 #: How far to both sides of a change of wires the forces are drawn [m].
 _MARGIN: Final = 15.0

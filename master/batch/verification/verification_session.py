@@ -13,7 +13,7 @@ from master.batch.verification.case import Case
 from master.batch.verification.case_runs import Runs
 from master.batch.verification.verification_outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
 from master.errors import InterruptedRunError
-from master.results import run_results
+from master.results import results_folder, run_summary
 from master.safety.supervision import unfinished
 
 JSON: Final = "verify.json"
@@ -46,12 +46,12 @@ def verify(
     MasterError
         If the folder holds something else.
     """
-    with run_results.taken_over(folder, JSON, GENERATOR, "verification"), unfinished(folder / JSON):
+    with results_folder.taken_over(folder, JSON, GENERATOR, "verification"), unfinished(folder / JSON):
         return _verify(cases, runs, show, _Writer(folder))
 
 
 def _verify(cases: Sequence[Case], runs: Runs, show: Callable[[CaseOutcome], None], writer: _Writer) -> Verification:
-    state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), run_results.versions(), len(cases))
+    state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), run_summary.versions(), len(cases))
     writer.write(state)
     try:
         for case in cases:
@@ -75,5 +75,5 @@ class _Writer:
 
     def write(self, state: Verification) -> None:
         self._sections += [verification_page.section(c) for c in state.cases[len(self._sections) :]]
-        run_results.write_json(self._folder / JSON, as_data(state))
-        run_results.write_text(self._folder / PAGE, verification_page.page(state, self._sections))
+        results_folder.write_json(self._folder / JSON, as_data(state))
+        results_folder.write_text(self._folder / PAGE, verification_page.page(state, self._sections))

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure as PlotFigure
 from rich.table import Table
 
 from master.evaluation.output_figures import output_figures
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.charts.run_charts import Axes, Chart, Curve, curve_trace
 from master.report.result_tables import plain_table
 from master.results.run_results import Results

@@ -17,7 +17,7 @@ from master.evaluation.contact_signals import Signals, power_spectrum
 from master.evaluation.en50367_limits import limits_at
 from master.evaluation.filters import FILTER_REACH, stands_in
 from master.evaluation.line_geometry import Uplift, aligned, by_section, indexed, met, period_of, slackness
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.charts.sample_packing import kept_samples, packed
 from master.results.run_results import Results
 

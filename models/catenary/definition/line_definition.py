@@ -15,10 +15,9 @@ from typing import Literal
 
 from models.contact_law import CONTACT_LAWS
 from models.definition_files import field_schema
-from models.definition_files.field_schema import count, quantity
+from models.definition_files.field_schema import count, monitoring, quantity
 from models.definition_files.parameter import Parameter
 from models.definition_files.toml_reader import Quantity, Table
-from models.numerics.energy_ledger import monitoring
 
 LineType = Literal["simple", "stitched", "compound"]
 LINE_TYPES: tuple[LineType, ...] = ("simple", "stitched", "compound")

@@ -14,8 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from models.arrays import BoolArray, FloatArray, IntArray
 from models.catenary.definition.line_definition import COMPONENTS, CatenaryDefinition, Section, Span
-from models.definition_files.parameter import BoolArray, FloatArray, IntArray
 
 #: Two positions closer than this are one [m].
 _SAME = 1e-6

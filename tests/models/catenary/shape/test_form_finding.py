@@ -18,8 +18,8 @@ from models.catenary.shape.line_matrices import (
     dropper_stiffness,
 )
 from models.catenary.shape.line_mesh import build_mesh
-from models.commands import main
-from models.library import line_names, load_line
+from models.commands.physics_main import main
+from models.library.catalogue import line_names, load_line
 
 
 @pytest.fixture(scope="module", params=line_names())

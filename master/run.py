@@ -10,30 +10,30 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from master.coupling.contact_loss_stop import ContactWatch
-from master.coupling.coupling_power import PowerObserver
+from master.coupling.contact_loss_stop import ContactLossStop
+from master.coupling.coupling_power import CouplingPowerObserver
 from master.coupling.coupling_schemes import make_algorithm
-from master.coupling.fmu_warnings import Caution, CautionObserver
-from master.coupling.macro_steps import Observer, Outcome, TimeGrid, simulate
+from master.coupling.fmu_warnings import FmuWarning, FmuWarningObserver
+from master.coupling.macro_steps import Observer, RunOutcome, TimeGrid, simulate
 from master.coupling.network import Network
-from master.coupling.real_time import Pacer
+from master.coupling.off_wire_stop import OffWireStop
+from master.coupling.real_time import WallClockPacer
 from master.coupling.stopwatch import Stopwatch, Timing
-from master.coupling.track_watch import TrackWatch
 from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
 from master.evaluation.interval_coverage import never_touched, shortfall
 from master.fmu.instance import Instance
 from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 from master.recording.checkpoint import NAME as CHECKPOINT
-from master.recording.checkpoint import (
-    Checkpoint,
+from master.recording.checkpoint import Checkpoint
+from master.recording.checkpoint_writer import (
     CheckpointObserver,
-    Continuation,
-    Occasions,
-    Remembering,
+    CheckpointSchedule,
+    StatefulObserver,
     index_at,
     steps_between,
     take,
 )
+from master.recording.continuation import Continuation
 from master.recording.recording import Recording
 from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
 from master.recording.static_geometry import GeometryObserver
@@ -98,38 +98,43 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
     RequestError
         If checkpoint or continuation do not fit the system.
     """
-    occasions = _occasions(system, manner)
+    schedule = _schedule(system, manner)
     with results_folder.claimed(folder):
         identity = _take_folder(system, folder, manner.continuation)
         with unfinished(folder / results_folder.SUMMARY, identity):
             results_folder.write_json(
                 folder / results_folder.SUMMARY, {**_description(system, identity), "status": "running"}
             )
-            return _run(system, folder, observers, manner, occasions, identity)
+            return _run(system, folder, observers, manner, schedule, identity)
 
 
 def _run(
-    system: System, folder: Path, observers: Sequence[Observer], manner: Manner, occasions: Occasions, identity: str
+    system: System,
+    folder: Path,
+    observers: Sequence[Observer],
+    manner: Manner,
+    schedule: CheckpointSchedule,
+    identity: str,
 ) -> Results:
-    farewells: list[Caution] = []
+    farewells: list[FmuWarning] = []
     with (
         interruptible() as stop_wanted,
         _failure_noted(system, folder, identity, stop_wanted),
         loaded(system, manner.isolation, farewells) as network,
     ):
         session = _Session(system, network, folder, manner, identity)
-        watchers = [*session.observers, *observers, *session.last_observers(occasions)]
+        watchers = [*session.observers, *observers, *session.last_observers(schedule)]
         continuation = manner.continuation
         way_in = {} if continuation is None else {"prepare": continuation.prepare}
         outcome = simulate(network, session.algorithm, session.grid, watchers, stop_wanted, **way_in)
     for observer in watchers:
-        if isinstance(observer, CautionObserver):
+        if isinstance(observer, FmuWarningObserver):
             for farewell in farewells:
                 observer.add(farewell)
     return _concluded(session, outcome, folder)
 
 
-def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
+def _concluded(session: _Session, outcome: RunOutcome, folder: Path) -> Results:
     try:
         recordings = session.recordings(outcome)
         outcome = session.checked(outcome, recordings[0])
@@ -146,9 +151,9 @@ def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
     return done
 
 
-def _occasions(system: System, manner: Manner) -> Occasions:
+def _schedule(system: System, manner: Manner) -> CheckpointSchedule:
     once, every = manner.checkpoint, manner.checkpoint_every
-    return Occasions(
+    return CheckpointSchedule(
         None if once is None else index_at(system, once),
         None if every is None else steps_between(system, every),
     )
@@ -176,7 +181,7 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
         # An FMU in Python takes the interruption for a failure of its own.
         is_interrupted = isinstance(error, KeyboardInterrupt) or stop_wanted()
         cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
-        outcome = Outcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
+        outcome = RunOutcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
         if _is_still(folder, identity):
             results_folder.write_json(
                 folder / results_folder.SUMMARY, {**_description(system, identity), **_ending(outcome)}
@@ -188,7 +193,7 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
 
 @contextmanager
 def loaded(
-    system: System, isolation: Isolation | None = None, farewells: list[Caution] | None = None
+    system: System, isolation: Isolation | None = None, farewells: list[FmuWarning] | None = None
 ) -> Iterator[Network]:
     """Load the FMUs of a system and connect them; they are freed at last.
 
@@ -197,7 +202,7 @@ def loaded(
     system : System
     isolation : Isolation, optional
         Given if each is to have a process of its own.
-    farewells : list of Caution, optional
+    farewells : list of FmuWarning, optional
         Takes what goes wrong when they are freed.
     """
     instances: list[Instance | IsolatedInstance] = []
@@ -224,7 +229,7 @@ def _check_single(system: System) -> None:
             raise RunError(f"components '{other}' and '{c.name}': {text}")
 
 
-def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caution]) -> None:
+def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[FmuWarning]) -> None:
     """Free all, also after one at which the user lost patience."""
     interruption = None
     for instance in reversed(instances):
@@ -235,7 +240,7 @@ def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caut
             interruption = error
             continue
         if said:
-            farewells.append(Caution(instance.name, said, is_own=False))
+            farewells.append(FmuWarning(instance.name, said, is_own=False))
     if interruption is not None:
         raise interruption
 
@@ -264,13 +269,13 @@ class _Session:
         self._geometry = GeometryObserver(
             system, lambda g: results_folder.write_json(folder / results_folder.GEOMETRY, g)
         )
-        self._power = PowerObserver(self._contacts, network)
-        self._contact_watch = ContactWatch(self._contacts, network)
-        self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
-        self._cautions = CautionObserver()
-        self._remembering: tuple[Remembering, ...] = (self._power, self._contact_watch)
+        self._power = CouplingPowerObserver(self._contacts, network)
+        self._contact_loss_stop = ContactLossStop(self._contacts, network)
+        self._off_wire_stop = OffWireStop(system, self._contacts, network, lambda: self._geometry.geometry)
+        self._cautions = FmuWarningObserver()
+        self._stateful: tuple[StatefulObserver, ...] = (self._power, self._contact_loss_stop)
         self._stopwatch = Stopwatch()
-        self._pacer = None if manner.real_time is None else Pacer(self.grid, manner.real_time)
+        self._pacer = None if manner.real_time is None else WallClockPacer(self.grid, manner.real_time)
         made = self._take_up(manner.continuation)
         self._recorders = [
             make_recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
@@ -281,8 +286,8 @@ class _Session:
         if continuation is None or not continuation.is_same_run:
             return None
         checkpoint = continuation.checkpoint
-        for observer in self._remembering:
-            observer.recall(checkpoint.observers[observer.name])
+        for observer in self._stateful:
+            observer.restore(checkpoint.observers[observer.name])
         return checkpoint.index
 
     @property
@@ -293,23 +298,23 @@ class _Session:
             *self._recorders,
             self._power,
             self._stopwatch,
-            self._contact_watch,
-            self._track_watch,
+            self._contact_loss_stop,
+            self._off_wire_stop,
             self._cautions,
         ]
 
-    def last_observers(self, occasions: Occasions) -> list[Observer]:
+    def last_observers(self, schedule: CheckpointSchedule) -> list[Observer]:
         """Those that have to see a step after all others: checkpoints, and at the very last the clock."""
         path = self._folder / CHECKPOINT
-        checkpoints = [CheckpointObserver(self._checkpoint, path, occasions)] if occasions else []
+        checkpoints = [CheckpointObserver(self._checkpoint, path, schedule)] if schedule else []
         return [*checkpoints, *([self._pacer] if self._pacer else [])]
 
     def _checkpoint(self, network: Network, index: int) -> Checkpoint:
         for recorder in self._recorders:
             recorder.sync()  # no checkpoint is ahead of the rows that it goes on from
-        return take(self._system, network, self.algorithm, index, self._remembering, self._identity)
+        return take(self._system, network, self.algorithm, index, self._stateful, self._identity)
 
-    def conclude(self, outcome: Outcome, recordings: tuple[Recording, ...]) -> Results:
+    def conclude(self, outcome: RunOutcome, recordings: tuple[Recording, ...]) -> Results:
         """Write the summary and return the results, of what is in the files."""
         description = {
             **_description(self._system, self._identity),
@@ -338,7 +343,7 @@ class _Session:
             data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
             results_folder.write_json(self._folder / results_folder.SUMMARY, data)
 
-    def recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
+    def recordings(self, outcome: RunOutcome) -> tuple[Recording, ...]:
         """Read what was recorded.
 
         Raises
@@ -361,7 +366,7 @@ class _Session:
                 raise ForeignResultsError(f"{recorder.path} is not what was written: it was changed {advice}")
         return recordings
 
-    def checked(self, outcome: Outcome, recording: Recording) -> Outcome:
+    def checked(self, outcome: RunOutcome, recording: Recording) -> RunOutcome:
         """Return how the run ended once it is seen whether it has covered what it was to cover."""
         reason = self._lacking(recording) if outcome.status == "complete" else ""
         if not reason or self._may_lack:
@@ -383,11 +388,11 @@ class _Session:
         silent = never_touched(recording, self._contacts)
         return f"'{silent}' never touches the wire" if silent else ""
 
-    def _not_judged(self, outcome: Outcome, recording: Recording) -> dict[str, str]:
+    def _not_judged(self, outcome: RunOutcome, recording: Recording) -> dict[str, str]:
         reason = self._lacking(recording) if outcome.status == "complete" else ""
         return {"not_judged": reason} if reason else {}
 
-    def _performance(self, outcome: Outcome) -> dict[str, Any]:
+    def _performance(self, outcome: RunOutcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None
         return {
             **_performance(self._stopwatch.timing, outcome.time - self.grid.begin),
@@ -456,7 +461,7 @@ def _input(component: Component, variable: Variable) -> dict[str, Any]:
     }
 
 
-def _ending(outcome: Outcome) -> dict[str, Any]:
+def _ending(outcome: RunOutcome) -> dict[str, Any]:
     return {
         "status": outcome.status,
         "reason": str(outcome.error) if outcome.error else "",
@@ -465,7 +470,7 @@ def _ending(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _what_happened(outcome: Outcome, folder: Path) -> str:
+def _what_happened(outcome: RunOutcome, folder: Path) -> str:
     kept = f"What was computed up to t = {outcome.time:.6g} s is in {folder}, marked {outcome.status}"
     if outcome.status == "interrupted":
         return f"interrupted. {kept}"

@@ -15,7 +15,8 @@ from master.commands.command_options import _add, _add_overrides, _overrides, _p
 from master.commands.run_command import _run_shown
 from master.errors import MasterError, Problem, RequestError, ScenarioError
 from master.results import run_results
-from master.scenario.open_scenario import find_parameter, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import find_parameter
 from master.ssp.archive import SSD_NAME, Package, Sources
 from master.ssp.run_settings import Calibration
 from master.ssp.ssd import read_structure

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from master.errors import MasterError
 from master.report.terminal_summary import Terminal
-from master.scenario.open_scenario import Overrides
+from master.scenario.overrides import Overrides
 from master.ssp.run_settings import SCHEMES
 from master.system.components import System
 

@@ -19,18 +19,19 @@ from master.commands.command_options import (
     _tell,
     _tell_warnings,
 )
-from master.coupling.fmu_warnings import CautionObserver
+from master.coupling.fmu_warnings import FmuWarningObserver
 from master.errors import RequestError, RunError, UsageError
 from master.fmu.isolation.isolated_instance import INIT_TIMEOUT, Isolation
 from master.recording import checkpoint
-from master.recording.checkpoint import Continuation
+from master.recording.continuation import Continuation
 from master.report import report_files
 from master.report.progress import ProgressObserver
 from master.report.terminal_summary import Terminal, _show, printable_json
 from master.results import parquet_export, results_folder
 from master.results.run_results import Results
 from master.run import Manner, run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.ssp.archive import Package
 from master.system.components import System
 from master.system.step_rounding import adjustments
@@ -178,7 +179,7 @@ def _run_shown(system: System, folder: Path, quiet: bool, manner: Manner = _PLAI
     console = Terminal(stderr=True)  # that of the progress bar, which then stays below
     for text in adjustments(system, manner.checkpoint_every):
         _tell(f"warning: {text}", console)
-    cautions = CautionObserver(lambda caution: _tell(str(caution), console))
+    cautions = FmuWarningObserver(lambda caution: _tell(str(caution), console))
     if manner.real_time is not None:  # drawing takes more time than a step has
         _tell(f"running for {(system.stop - system.start) / manner.real_time:g} s by the wall clock")
         return run(system, folder, [cautions], manner)

@@ -13,7 +13,7 @@ from master.errors import MasterError, RequestError
 from master.recording.checkpoint import NAME as CHECKPOINT
 from master.results import summary_schema
 from master.safety import folder_lock
-from master.safety.safe_files import PART, write_whole
+from master.safety.safe_files import PART, write_atomically
 
 GENERATOR: Final = "openpanto master"
 #: Version of what a run leaves. 1, which says none: figures of a brick wall at 20 Hz; 2: as it stands here.
@@ -158,7 +158,7 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one go."""
-    write_whole(path, text.encode())
+    write_atomically(path, text.encode())
 
 
 def _summary(folder: Path) -> dict[str, Any]:

@@ -12,18 +12,19 @@ from typing import Any
 
 from master.batch.calibration import CalibrationResult, find_values
 from master.batch.study.family import Calibration, Family, Interval, Variant
-from master.coupling.fmu_warnings import CautionObserver
+from master.coupling.fmu_warnings import FmuWarningObserver
 from master.coupling.macro_steps import Observer
 from master.errors import MasterError, RequestError
 from master.results import results_folder, run_results
 from master.results.run_results import Results
 from master.run import run
-from master.scenario.open_scenario import Overrides, find_parameter, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides, find_parameter
 from master.system.components import System
 from master.system.step_rounding import adjustments
 
 #: Makes the observers of one run, and takes them away after it.
-Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
+ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 @contextmanager
@@ -46,7 +47,7 @@ class Runner:
         Whether missing or stale FMUs are built.
     """
 
-    watching: Watching = unwatched
+    watching: ObserverFactory = unwatched
     tell: Callable[[str], None] = lambda _: None
     build: bool = True
 
@@ -54,7 +55,7 @@ class Runner:
         """Run one system."""
         for text in adjustments(system):
             self.tell(f"{system.name}: warning: {text}")
-        cautions = CautionObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
+        cautions = FmuWarningObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
         with self.watching(system) as observers:
             return run(system, folder, [cautions, *observers])
 

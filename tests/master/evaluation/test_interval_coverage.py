@@ -17,7 +17,8 @@ from master.recording.recording import Recording
 from master.report.html_markup import verdict
 from master.results.run_results import Results, read
 from master.results.run_summary import figures
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.system.contacts import Contact
 from tests.master.batch.study.conftest import STUDY
 

@@ -23,7 +23,8 @@ from master.report.result_tables import figure_rows
 from master.results import results_folder, run_difference, run_results
 from master.results.run_results import Results
 from master.run import run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.system.contacts import Contact
 from models.catenary.line_model import CatenaryModel
 from models.commands.couple_command import Evaluated, write_timeseries

@@ -149,7 +149,7 @@ def test_a_second_run_is_refused_and_the_first_is_not_disturbed(toy, tmp_path, c
 def test_what_a_run_writes_is_not_read(toy, tmp_path, capsys, busy, verb):
     folder, _ = busy
     if verb == "resume":
-        (folder / checkpoint.NAME).write_bytes(b"openpanto checkpoint 1\n")
+        (folder / checkpoint.NAME).write_bytes(b"openpanto arrays 1\n")
         assert main([str(toy), "--no-build", "--resume", str(folder)]) == 1
         return
     arguments = ["report", str(folder)] if verb == "report" else ["compare", str(folder), str(folder)]
@@ -203,7 +203,7 @@ def test_rows_are_counted_before_a_run_is_complete(toy, tmp_path, capsys, monkey
             path.write_text("".join(lines[:-1] if rows < 0 else lines + more))
         return load(path)
 
-    monkeypatch.setattr("master.recording.recording.load", changed)
+    monkeypatch.setattr("master.recording.recorder.load", changed)
     assert go(toy, folder, "--stop", "0.1") == 1
     assert f"timeseries.csv has {101 + rows} rows, 101 were written: it was changed" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())
@@ -221,7 +221,7 @@ def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsy
             path.write_text(f"{text[:-1]}{'1' if text[-1] != '1' else '2'}\n")
         return load(path)
 
-    monkeypatch.setattr("master.recording.recording.load", replaced)
+    monkeypatch.setattr("master.recording.recorder.load", replaced)
     assert go(toy, folder, "--stop", "0.1") == 1
     assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())

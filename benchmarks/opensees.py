@@ -31,7 +31,7 @@ from models.arrays import FloatArray
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape import line_matrices
 from models.catenary.statics.elasticity import elasticity, positions_in_span
-from models.library import load_line
+from models.library.catalogue import load_line
 
 STEP = 1e-3
 #: Steps to a round, and rounds, of a timing.

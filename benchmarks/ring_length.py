@@ -20,7 +20,7 @@ from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_model import CatenaryModel
 from models.coupled.monolithic import CoupledModel
-from models.library import load_lumped
+from models.library.catalogue import load_lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 
 STEP = 1e-3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -11,62 +10,40 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from master.coupling.contact_loss_stop import ContactWatch
-from master.coupling.coupling_power import PowerObserver
+from master.coupling.contact_loss_stop import ContactLossStop
+from master.coupling.coupling_power import CouplingPowerObserver
 from master.coupling.coupling_schemes import make_algorithm
-from master.coupling.fmu_warnings import Caution, CautionObserver
-from master.coupling.macro_steps import Observer, Outcome, TimeGrid, simulate
+from master.coupling.fmu_warnings import FmuWarning, FmuWarningObserver
+from master.coupling.macro_steps import Observer, RunOutcome, TimeGrid, simulate
 from master.coupling.network import Network
-from master.coupling.real_time import Pacer
-from master.coupling.track_watch import TrackWatch
+from master.coupling.off_wire_stop import OffWireStop
+from master.coupling.real_time import WallClockPacer
+from master.coupling.stopwatch import Stopwatch, Timing
 from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
 from master.evaluation.interval_coverage import never_touched, shortfall
-from master.evaluation.line_geometry import GeometryObserver
-from master.fmu.instance import Instance, Recordable
-from master.fmu.isolation import IsolatedInstance, Isolation
+from master.fmu.instance import Instance
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 from master.recording.checkpoint import NAME as CHECKPOINT
-from master.recording.checkpoint import (
-    Checkpoint,
+from master.recording.checkpoint import Checkpoint
+from master.recording.checkpoint_writer import (
     CheckpointObserver,
-    Continuation,
-    Occasions,
-    Remembering,
+    CheckpointSchedule,
+    StatefulObserver,
     index_at,
     steps_between,
     take,
 )
-from master.recording.recorder import Recorder, Recording, Source
-from master.results import run_results
+from master.recording.continuation import Continuation
+from master.recording.recording import Recording
+from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
+from master.recording.static_geometry import GeometryObserver
+from master.results import results_folder, run_results, run_summary
 from master.results.run_results import Results
 from master.safety.interruption import heeded_at_once, interruptible
 from master.safety.supervision import phase, unfinished
 from master.system.components import Component, System, Variable
 from master.system.contacts import find_contacts
-from master.system.step_rounding import adjustments, is_recordable, record_of, steps_in
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Which variables are recorded how often.
-
-    Attributes
-    ----------
-    every : int
-        Steps between rows.
-    names : dict
-        Variable names by component.
-    """
-
-    every: int
-    names: dict[str, list[str]]
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Wall time of a run [s]: initialization, and stepping with recording."""
-
-    initialisation: float
-    stepping: float
+from master.system.step_rounding import adjustments
 
 
 @dataclass(frozen=True)
@@ -121,38 +98,43 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
     RequestError
         If checkpoint or continuation do not fit the system.
     """
-    occasions = _occasions(system, manner)
-    with run_results.claimed(folder):
+    schedule = _schedule(system, manner)
+    with results_folder.claimed(folder):
         identity = _take_folder(system, folder, manner.continuation)
-        with unfinished(folder / run_results.SUMMARY, identity):
-            run_results.write_json(
-                folder / run_results.SUMMARY, {**_description(system, identity), "status": "running"}
+        with unfinished(folder / results_folder.SUMMARY, identity):
+            results_folder.write_json(
+                folder / results_folder.SUMMARY, {**_description(system, identity), "status": "running"}
             )
-            return _run(system, folder, observers, manner, occasions, identity)
+            return _run(system, folder, observers, manner, schedule, identity)
 
 
 def _run(
-    system: System, folder: Path, observers: Sequence[Observer], manner: Manner, occasions: Occasions, identity: str
+    system: System,
+    folder: Path,
+    observers: Sequence[Observer],
+    manner: Manner,
+    schedule: CheckpointSchedule,
+    identity: str,
 ) -> Results:
-    farewells: list[Caution] = []
+    farewells: list[FmuWarning] = []
     with (
         interruptible() as stop_wanted,
         _failure_noted(system, folder, identity, stop_wanted),
         loaded(system, manner.isolation, farewells) as network,
     ):
         session = _Session(system, network, folder, manner, identity)
-        watchers = [*session.observers, *observers, *session.last_observers(occasions)]
+        watchers = [*session.observers, *observers, *session.last_observers(schedule)]
         continuation = manner.continuation
         way_in = {} if continuation is None else {"prepare": continuation.prepare}
         outcome = simulate(network, session.algorithm, session.grid, watchers, stop_wanted, **way_in)
     for observer in watchers:
-        if isinstance(observer, CautionObserver):
+        if isinstance(observer, FmuWarningObserver):
             for farewell in farewells:
                 observer.add(farewell)
     return _concluded(session, outcome, folder)
 
 
-def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
+def _concluded(session: _Session, outcome: RunOutcome, folder: Path) -> Results:
     try:
         recordings = session.recordings(outcome)
         outcome = session.checked(outcome, recordings[0])
@@ -169,9 +151,9 @@ def _concluded(session: _Session, outcome: Outcome, folder: Path) -> Results:
     return done
 
 
-def _occasions(system: System, manner: Manner) -> Occasions:
+def _schedule(system: System, manner: Manner) -> CheckpointSchedule:
     once, every = manner.checkpoint, manner.checkpoint_every
-    return Occasions(
+    return CheckpointSchedule(
         None if once is None else index_at(system, once),
         None if every is None else steps_between(system, every),
     )
@@ -182,11 +164,11 @@ def _take_folder(system: System, folder: Path, continuation: Continuation | None
     if continuation is not None:
         continuation.check(system)
         if continuation.is_same_run:
-            known = run_results.identity(folder)
+            known = results_folder.identity(folder)
             if not known or known != continuation.checkpoint.run:
                 raise RequestError(f"{continuation.file} comes from another run than the results beside it")
             return known
-    run_results.prepare(folder, None if continuation is None else Path(continuation.file))
+    results_folder.prepare(folder, None if continuation is None else Path(continuation.file))
     return uuid.uuid4().hex
 
 
@@ -199,9 +181,11 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
         # An FMU in Python takes the interruption for a failure of its own.
         is_interrupted = isinstance(error, KeyboardInterrupt) or stop_wanted()
         cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
-        outcome = Outcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
+        outcome = RunOutcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
         if _is_still(folder, identity):
-            run_results.write_json(folder / run_results.SUMMARY, {**_description(system, identity), **_ending(outcome)})
+            results_folder.write_json(
+                folder / results_folder.SUMMARY, {**_description(system, identity), **_ending(outcome)}
+            )
         if is_interrupted:
             raise InterruptedRunError(_what_happened(outcome, folder)) from error
         raise
@@ -209,7 +193,7 @@ def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Cal
 
 @contextmanager
 def loaded(
-    system: System, isolation: Isolation | None = None, farewells: list[Caution] | None = None
+    system: System, isolation: Isolation | None = None, farewells: list[FmuWarning] | None = None
 ) -> Iterator[Network]:
     """Load the FMUs of a system and connect them; they are freed at last.
 
@@ -218,7 +202,7 @@ def loaded(
     system : System
     isolation : Isolation, optional
         Given if each is to have a process of its own.
-    farewells : list of Caution, optional
+    farewells : list of FmuWarning, optional
         Takes what goes wrong when they are freed.
     """
     instances: list[Instance | IsolatedInstance] = []
@@ -245,7 +229,7 @@ def _check_single(system: System) -> None:
             raise RunError(f"components '{other}' and '{c.name}': {text}")
 
 
-def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caution]) -> None:
+def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[FmuWarning]) -> None:
     """Free all, also after one at which the user lost patience."""
     interruption = None
     for instance in reversed(instances):
@@ -256,7 +240,7 @@ def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caut
             interruption = error
             continue
         if said:
-            farewells.append(Caution(instance.name, said, is_own=False))
+            farewells.append(FmuWarning(instance.name, said, is_own=False))
     if interruption is not None:
         raise interruption
 
@@ -264,65 +248,8 @@ def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[Caut
 def _is_still(folder: Path, identity: str) -> bool:
     """Whether it is the run of this identity whose results lie in the folder."""
     with suppress(MasterError):
-        return run_results.identity(folder) == identity
+        return results_folder.identity(folder) == identity
     return False
-
-
-def recording_plans(system: System) -> tuple[Plan, ...]:
-    """Return what is recorded how often besides the exchanged outputs; the plan for every step comes first.
-
-    Exchanged outputs are always recorded at every step, all other outputs too unless an entry of the settings says
-    otherwise, and local variables only if an entry names them; texts are not recorded.
-    """
-    by_rate: dict[int, dict[str, list[str]]] = {1: {}}
-    for component in system.components:
-        for variable in component.fmu.variables.values():
-            every = _steps_between_rows(component, variable, system)
-            if every:
-                by_rate.setdefault(every, {}).setdefault(component.name, []).append(variable.name)
-    return tuple(Plan(rate, by_rate[rate]) for rate in sorted(by_rate))
-
-
-def _steps_between_rows(component: Component, variable: Variable, system: System) -> int:
-    """Return how often a variable is recorded, 0 for never (or with the exchanged ones)."""
-    if not is_recordable(component, variable):
-        return 0
-    record = record_of(f"{component.name}.{variable.name}", system.settings.records)
-    if record is None:
-        return 1 if variable.causality == "output" else 0
-    return steps_in(record.every, system.step)
-
-
-def recording_name(plan: Plan, step: float) -> str:
-    """Return the name of a plan's file."""
-    return run_results.TIMESERIES if plan.every == 1 else f"timeseries_{1e3 * plan.every * step:g}ms.csv"
-
-
-class Stopwatch:
-    """Observer that measures the wall time of initialization and of stepping."""
-
-    def __init__(self) -> None:
-        self._created = time.perf_counter()
-        self._began: float | None = None
-        self._ended: float | None = None
-
-    def begin(self, start: float, network: Network) -> None:
-        """Stepping begins."""
-        self._began = time.perf_counter()
-
-    def observe(self, index: int, end: float, network: Network) -> None:
-        """Nothing to measure."""
-
-    def finish(self) -> None:
-        """Stepping has ended."""
-        self._ended = time.perf_counter()
-
-    @property
-    def timing(self) -> Timing:
-        """What was measured."""
-        ended = self._ended if self._ended is not None else time.perf_counter()
-        began = self._began if self._began is not None else ended
-        return Timing(began - self._created, ended - began)
 
 
 class _Session:
@@ -339,17 +266,19 @@ class _Session:
         self.algorithm = make_algorithm(system.settings.coupling)
         whole = TimeGrid(system.start, system.step, system.step_count)
         self.grid = whole if manner.continuation is None else manner.continuation.grid(system)
-        self._geometry = GeometryObserver(system, lambda g: run_results.write_json(folder / run_results.GEOMETRY, g))
-        self._power = PowerObserver(self._contacts, network)
-        self._contact_watch = ContactWatch(self._contacts, network)
-        self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
-        self._cautions = CautionObserver()
-        self._remembering: tuple[Remembering, ...] = (self._power, self._contact_watch)
+        self._geometry = GeometryObserver(
+            system, lambda g: results_folder.write_json(folder / results_folder.GEOMETRY, g)
+        )
+        self._power = CouplingPowerObserver(self._contacts, network)
+        self._contact_loss_stop = ContactLossStop(self._contacts, network)
+        self._off_wire_stop = OffWireStop(system, self._contacts, network, lambda: self._geometry.geometry)
+        self._cautions = FmuWarningObserver()
+        self._stateful: tuple[StatefulObserver, ...] = (self._power, self._contact_loss_stop)
         self._stopwatch = Stopwatch()
-        self._pacer = None if manner.real_time is None else Pacer(self.grid, manner.real_time)
+        self._pacer = None if manner.real_time is None else WallClockPacer(self.grid, manner.real_time)
         made = self._take_up(manner.continuation)
         self._recorders = [
-            _recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
+            make_recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
         ]
 
     def _take_up(self, continuation: Continuation | None) -> int | None:
@@ -357,8 +286,8 @@ class _Session:
         if continuation is None or not continuation.is_same_run:
             return None
         checkpoint = continuation.checkpoint
-        for observer in self._remembering:
-            observer.recall(checkpoint.observers[observer.name])
+        for observer in self._stateful:
+            observer.restore(checkpoint.observers[observer.name])
         return checkpoint.index
 
     @property
@@ -369,23 +298,23 @@ class _Session:
             *self._recorders,
             self._power,
             self._stopwatch,
-            self._contact_watch,
-            self._track_watch,
+            self._contact_loss_stop,
+            self._off_wire_stop,
             self._cautions,
         ]
 
-    def last_observers(self, occasions: Occasions) -> list[Observer]:
+    def last_observers(self, schedule: CheckpointSchedule) -> list[Observer]:
         """Those that have to see a step after all others: checkpoints, and at the very last the clock."""
         path = self._folder / CHECKPOINT
-        checkpoints = [CheckpointObserver(self._checkpoint, path, occasions)] if occasions else []
+        checkpoints = [CheckpointObserver(self._checkpoint, path, schedule)] if schedule else []
         return [*checkpoints, *([self._pacer] if self._pacer else [])]
 
     def _checkpoint(self, network: Network, index: int) -> Checkpoint:
         for recorder in self._recorders:
             recorder.sync()  # no checkpoint is ahead of the rows that it goes on from
-        return take(self._system, network, self.algorithm, index, self._remembering, self._identity)
+        return take(self._system, network, self.algorithm, index, self._stateful, self._identity)
 
-    def conclude(self, outcome: Outcome, recordings: tuple[Recording, ...]) -> Results:
+    def conclude(self, outcome: RunOutcome, recordings: tuple[Recording, ...]) -> Results:
         """Write the summary and return the results, of what is in the files."""
         description = {
             **_description(self._system, self._identity),
@@ -396,7 +325,7 @@ class _Session:
         summary = {
             **description,
             **_origin(self._manner.continuation),
-            **run_results.figures(done),
+            **run_summary.figures(done),
             "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
             "performance": self._performance(outcome),
             "recordings": [recording_name(p, self._system.step) for p in self._plans],
@@ -405,16 +334,16 @@ class _Session:
             "scenario_warnings": list(self._system.warnings),
         }
         run_results.write_forces(done)
-        run_results.write_json(self._folder / run_results.SUMMARY, summary)
+        results_folder.write_json(self._folder / results_folder.SUMMARY, summary)
         return replace(done, summary=summary)
 
     def disown(self, error: ForeignResultsError) -> None:
         """Mark results that are not what was written, if they are this run's at all."""
         if _is_still(self._folder, self._identity):
             data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
-            run_results.write_json(self._folder / run_results.SUMMARY, data)
+            results_folder.write_json(self._folder / results_folder.SUMMARY, data)
 
-    def recordings(self, outcome: Outcome) -> tuple[Recording, ...]:
+    def recordings(self, outcome: RunOutcome) -> tuple[Recording, ...]:
         """Read what was recorded.
 
         Raises
@@ -437,7 +366,7 @@ class _Session:
                 raise ForeignResultsError(f"{recorder.path} is not what was written: it was changed {advice}")
         return recordings
 
-    def checked(self, outcome: Outcome, recording: Recording) -> Outcome:
+    def checked(self, outcome: RunOutcome, recording: Recording) -> RunOutcome:
         """Return how the run ended once it is seen whether it has covered what it was to cover."""
         reason = self._lacking(recording) if outcome.status == "complete" else ""
         if not reason or self._may_lack:
@@ -459,11 +388,11 @@ class _Session:
         silent = never_touched(recording, self._contacts)
         return f"'{silent}' never touches the wire" if silent else ""
 
-    def _not_judged(self, outcome: Outcome, recording: Recording) -> dict[str, str]:
+    def _not_judged(self, outcome: RunOutcome, recording: Recording) -> dict[str, str]:
         reason = self._lacking(recording) if outcome.status == "complete" else ""
         return {"not_judged": reason} if reason else {}
 
-    def _performance(self, outcome: Outcome) -> dict[str, Any]:
+    def _performance(self, outcome: RunOutcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None
         return {
             **_performance(self._stopwatch.timing, outcome.time - self.grid.begin),
@@ -485,48 +414,18 @@ def _performance(timing: Timing, simulated: float) -> dict[str, float]:
         "initialisation_time": timing.initialisation,
         "wall_time": timing.stepping,
         "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
-        "peak_memory": run_results.peak_memory(),
+        "peak_memory": run_summary.peak_memory(),
     }
-
-
-def _recorder(
-    system: System, network: Network, plan: Plan, folder: Path, made: int | None, is_steady: bool
-) -> Recorder:
-    """Return the recorder of a plan; ``made`` are the steps whose rows are in its file already."""
-    sources = [_exchanged(system, network)] if plan.every == 1 else []
-    units: dict[str, str] = {}
-    for component, slave in zip(system.components, network.slaves, strict=True):
-        units |= {f"{component.name}.{v.name}": v.unit for v in component.fmu.variables.values()}
-        names = plan.names.get(component.name, [])
-        if names and isinstance(slave, Recordable):
-            group = slave.group(names)
-            sources.append(Source([f"{component.name}.{n}" for n in names], group.values, group.read))
-    keep = 0 if made is None else made // plan.every + 1
-    return Recorder(folder / recording_name(plan, system.step), sources, units, plan.every, keep, is_steady)
-
-
-def _exchanged(system: System, network: Network) -> Source:
-    """Return the exchanged outputs as a source; of texts there is no column."""
-    texts = {f"{c.name}.{n}" for c in system.components for n in c.texts}
-    places = [i for i, name in enumerate(network.output_names) if name not in texts]
-    if len(places) == len(network.output_names):
-        return Source(network.output_names, network.outputs)
-    values = network.outputs[places]
-
-    def read() -> None:
-        values[:] = network.outputs[places]
-
-    return Source([network.output_names[i] for i in places], values, read)
 
 
 def _description(system: System, identity: str) -> dict[str, Any]:
     return {
-        "generator": run_results.GENERATOR,
-        "format": run_results.FORMAT,
+        "generator": results_folder.GENERATOR,
+        "format": results_folder.FORMAT,
         "run": identity,
         "scenario": system.name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": run_results.versions(),
+        "versions": run_summary.versions(),
         "settings": {
             "start": system.start,
             "stop": system.stop,
@@ -562,7 +461,7 @@ def _input(component: Component, variable: Variable) -> dict[str, Any]:
     }
 
 
-def _ending(outcome: Outcome) -> dict[str, Any]:
+def _ending(outcome: RunOutcome) -> dict[str, Any]:
     return {
         "status": outcome.status,
         "reason": str(outcome.error) if outcome.error else "",
@@ -571,7 +470,7 @@ def _ending(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _what_happened(outcome: Outcome, folder: Path) -> str:
+def _what_happened(outcome: RunOutcome, folder: Path) -> str:
     kept = f"What was computed up to t = {outcome.time:.6g} s is in {folder}, marked {outcome.status}"
     if outcome.status == "interrupted":
         return f"interrupted. {kept}"

@@ -15,7 +15,8 @@ import pytest
 
 from master.errors import ScenarioError
 from master.run import Manner, run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 SOURCE = r"""
 #include <stdlib.h>

@@ -11,16 +11,17 @@ from pathlib import Path
 from typing import Any, Final
 
 from master.errors import MasterError
+from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
-from master.report.charts.measured_charts import Comparison, compare_measured, comparison_rows, read_measured
+from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import columns, comparison_page
 from master.report.film_file import FilmOptions, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
 from master.report.terminal_summary import Terminal
-from master.results import parquet_export, run_difference, run_results
+from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
 from master.results.run_results import Results
 from master.safety import folder_lock
-from master.safety.safe_files import write_whole
+from master.safety.safe_files import write_atomically
 
 REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
 COMPARE_HELP: Final = "two or more runs side by side"
@@ -39,15 +40,15 @@ def add_report_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is wanted."""
-    run_results.identity(options.run)  # a folder that is none of ours is left alone
+    results_folder.identity(options.run)  # a folder that is none of ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
-        summary = {**done.summary, **run_results.figures(done), "format": run_results.FORMAT}
-        summary["settings"] = {**summary.get("settings", {}), "filter": run_results.filter_data(done.evaluation.filter)}
+        summary = {**done.summary, **run_summary.figures(done), "format": results_folder.FORMAT}
+        summary["settings"] = {**summary.get("settings", {}), "filter": run_summary.filter_data(done.evaluation.filter)}
         done = replace(done, summary=summary)
         measured = _measured(done, options.measured, options.contact) if options.measured else None
         run_results.write_forces(done)
-        run_results.write_json(done.folder / run_results.SUMMARY, summary)
+        results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
         print(report_files.write(done, measured))
         if options.parquet:
             print(*parquet_export.write_parquet(done.folder), sep="\n")
@@ -88,7 +89,7 @@ def report_what_there_is(folder: Path) -> None:
         return  # it stopped before anything was recorded; the error itself is told by the caller
 
 
-def _measured(done: Results, path: Path, contact: int) -> Comparison:
+def _measured(done: Results, path: Path, contact: int) -> MeasuredComparison:
     signals = [s for s in done.signals if s.contact.index == contact]
     if not signals:
         raise MasterError(
@@ -97,7 +98,7 @@ def _measured(done: Results, path: Path, contact: int) -> Comparison:
     return compare_measured(signals[0], read_measured(path))
 
 
-def _say_measured(measured: Comparison) -> None:
+def _say_measured(measured: MeasuredComparison) -> None:
     rows = result_tables.plain_table(("low-passed", "simulated", "measured", "difference"), comparison_rows(measured))
     console = Terminal(width=_WIDTH, highlight=False)
     console.print(rows)
@@ -128,7 +129,7 @@ def run_compare(options: argparse.Namespace) -> int:
     runs = [run_results.read(folder) for folder in (options.first, *options.others)]
     _warn_of_open_runs(runs)
     if options.report:
-        write_whole(options.report, comparison_page(runs).encode(), "another file with --report")
+        write_atomically(options.report, comparison_page(runs).encode(), "another file with --report")
     pairs = [run_difference.compare(runs[0], other) for other in runs[1:]]
     if options.json:
         others = [(other, c) for other, found in zip(runs[1:], pairs, strict=True) for c in found]
@@ -139,7 +140,7 @@ def run_compare(options: argparse.Namespace) -> int:
 
 
 def _show(
-    runs: Sequence[Results], pairs: Sequence[Sequence[run_difference.Comparison]], options: argparse.Namespace
+    runs: Sequence[Results], pairs: Sequence[Sequence[run_difference.RunDifference]], options: argparse.Namespace
 ) -> None:
     console = Terminal(width=_WIDTH, highlight=False)
     found = columns(runs)
@@ -157,7 +158,7 @@ def _show(
         console.print(f"report in {options.report}", markup=False, soft_wrap=True)
 
 
-def _as_json(c: run_difference.Comparison, first: Results, other: Results) -> Mapping[str, Any]:
+def _as_json(c: run_difference.RunDifference, first: Results, other: Results) -> Mapping[str, Any]:
     names = ("mean", "sigma", "minimum", "maximum")
     one, two = c.first.quality, c.second.quality
     difference = {n: getattr(two, n) - getattr(one, n) for n in names}

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from master.arrays import FloatArray
-from master.recording.recorder import Recording
-from master.system.contacts import Contact, strip_centre, track_position
+from master.evaluation.contact_positions import strip_centre, track_position
+from master.recording.recording import Recording
+from master.system.contacts import Contact
 
 Interval = tuple[float | None, float | None]
 

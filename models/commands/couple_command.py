@@ -34,7 +34,7 @@ from models.commands.physics_options import (
 )
 from models.coupled.monolithic import CoupledModel, CoupledRecord
 from models.definition_files.parameter import ParameterError
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_advice import working_height_warning
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 

@@ -10,10 +10,11 @@ import pytest
 
 from master.evaluation.energy_balance import DRIFT
 from master.recording import checkpoint
-from master.recording.checkpoint import Continuation
-from master.recording.recorder import load
+from master.recording.continuation import Continuation
+from master.recording.recording import load
 from master.run import Manner, run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.ssp.archive import extract
 from master.ssp.ssp_units import Conversion
 

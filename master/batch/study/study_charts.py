@@ -12,14 +12,14 @@ from master.arrays import BoolArray, FloatArray
 from master.batch.study.family import Interval
 from master.batch.study.study_evaluation import Entry, section_forces
 from master.batch.study.study_outcome import Done, Outcome
+from master.evaluation.contact_positions import track_position
 from master.evaluation.contact_signals import contact_signals
 from master.evaluation.filters import settled
-from master.evaluation.line_geometry import Geometry
+from master.recording.static_geometry import Geometry
 from master.report.charts.chart import Axis, Bars, Chart, Curve, stroke
 from master.report.charts.force_charts import SHARE, TRACK, force_bars
 from master.report.charts.line_charts import line_marks
 from master.results.run_results import Results
-from master.system.contacts import track_position
 
 #: How far to both sides of a change of wires the forces are drawn [m].
 _MARGIN: Final = 15.0

@@ -13,7 +13,7 @@ from master.batch.verification.case_runs import Runs
 from master.batch.verification.verification_outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
 from master.batch.verification.verification_page import page
 from master.errors import InterruptedRunError
-from master.results import run_results
+from master.results import results_folder, run_summary
 from master.safety.supervision import unfinished
 
 JSON: Final = "verify.json"
@@ -46,12 +46,12 @@ def verify(
     MasterError
         If the folder holds something else.
     """
-    with run_results.taken_over(folder, JSON, GENERATOR, "verification"), unfinished(folder / JSON):
+    with results_folder.taken_over(folder, JSON, GENERATOR, "verification"), unfinished(folder / JSON):
         return _verify(cases, runs, show, folder)
 
 
 def _verify(cases: Sequence[Case], runs: Runs, show: Callable[[CaseOutcome], None], folder: Path) -> Verification:
-    state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), run_results.versions(), len(cases))
+    state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), run_summary.versions(), len(cases))
     write(state, folder)
     try:
         for case in cases:
@@ -68,5 +68,5 @@ def _verify(cases: Sequence[Case], runs: Runs, show: Callable[[CaseOutcome], Non
 
 def write(state: Verification, folder: Path) -> None:
     """Write what there is so far."""
-    run_results.write_json(folder / JSON, as_data(state))
-    run_results.write_text(folder / PAGE, page(state))
+    results_folder.write_json(folder / JSON, as_data(state))
+    results_folder.write_text(folder / PAGE, page(state))

@@ -10,7 +10,7 @@ import numpy as np
 from master.arrays import FloatArray
 from master.evaluation.filters import stands_in
 from master.evaluation.line_geometry import indexed, period_of, slackness
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.charts.chart import COLOURS, MARK, Axis, Chart, Curve, Level, Part, Points, Stroke, gapped, stroke
 from master.report.charts.line_charts import interval_band
 from master.report.charts.uplift_charts import FEW_POINTS, IN_LAP, TIME

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rich.table import Table
 
 from master.evaluation.output_figures import output_figures
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.charts.chart import Axis, Chart, Curve, stroke
 from master.report.result_tables import plain_table
 from master.results.run_results import Results

@@ -7,7 +7,8 @@ import common
 from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.run import loaded
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 archive, step, count, out = common.arguments()
 

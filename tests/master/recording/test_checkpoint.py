@@ -12,10 +12,13 @@ from master.commands.main import main
 from master.coupling.coupling_schemes import Iterative, Jacobi
 from master.errors import MasterError, RequestError, RunError
 from master.recording import checkpoint
-from master.recording.checkpoint import Continuation, index_at, pack, unpack
-from master.recording.recorder import load
+from master.recording.checkpoint import pack, unpack
+from master.recording.checkpoint_writer import index_at
+from master.recording.continuation import Continuation
+from master.recording.recording import load
 from master.run import loaded
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 
 def go(scenario, folder, *options):
@@ -137,7 +140,7 @@ def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
             way, scheme = Continuation(found, "state", renewed=renewed), Iterative()
             with loaded(scenario.system) as network:
                 way.prepare(network, scheme, way.grid(scenario.system))
-                assert scheme.memory().tolist() == expected
+                assert scheme.save().tolist() == expected
                 if not renewed:
                     assert dict(zip(network.output_names, network.outputs.tolist(), strict=True)) == found.outputs
                     told = dict(zip(network.input_names, network.inputs.tolist(), strict=True))
@@ -149,7 +152,7 @@ def test_a_scheme_does_not_take_another_s_memory(toy, saved):
     with open_scenario(toy, Overrides(), build=False) as scenario, loaded(scenario.system) as network:
         way, scheme = Continuation(found, "state"), Iterative()
         way.prepare(network, scheme, way.grid(scenario.system))
-        assert not scheme.memory().size
+        assert not scheme.save().size
 
 
 def test_fmus_that_cannot_serialise_are_named(toy):
@@ -163,7 +166,7 @@ def test_fmus_that_cannot_serialise_are_named(toy):
 def test_a_checkpoint_of_another_version_is_refused_in_one_sentence(tmp_path):
     path = tmp_path / "checkpoint.state"
     path.write_bytes(b"openpanto checkpoint 0\nwhatever came then")
-    with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 1: begin the run anew"):
+    with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 2: start the run again"):
         checkpoint.read(path)
     path.write_bytes(b"something else")
     with pytest.raises(MasterError, match="is not a checkpoint"):

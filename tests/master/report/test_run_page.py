@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report import run_page
 from master.report.charts.interactive_figure import interactive_figure
 from master.report.charts.run_charts import run_charts

@@ -8,7 +8,7 @@ import fmpy
 import pytest
 
 from master.errors import RunError
-from master.fmu.isolation import Isolation
+from master.fmu.isolation.isolated_instance import Isolation
 from master.run import Manner
 from master.ssp.pack import pack
 from tests.foreign_fmus import (

@@ -12,7 +12,7 @@ from master.commands.main import main
 from master.coupling.coupling_schemes import make_algorithm
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.errors import RequestError, SlaveError
-from master.fmu.isolation import Isolation
+from master.fmu.isolation.isolated_instance import Isolation
 from master.fmu.typed_values import TEXTS
 from master.run import Manner, loaded
 from tests.foreign_fmus import (

@@ -8,7 +8,8 @@ import pytest
 
 from master.errors import ScenarioError
 from master.run import loaded, run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.ssp.ssp_units import Conversion
 
 FORCE = "catenary.pantograph[1].contact.force"

@@ -12,7 +12,7 @@ from master.batch.study.study_outcome import Done, Outcome, as_csv, differences
 from master.batch.study.study_page import page
 from master.batch.verification.quantities import QUANTITIES, Choice
 from master.evaluation.contact_assessment import slack_share
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.results.run_results import Results
 from master.system.contacts import Contact
 
@@ -45,7 +45,7 @@ def test_change_of_wires(pair):
 
 
 def test_followers_are_compared_with_the_one_ahead(pair):
-    (following,) = pair.followings
+    (following,) = pair.follower_effects
     assert (following.leading, following.trailing) == ("leading", "trailing")
     assert following.distance == pytest.approx(30.0)
     assert following.sigma < 0.0

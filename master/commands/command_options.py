@@ -1,0 +1,103 @@
+"""Options and messages that several verbs of the command line share."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from master.errors import MasterError
+from master.report.terminal_summary import Terminal
+from master.scenario.overrides import Overrides
+from master.ssp.run_settings import SCHEMES
+from master.system.components import System
+
+
+def _add_tolerance(parser: argparse.ArgumentParser) -> None:
+    text = "relative tolerance for all FMUs, default: that of their default experiments"
+    parser.add_argument("--tolerance", dest="fmu_tolerance", type=_positive, metavar="R", help=text)
+
+
+def _add_overrides(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--strict", action="store_true", help="warnings of the scenario are errors")
+    parser.add_argument(
+        "--allow-outside",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="DIR",
+        help="the scenario may name files in this folder outside of it, such as FMUs that scenarios share",
+    )
+    parser.add_argument("--stop", type=_number, metavar="T", help="stop time [s]")
+    parser.add_argument("--step", type=_positive, metavar="H", help="macro step [s]")
+    parser.add_argument("--scheme", choices=SCHEMES, help="coupling scheme")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=_assignment,
+        metavar="COMPONENT.PARAMETER=VALUE",
+        help="change a parameter",
+    )
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or "_" in text or not text.isascii():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = _number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"'{text}' must be greater than 0")
+    return value
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    name, sign, value = text.partition("=")
+    if not (name and sign and value):
+        raise argparse.ArgumentTypeError(f"'{text}' must be written COMPONENT.PARAMETER=VALUE")
+    return name, value
+
+
+def _overrides(options: argparse.Namespace) -> Overrides:
+    outside = tuple(options.allow_outside)
+    for folder in outside:
+        if not folder.is_dir():
+            raise MasterError(f"--allow-outside {folder}: there is no such folder")
+    return Overrides(
+        options.stop,
+        options.step,
+        options.scheme,
+        dict(options.set),
+        tolerance=getattr(options, "fmu_tolerance", None),
+        strict=options.strict,
+        outside=outside,
+    )
+
+
+def _add(verbs: Any, name: str, text: str, verb: Callable[..., int], scenario: bool = False) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text)
+    parser.set_defaults(verb=verb)
+    if scenario:
+        parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="folder NAME.ssp/ or archive NAME.ssp")
+        parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
+    return parser
+
+
+def _tell(text: str, console: Console | None = None) -> None:
+    (console or Terminal(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
+
+
+def _tell_warnings(system: System, tell: Callable[[str], None]) -> None:
+    for text in system.warnings:
+        tell(f"warning: {text}")

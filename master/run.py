@@ -8,21 +8,28 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from master.coupling.contact_loss_stop import ContactWatch
-from master.coupling.coupling_power import PowerObserver
+from master.coupling.contact_loss_stop import ContactLossStop
+from master.coupling.coupling_power import CouplingPowerObserver
 from master.coupling.coupling_schemes import make_algorithm
-from master.coupling.fmu_warnings import Caution, CautionObserver
-from master.coupling.macro_steps import Observer, Outcome, TimeGrid, simulate
+from master.coupling.fmu_warnings import FmuWarning, FmuWarningObserver
+from master.coupling.macro_steps import Observer, RunOutcome, TimeGrid, simulate
 from master.coupling.network import Network
-from master.coupling.real_time import Pacer
+from master.coupling.off_wire_stop import OffWireStop
+from master.coupling.real_time import WallClockPacer
 from master.coupling.stopwatch import Stopwatch
-from master.coupling.track_watch import TrackWatch
 from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RunError
 from master.evaluation.interval_coverage import not_judgeable
 from master.fmu.isolation.isolated_instance import Isolation
 from master.fmu.loading import loaded_fmus
 from master.recording.checkpoint import Checkpoint
-from master.recording.checkpoint_writer import CheckpointObserver, Occasions, Remembering, index_at, steps_between, take
+from master.recording.checkpoint_writer import (
+    CheckpointObserver,
+    CheckpointSchedule,
+    StatefulObserver,
+    index_at,
+    steps_between,
+    take,
+)
 from master.recording.continuation import Continuation
 from master.recording.recorder import RERUN_ADVICE
 from master.recording.recording import Recording
@@ -62,10 +69,10 @@ class RunOptions:
     isolation: Isolation | None = None
     real_time: float | None = None
 
-    def schedule(self, system: System) -> Occasions:
+    def schedule(self, system: System) -> CheckpointSchedule:
         """Return after which macro steps checkpoints are written; refuses what does not fit the system."""
         once, every = self.checkpoint, self.checkpoint_every
-        return Occasions(
+        return CheckpointSchedule(
             None if once is None else index_at(system, once),
             None if every is None else steps_between(system, every),
         )
@@ -144,7 +151,7 @@ def _failure_noted(folder: RunFolder, description: dict[str, Any], stop_wanted: 
         is_interrupted = isinstance(error, KeyboardInterrupt) or stop_wanted()
         cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
         start = description["settings"]["start"]
-        outcome = Outcome("interrupted" if is_interrupted else "failed", 0, start, cause)
+        outcome = RunOutcome("interrupted" if is_interrupted else "failed", 0, start, cause)
         if folder.is_intact:
             folder.write_summary({**description, **run_summary.ending(outcome)})
         if is_interrupted:
@@ -176,7 +183,7 @@ class RunSession:
         folder: RunFolder,
         description: dict[str, Any],
         options: RunOptions,
-        schedule: Occasions,
+        schedule: CheckpointSchedule,
     ) -> None:
         self._system, self._network, self._folder = system, network, folder
         self._description, self._options, self._schedule = description, options, schedule
@@ -185,13 +192,13 @@ class RunSession:
         whole = TimeGrid(system.start, system.step, system.step_count)
         self._grid = whole if options.continuation is None else options.continuation.grid(system)
         self._geometry = GeometryObserver(system, folder.write_geometry)
-        self._power = PowerObserver(self._contacts, network)
-        self._loss_stop = ContactWatch(self._contacts, network)
-        self._track_watch = TrackWatch(system, self._contacts, network, lambda: self._geometry.geometry)
-        self._warnings = [CautionObserver()]
-        self._stateful: tuple[Remembering, ...] = (self._power, self._loss_stop)
+        self._power = CouplingPowerObserver(self._contacts, network)
+        self._loss_stop = ContactLossStop(self._contacts, network)
+        self._off_wire_stop = OffWireStop(system, self._contacts, network, lambda: self._geometry.geometry)
+        self._warnings = [FmuWarningObserver()]
+        self._stateful: tuple[StatefulObserver, ...] = (self._power, self._loss_stop)
         self._stopwatch = Stopwatch()
-        self._pacer = None if options.real_time is None else Pacer(self._grid, options.real_time)
+        self._pacer = None if options.real_time is None else WallClockPacer(self._grid, options.real_time)
         self._plans = recording_plans(system)
         made, is_steady = self._restored(), options.real_time is not None
         self._recorders = [make_recorder(system, network, p, folder.path, made, is_steady) for p in self._plans]
@@ -203,14 +210,14 @@ class RunSession:
             return None
         checkpoint = continuation.checkpoint
         for observer in self._stateful:
-            observer.recall(checkpoint.observers[observer.name])
+            observer.restore(checkpoint.observers[observer.name])
         return checkpoint.index
 
-    def simulate(self, observers: Sequence[Observer], stop_wanted: Callable[[], bool]) -> Outcome:
+    def simulate(self, observers: Sequence[Observer], stop_wanted: Callable[[], bool]) -> RunOutcome:
         """Step over the grid, watched by the run's observers and by further ones."""
-        self._warnings += [o for o in observers if isinstance(o, CautionObserver)]
+        self._warnings += [o for o in observers if isinstance(o, FmuWarningObserver)]
         everyone: list[Observer] = [self._geometry, *self._recorders, self._power, self._stopwatch]
-        everyone += [self._loss_stop, self._track_watch, self._warnings[0], *observers]
+        everyone += [self._loss_stop, self._off_wire_stop, self._warnings[0], *observers]
         # These have to see a step after all others: checkpoints, and at the very last the clock.
         if self._schedule:
             everyone.append(CheckpointObserver(self._checkpoint, self._folder.checkpoint_file, self._schedule))
@@ -229,9 +236,9 @@ class RunSession:
         """Add what went wrong when FMUs were freed to what they have warned of."""
         for observer in self._warnings:
             for component, text in troubles.items():
-                observer.add(Caution(component, text, is_own=False))
+                observer.add(FmuWarning(component, text, is_own=False))
 
-    def conclude(self, outcome: Outcome) -> Results:
+    def conclude(self, outcome: RunOutcome) -> Results:
         """Write the summary and return the results, of what is in the files.
 
         Raises
@@ -265,7 +272,7 @@ class RunSession:
             raise ForeignResultsError(f"{text} {RERUN_ADVICE}")
         return tuple(recorder.read_back(is_complete) for recorder in self._recorders)
 
-    def _judged(self, outcome: Outcome, recording: Recording) -> tuple[Outcome, str]:
+    def _judged(self, outcome: RunOutcome, recording: Recording) -> tuple[RunOutcome, str]:
         """Return how the run ended if it has to cover its interval of interest, and why it cannot be judged, if so."""
         if outcome.status != "complete":
             return outcome, ""
@@ -278,7 +285,7 @@ class RunSession:
         error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")
         return replace(outcome, status="incomplete", error=error), ""
 
-    def _written(self, outcome: Outcome, not_judged: str, recordings: tuple[Recording, ...]) -> Results:
+    def _written(self, outcome: RunOutcome, not_judged: str, recordings: tuple[Recording, ...]) -> Results:
         description = {
             **self._description,
             **run_summary.ending(outcome),
@@ -300,7 +307,7 @@ class RunSession:
         self._folder.write_summary(summary)
         return replace(done, summary=summary)
 
-    def _performance(self, outcome: Outcome) -> dict[str, Any]:
+    def _performance(self, outcome: RunOutcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None
         return {
             **run_summary.performance(self._stopwatch.timing, outcome.time - self._grid.begin),
@@ -310,7 +317,7 @@ class RunSession:
         }
 
 
-def _what_happened(outcome: Outcome, folder: Path) -> str:
+def _what_happened(outcome: RunOutcome, folder: Path) -> str:
     kept = f"What was computed up to t = {outcome.time:.6g} s is in {folder}, marked {outcome.status}"
     if outcome.status == "interrupted":
         return f"interrupted. {kept}"

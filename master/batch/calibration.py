@@ -12,7 +12,7 @@ from typing import Final
 
 from master.errors import MasterError
 from master.safety import folder_lock
-from master.safety.safe_files import write_whole
+from master.safety.safe_files import write_atomically
 
 MAX_RUNS: Final = 12
 #: Files of a scenario in which values stand.
@@ -219,4 +219,4 @@ def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     m = found[0]
     comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
     new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"
-    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode(), "a copy of the scenario elsewhere")
+    write_atomically(path, (text[: m.start()] + new + text[m.end() :]).encode(), "a copy of the scenario elsewhere")

@@ -22,7 +22,7 @@ from master.report.terminal_summary import WIDTH, Terminal
 from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
 from master.results.run_results import Results
 from master.safety import folder_lock
-from master.safety.safe_files import write_whole
+from master.safety.safe_files import write_atomically
 
 
 def add_report(verbs: Any) -> None:
@@ -131,7 +131,7 @@ def _compare(options: argparse.Namespace) -> int:
     runs = [run_results.read(folder) for folder in (options.first, *options.others)]
     _warn_of_open_runs(runs)
     if options.report:
-        write_whole(options.report, comparison_page(runs).encode(), "another file with --report")
+        write_atomically(options.report, comparison_page(runs).encode(), "another file with --report")
     pairs = [run_difference.compare(runs[0], other) for other in runs[1:]]
     if options.json:
         others = [(other, c) for other, found in zip(runs[1:], pairs, strict=True) for c in found]

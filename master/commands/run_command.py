@@ -19,7 +19,7 @@ from master.commands.command_options import (
     say,
     say_warnings,
 )
-from master.coupling.fmu_warnings import CautionObserver
+from master.coupling.fmu_warnings import FmuWarningObserver
 from master.errors import RequestError, RunError, UsageError
 from master.fmu.isolation.isolated_instance import INIT_TIMEOUT, Isolation
 from master.recording import checkpoint
@@ -179,7 +179,7 @@ def run_shown(system: System, folder: Path, quiet: bool, options: RunOptions = _
     console = Terminal(stderr=True)  # that of the progress bar, which then stays below
     for text in adjustments(system, options.checkpoint_every):
         say(f"warning: {text}", console)
-    cautions = CautionObserver(lambda caution: say(str(caution), console))
+    cautions = FmuWarningObserver(lambda caution: say(str(caution), console))
     if options.real_time is not None:  # drawing takes more time than a step has
         say(f"running for {(system.stop - system.start) / options.real_time:g} s by the wall clock")
         return run(system, folder, [cautions], options)

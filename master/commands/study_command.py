@@ -15,7 +15,7 @@ from master.batch.study.family import Family, Variant, family_names, load_family
 from master.batch.study.study_outcome import Done
 from master.batch.study.study_session import CSV, JSON, PAGE, study
 from master.batch.study.study_table import list_table, show
-from master.batch.study.variants import Runner, Watching, calibrate_variant, unwatched
+from master.batch.study.variants import ObserverFactory, Runner, calibrate_variant, unwatched
 from master.commands.command_options import add_verb
 from master.coupling.macro_steps import Observer
 from master.errors import UsageError
@@ -105,7 +105,7 @@ def _announcer(runner: Runner) -> Callable[[Done], None]:
     return lambda done: runner.tell(f"{done.name}: results in {done.results.folder}")
 
 
-def _progress(console: Console) -> Watching:
+def _progress(console: Console) -> ObserverFactory:
     @contextmanager
     def watching(system: System) -> Iterator[Sequence[Observer]]:
         progress = ProgressObserver(console, system.start, system.stop)

@@ -14,7 +14,7 @@ from master.arrays import FloatArray
 from master.coupling.network import Network
 from master.errors import ForeignResultsError, MasterError
 from master.recording.recording import NUMBER_FORMAT, Recording, header, load
-from master.safety.safe_files import LineFile, safe_cell
+from master.safety.safe_files import AppendOnlyFile, safe_cell
 
 #: Rows kept back before they are written, and the simulated time that they may span [s].
 ROWS_PER_FLUSH: Final = 250
@@ -23,7 +23,7 @@ LONGEST_UNWRITTEN: Final = 1.0
 RERUN_ADVICE: Final = "while the run was in progress; run it again, into another folder (--out)"
 
 
-class Source:
+class RecordedValues:
     """Where values of a recording come from: called when a row is due."""
 
     def __init__(self, names: Sequence[str], values: FloatArray, read: Callable[[], None] = lambda: None) -> None:
@@ -42,7 +42,7 @@ class Recorder:
     ----------
     path : Path
         The CSV file.
-    sources : sequence of Source
+    sources : sequence of RecordedValues
         Groups of variables.
     units : mapping
         Unit by name.
@@ -62,7 +62,7 @@ class Recorder:
     def __init__(
         self,
         path: Path,
-        sources: Sequence[Source],
+        sources: Sequence[RecordedValues],
         units: Mapping[str, str],
         every: int = 1,
         keep: int = 0,
@@ -81,7 +81,7 @@ class Recorder:
         self._goes_on = keep > 0
         self._rows = keep
         titles = _title_line(self.names, self.units)
-        self._file = LineFile(path, _end_of_rows(path, titles, keep) if keep else 0)
+        self._file = AppendOnlyFile(path, _end_of_rows(path, titles, keep) if keep else 0)
         if not keep:
             self._file.write(titles.encode())
 

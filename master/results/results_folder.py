@@ -23,7 +23,7 @@ from master.recording.recording import NUMBER_FORMAT
 from master.recording.static_geometry import Geometry
 from master.results import summary_schema
 from master.safety import folder_lock
-from master.safety.safe_files import PART, safe_cell, write_whole
+from master.safety.safe_files import PART, safe_cell, write_atomically
 
 GENERATOR: Final = "openpanto master"
 #: Version of what a run leaves. 1, which says none: figures of a brick wall at 20 Hz; 2: as it stands here.
@@ -241,7 +241,7 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one go."""
-    write_whole(path, text.encode())
+    write_atomically(path, text.encode())
 
 
 def write_forces(folder: Path, signals: Sequence[Signals]) -> None:

@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from master.coupling.macro_steps import Outcome
+from master.coupling.macro_steps import RunOutcome
 from master.coupling.stopwatch import Timing
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.filters import ForceFilter
@@ -67,7 +67,7 @@ def _input(component: Component, variable: Variable) -> dict[str, Any]:
     }
 
 
-def ending(outcome: Outcome) -> dict[str, Any]:
+def ending(outcome: RunOutcome) -> dict[str, Any]:
     """Return how a run ended."""
     return {
         "status": outcome.status,

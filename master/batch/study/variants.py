@@ -12,7 +12,7 @@ from typing import Any
 
 from master.batch.calibration import CalibrationResult, find_values
 from master.batch.study.family import Calibration, Family, Interval, Variant
-from master.coupling.fmu_warnings import CautionObserver
+from master.coupling.fmu_warnings import FmuWarningObserver
 from master.coupling.macro_steps import Observer
 from master.errors import MasterError, RequestError
 from master.results import results_folder, run_results
@@ -24,7 +24,7 @@ from master.system.components import System
 from master.system.step_rounding import adjustments
 
 #: Makes the observers of one run, and takes them away after it.
-Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
+ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 @contextmanager
@@ -47,7 +47,7 @@ class Runner:
         Whether missing or stale FMUs are built.
     """
 
-    watching: Watching = unwatched
+    watching: ObserverFactory = unwatched
     tell: Callable[[str], None] = lambda _: None
     build: bool = True
 
@@ -55,7 +55,7 @@ class Runner:
         """Run one system."""
         for text in adjustments(system):
             self.tell(f"{system.name}: warning: {text}")
-        cautions = CautionObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
+        cautions = FmuWarningObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
         with self.watching(system) as observers:
             return run(system, folder, [cautions, *observers])
 

@@ -22,7 +22,7 @@ from master.system.components import System
 RUNS: Final = "runs"
 
 #: Makes the observers of one run, and takes them away after it.
-Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
+ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 def content_key(system: System) -> str:
@@ -66,7 +66,7 @@ class Runs:
     """
 
     folder: Path
-    watching: Watching
+    watching: ObserverFactory
     tell: Callable[[str], None] = lambda _: None
     build: bool = True
     _done: dict[str, Results | MasterError] = field(default_factory=dict)

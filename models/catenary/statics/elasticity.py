@@ -275,7 +275,9 @@ class _StaticResponse:
     def uplift(self, wire: ContactWire, x: float, force: float) -> float:
         """Return the rise of a contact wire under a vertical force on it [m]."""
         model = self._model
-        interval, _, modal, ends, _ = wire.touch(*wire.locate(x))
+        element, xi = wire.locate(x)
+        interval = wire.interval(element)
+        modal, ends = interval.split(interval.lift(element, xi)[0])
         load = self._rest.copy()
         load[interval.ends] += force * ends
         displacement = self._solve(load)

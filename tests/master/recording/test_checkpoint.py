@@ -143,7 +143,7 @@ def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
             way, scheme = Continuation(found, "state", renewed=renewed), Iterative()
             with connected_fmus(scenario.system) as network:
                 way.prepare(network, scheme, way.grid(scenario.system))
-                assert scheme.memory().tolist() == expected
+                assert scheme.save().tolist() == expected
                 if not renewed:
                     assert dict(zip(network.output_names, network.outputs.tolist(), strict=True)) == found.outputs
                     told = dict(zip(network.input_names, network.inputs.tolist(), strict=True))
@@ -155,7 +155,7 @@ def test_a_scheme_does_not_take_another_s_memory(toy, saved):
     with open_scenario(toy, Overrides(), build=False) as scenario, connected_fmus(scenario.system) as network:
         way, scheme = Continuation(found, "state"), Iterative()
         way.prepare(network, scheme, way.grid(scenario.system))
-        assert not scheme.memory().size
+        assert not scheme.save().size
 
 
 def test_fmus_that_cannot_serialise_are_named(toy):

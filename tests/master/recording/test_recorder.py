@@ -7,7 +7,7 @@ from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.coupling.network import Network
 from master.errors import MasterError
-from master.recording.recorder import Recorder, Source
+from master.recording.recorder import RecordedValues, Recorder
 from master.recording.recording import header, load
 from master.system.connections import Connection
 from master.system.variable_names import matcher
@@ -19,7 +19,7 @@ def record(fake_slave, path, count, every=1, flow=lambda s, u, t, h: np.array([t
     """The slave's output is the time at the end of its last step."""
     slave = fake_slave("clock", ("u",), ("pantograph[1].contact.force",), np.array([2.0]), flow)
     network = Network([slave], [Connection("clock", "pantograph[1].contact.force", "clock", "u")])
-    recorder = Recorder(path, [Source(network.output_names, network.outputs)], {NAME: "N"}, every)
+    recorder = Recorder(path, [RecordedValues(network.output_names, network.outputs)], {NAME: "N"}, every)
     simulate(network, Jacobi(), TimeGrid(2.0, 1e-3, count), [recorder])
     return recorder
 

@@ -21,7 +21,7 @@ LONGEST_RISE: Final = 1.0
 _RAISING: Final = ("raise_start", "raise_duration")
 
 
-class TrackWatch:
+class OffWireStop:
     """Observer that ends a run whose pantograph is not under the wire.
 
     What is not told by an FMU is not looked at: where its wire ends, where a pantograph will be, when it is raised.

@@ -65,7 +65,7 @@ def page() -> str:
         "line that was not understood ([more](../reliability.md#exit-codes)).",
         "",
     ]
-    with mock.patch.dict(os.environ, {"COLUMNS": "100", "NO_COLOR": "1"}):
+    with mock.patch.dict(os.environ, {"COLUMNS": "84", "NO_COLOR": "1"}):
         for call in ENTRY_POINTS:
             parser = parser_of(call)
             if parser is not None:
@@ -121,8 +121,8 @@ def _arguments(parser: argparse.ArgumentParser) -> Iterator[str]:
 def _names(action: argparse.Action, formatter: argparse.HelpFormatter) -> str:
     value = "" if action.nargs == 0 else formatter._format_args(action, _metavar(action))
     if not action.option_strings:
-        return f"`{_escaped(value)}`"
-    return ", ".join(f"`{option}{' ' if value else ''}{_escaped(value)}`" for option in action.option_strings)
+        return f"`{value}`"
+    return ", ".join(f"`{option}{' ' if value else ''}{value}`" for option in action.option_strings)
 
 
 def _metavar(action: argparse.Action) -> str:
@@ -132,4 +132,5 @@ def _metavar(action: argparse.Action) -> str:
 
 
 def _escaped(text: str) -> str:
-    return text.replace("|", "\\|").replace("<", "&lt;") if "`" not in text else text.replace("|", "\\|")
+    """Return a text that a table's cell may hold."""
+    return text.replace("|", "\\|").replace("<", "&lt;")

@@ -265,8 +265,6 @@ def _in_order(reference: Reference, table: str) -> Iterator[str]:
         inside = next((t for t in (key.path, f"{key.path}[]") if t in reference.tables), None)
         if key.table == table and key.is_table and inside is not None:
             yield from _in_order(reference, inside)
-        if key.table == table and key.is_table and f"{key.path}.NAME" in reference.tables:
-            yield from _in_order(reference, f"{key.path}.NAME")
 
 
 def _rows(keys: list[Key], reference: Reference, own: dict[str, str]) -> Iterator[str]:
@@ -315,9 +313,9 @@ def _range(key: Key) -> str:
         parts.append(f"from {low:g}")
     if math.isfinite(high):
         parts.append(f"to {high:g}")
-    if key.given.get("length"):
-        parts.append(f"{key.given['length']} values" if key.name != "heights" else "as many as positions")
-    return " ".join(parts)
+    length = key.given.get("length")
+    count = f"{length} values" if length == 3 else ""  # of others it is that of another list
+    return ", ".join(filter(None, [" ".join(parts), count]))
 
 
 def _default(key: Key, reference: Reference) -> str:
@@ -328,6 +326,8 @@ def _default(key: Key, reference: Reference) -> str:
         return ""
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
+    if isinstance(value, tuple):
+        return ", ".join(f"{v:g}" for v in value)
     if isinstance(value, float):
         return f"{value:.6g}"
     return f"`{value}`" if isinstance(value, str) else str(value)

@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 import numpy as np
 from timing import table
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 ROOT = Path(__file__).resolve().parents[1]
 TOOLS = ("ours", "ecos", "libcosim", "fmpy", "cofmupy")

@@ -18,10 +18,10 @@ from collections.abc import Callable
 from lines import long_line
 from timing import by_turns, memory, on_one_thread, table
 
-from master.results.run_results import peak_memory
+from master.results.run_summary import peak_memory
 from models.catenary.line_model import CatenaryModel
 from models.coupled.monolithic import CoupledModel
-from models.library import load_lumped
+from models.library.catalogue import load_lumped
 
 STEP = 1e-3
 STEPS = 50

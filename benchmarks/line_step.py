@@ -17,7 +17,7 @@ from timing import by_turns, on_one_thread, table
 from models.catenary.contact_and_slack import local_problem
 from models.catenary.line_model import CatenaryModel
 from models.coupled.monolithic import CoupledModel
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_model import LumpedModel
 
 STEP = 1e-3
@@ -51,11 +51,11 @@ def main(name: str) -> None:
 
 def parts(model: CatenaryModel) -> Parts:
     """Return part of a step -> class and methods that it is done in; what they call in another part counts there."""
-    stepper = type(model._step(STEP).stepper)
+    engine = type(model._step(STEP).engine)
     return {
-        f"products ({stepper.__name__})": (stepper, ("begin", "finish")),
-        f"band solution ({stepper.__name__})": (stepper, ("solve",)),
-        "finding the contact": (CatenaryModel, ("_open_contacts",)),
+        f"products ({engine.__name__})": (engine, ("begin", "finish")),
+        f"band solution ({engine.__name__})": (engine, ("solve",)),
+        "finding the contact": (CatenaryModel, ("_candidates",)),
         "contact force and slack droppers": (local_problem.LocalProblem, ("solve",)),
         "pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of")),
         "rest of the line": (CatenaryModel, ("step",)),

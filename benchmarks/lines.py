@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 import tomllib
 
-from models.catenary.definition.line_definition import CatenaryDefinition, read
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_reading import read
 from models.definition_files.toml_reader import Table
-from models.library import line_path
+from models.library.catalogue import line_path
 
 #: Length of a span [m].
 SPAN = 50.0

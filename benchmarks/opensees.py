@@ -27,11 +27,11 @@ import numpy as np
 from opensees_line import Formulation, OpenSeesLine, Solver
 from timing import by_turns, on_one_thread, rounds_of, table
 
+from models.arrays import FloatArray
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape import line_matrices
 from models.catenary.statics.elasticity import elasticity, positions_in_span
-from models.definition_files.parameter import FloatArray
-from models.library import load_line
+from models.library.catalogue import load_line
 
 STEP = 1e-3
 #: Steps to a round, and rounds, of a timing.

@@ -28,11 +28,11 @@ from pathlib import Path
 import numpy as np
 import openseespy.opensees as ops
 
+from models.arrays import FloatArray, IntArray
 from models.catenary.definition.line_definition import COMPONENTS, SHEAR_RATIO
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
 from models.catenary.shape.line_matrices import beam_properties, compression_ratio, dropper_stiffness
-from models.definition_files.parameter import FloatArray, IntArray
 
 #: Tags: one load pattern holds the weight, one a static force, those from the third on a moving force's histories.
 _WEIGHT, _POINT, _MOVING = 1, 2, 3

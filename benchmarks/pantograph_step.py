@@ -12,8 +12,8 @@ import numpy as np
 from fmu_calls import stepped
 from timing import by_turns, on_one_thread, table
 
-from models.library import load_pantograph, pantograph_names
-from models.pantograph.lumped.lumped_model import LumpedPantographPart
+from models.library.catalogue import load_pantograph, pantograph_names
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 

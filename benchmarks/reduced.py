@@ -25,7 +25,7 @@ from master.evaluation.filters import ForceFilter, low_pass
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_model import CatenaryModel
 from models.coupled.monolithic import CoupledModel, CoupledRecord
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 
 CUTS = (1000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0, 20.0)
 #: The run: shares of the line's length where it begins, where figures begin, and where both end.

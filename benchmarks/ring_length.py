@@ -16,11 +16,11 @@ from lines import SPAN, long_line, ring
 from timing import on_one_thread, table
 
 from master.evaluation.filters import ForceFilter, low_pass
+from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_model import CatenaryModel
 from models.coupled.monolithic import CoupledModel
-from models.definition_files.parameter import FloatArray
-from models.library import load_lumped
+from models.library.catalogue import load_lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 
 STEP = 1e-3

@@ -27,12 +27,12 @@ import numpy as np
 from lines import SPAN, long_line, ring
 from timing import memory, on_one_thread, table
 
+from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.coupled.monolithic import CoupledModel
-from models.definition_files.parameter import FloatArray
-from models.library import load_pantograph
+from models.library.catalogue import load_pantograph
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart

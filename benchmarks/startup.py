@@ -70,7 +70,7 @@ def _file(spans: int, folder: Path) -> Path:
     """Return the definition file of a line; 0 spans are LN2's own."""
     from lines import long_line_file
 
-    from models.library import line_path
+    from models.library.catalogue import line_path
 
     if spans == 0:
         return line_path("LN2")
@@ -86,7 +86,7 @@ def model_phases(spans: int) -> dict[str, float]:
     from clocks import Clocks
 
     import models.catenary.line_model as line
-    from models.library import load_line
+    from models.library.catalogue import load_line
 
     phases.durations["model: import"] = time.process_time() - begin
     with tempfile.TemporaryDirectory() as folder:

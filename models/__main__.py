@@ -2,8 +2,8 @@
 
 import sys
 
-from models.commands import main
 from models.commands.physics_interruption import watch_interruptions
+from models.commands.physics_main import main
 
 if __name__ == "__main__":
     watch_interruptions()

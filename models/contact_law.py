@@ -1,4 +1,4 @@
-"""Contact of a collector strip with a contact wire: where they cross in plan, and the normal force [1]_.
+"""Contact of a collector strip with a contact wire: the normal force [1]_, and where the resultant acts.
 
 References
 ----------
@@ -8,21 +8,17 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 #: Below this penetration velocity an impact has no velocity to refer to [m/s].
 _SLOWEST_IMPACT = 1e-6
-#: Widths over which a contact sets in and fades [m]: of the strip, from its ends, as its horns bend down there; of the
-#: wire, from its ends. They keep the force continuous where a wire slides off a strip or ends under it.
-STRIP_EDGE = 0.05
-WIRE_EDGE = 1.0
 
 
 class ContactParameters(Protocol):
@@ -183,48 +179,6 @@ def _jump(
 
 
 register_contact_law("continuous", continuous_contact)
-
-
-def crossing(
-    a: Sequence[float], b: Sequence[float], i: Sequence[float], j: Sequence[float]
-) -> tuple[float, float] | None:
-    """Intersect strip and wire element in plan [2.36-2.42].
-
-    Parameters
-    ----------
-    a, b : sequence of at least two numbers
-        Ends of the strip, x and y first [m].
-    i, j : (float, float)
-        Ends of the element in plan [m].
-
-    Returns
-    -------
-    (float, float) or None
-        Shares of the way from A to B and from I to J; None if the two are parallel.
-
-    Examples
-    --------
-    >>> crossing((1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 0.5), (4.0, 0.5))
-    (0.25, 0.25)
-    """
-    strip_x, strip_y = b[0] - a[0], b[1] - a[1]
-    wire_x, wire_y = j[0] - i[0], j[1] - i[1]
-    determinant = strip_y * wire_x - strip_x * wire_y
-    if determinant == 0.0:
-        return None
-    dx, dy = i[0] - a[0], i[1] - a[1]
-    return (dy * wire_x - dx * wire_y) / determinant, (strip_x * dy - strip_y * dx) / determinant
-
-
-def engagement(from_strip_end: float, from_wire_end: float) -> float:
-    """Return the share of the contact law that acts so near to the ends of strip and wire [m].
-
-    Examples
-    --------
-    >>> engagement(0.4, 200.0), engagement(0.4, 0.25), engagement(0.0, 200.0)
-    (1.0, 0.25, 0.0)
-    """
-    return min(1.0, from_strip_end / STRIP_EDGE) * min(1.0, from_wire_end / WIRE_EDGE)
 
 
 def application_point(force: FloatArray, point: FloatArray, strip: FloatArray) -> FloatArray:

@@ -82,15 +82,9 @@ OUTSIDE_FMU = ("models.commands", "models.__main__")
 
 #: Imports and names that still break the rules: to be emptied, never to grow.
 OPEN: set[str] = {
-    "circle models.pantograph.lumped.lumped_energy -> models.pantograph.lumped.lumped_model",
-    "init fmus.slave does not say its duty",
-    "init master.batch does not say its duty",
     "init master.commands does not say its duty",
     "init master.coupling does not say its duty",
-    "init master.fmu.isolation holds more than a docstring",
     "init master.recording does not say its duty",
-    "init master.report holds more than a docstring",
-    "init master.report.charts does not say its duty",
     "init master.results does not say its duty",
     "init master.scenario does not say its duty",
     "init master.system does not say its duty",
@@ -100,29 +94,7 @@ OPEN: set[str] = {
     "init models.catenary.shape does not say its duty",
     "init models.catenary.statics does not say its duty",
     "init models.catenary.step does not say its duty",
-    "init models.commands holds more than a docstring",
-    "init models.coupled does not say its duty",
     "init models.definition_files does not say its duty",
-    "init models.library holds more than a docstring",
-    "init models.pantograph.lumped does not say its duty",
-    "init models.pantograph.multibody.analysis does not say its duty",
-    "init models.pantograph.multibody.elements does not say its duty",
-    "room models.catenary: meeting is in no tier",
-    "tier master: master.coupling.fmu_warnings -> master.fmu.instance",
-    "tier master: master.coupling.track_watch -> master.evaluation.line_geometry",
-    "tier master: master.coupling.track_watch -> master.scenario.scenario_checks",
-    "tier master: master.scenario.open_scenario -> master.evaluation.energy_balance",
-    "tier master: master.system.contacts -> master.recording.recorder",
-    "tier models.catenary: models.catenary.line_model -> models.catenary.meeting",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.contact_and_slack.contact_wire",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.contact_and_slack.wire_response",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.linear_motion.line_motion",
-    "tier models.catenary: models.catenary.meeting -> models.catenary.step.numpy_engine",
-    "tier models.pantograph: models.pantograph.multibody.mechanism_definition -> models.pantograph.lumped.lumped_definition",  # noqa: E501
-    "tier models: models.contact_law -> models.definition_files.parameter",
-    "tier models: models.numerics.energy_ledger -> models.definition_files.field_schema",
-    "tier models: models.numerics.energy_ledger -> models.definition_files.parameter",
-    "tier models: models.numerics.extrapolation -> models.definition_files.parameter",
 }
 
 

@@ -23,8 +23,9 @@ from master.report.charts import run_charts
 from master.report.run_inputs import scheme_options
 from master.ssp.run_settings import OPTIONS, SCHEMES, Coupling
 from master.ssp.ssp_units import COMMON
-from models import commands, contact_law
+from models import contact_law
 from models.catenary.definition.line_definition import Contact
+from models.commands import physics_main
 from models.contact_law import CONTACT_LAWS, ContactLawError, NormalForce, continuous_contact, register_contact_law
 from models.definition_files.si_units import SI, to_si
 from models.pantograph.multibody import mechanism_definition
@@ -230,11 +231,12 @@ def test_every_quantity_measures_something_else_and_has_a_unit_that_is_known():
 
 
 def test_every_chart_is_in_a_report():
-    """A function of the module that makes a chart is asked by one that makes all, itself or through another."""
-    tree = ast.parse(Path(run_charts.__file__).read_text(encoding="utf-8"))
-    functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
+    """A function of the room that makes a chart is asked by one that makes all, itself or through another."""
+    room = Path(run_charts.__file__).parent
+    trees = [ast.parse(p.read_text(encoding="utf-8")) for p in room.glob("*_charts.py") if p.stem != "measured_charts"]
+    functions = {n.name: n for tree in trees for n in tree.body if isinstance(n, ast.FunctionDef)}
     makers = {n for n, f in functions.items() if f.returns is not None and "Chart" in ast.unparse(f.returns)}
-    asked, left = set(), ["run_charts"]
+    asked, left = set(), ["run_charts", "file_charts"]
     while left:
         asked.add(name := left.pop())
         used = {n.id for n in ast.walk(functions[name]) if isinstance(n, ast.Name)}
@@ -259,11 +261,11 @@ def test_every_verb_of_the_others_does_something():
     assert all(callable(parser.get_default("run")) for parser in verbs(fmus_parser()).values())
     parser = argparse.ArgumentParser()
     subparsers = parser.add_subparsers()
-    for verb in commands._VERBS:
+    for verb in physics_main._VERBS:
         verb.add(subparsers)
     assert all(callable(p.get_default("run")) for p in subparsers.choices.values())
     modules = {p.stem for p in (ROOT / "models/commands").glob("*.py") if "\ndef add(" in p.read_text(encoding="utf-8")}
-    assert modules == {verb.__name__.rpartition(".")[2] for verb in commands._VERBS}
+    assert modules == {verb.__name__.rpartition(".")[2] for verb in physics_main._VERBS}
 
 
 @pytest.mark.parametrize("name", sorted(SI))

@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.lumped.lumped_advice import working_height_warning
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, load_lumped
-from models.pantograph.lumped.lumped_model import LumpedPantographPart
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 
 
 class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
@@ -41,7 +41,7 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     def _make_ports(self, part: LumpedPantographPart) -> Ports:
         return pantograph_ports(part)
 
-    def _doubts(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
+    def _start_warnings(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
 
     def _initialise(self, part: LumpedPantographPart, time: float, inputs: FloatArray) -> None:

@@ -9,7 +9,7 @@ from typing import ClassVar
 from fmus.slave.adapter import Adapter
 from fmus.slave.lumped_slave import pantograph_ports
 from fmus.slave.ports import Ports
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition, load
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 
@@ -38,7 +38,7 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
     def _make_ports(self, part: MultibodyPantographPart) -> Ports:
         return pantograph_ports(part)
 
-    def _doubts(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
+    def _start_warnings(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
 
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Parameter
+from models.arrays import FloatArray
+from models.definition_files.parameter import Parameter
 from models.numerics.energy_ledger import BALANCE
 
 Causality = Literal["parameter", "input", "output", "local", "calculatedParameter"]

@@ -12,7 +12,7 @@ from typing import Final
 
 from master.errors import MasterError
 from master.safety import folder_lock
-from master.safety.safe_files import write_whole
+from master.safety.safe_files import write_atomically
 
 MAX_RUNS: Final = 12
 #: Files of a scenario in which values stand.
@@ -22,7 +22,7 @@ _FIRST_CHANGE: Final = 0.03
 
 
 @dataclass(frozen=True)
-class Trial:
+class CalibrationTrial:
     """One run of a calibration: parameter value and what came out."""
 
     value: float
@@ -30,12 +30,12 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Found:
+class CalibrationResult:
     """Result of a calibration: the chosen value, what it gives, and all trials in order."""
 
     value: float
     result: float
-    trials: tuple[Trial, ...]
+    trials: tuple[CalibrationTrial, ...]
 
 
 def find_value(
@@ -44,7 +44,7 @@ def find_value(
     start: float,
     tolerance: float,
     guess: float | None = None,
-) -> Found:
+) -> CalibrationResult:
     """Find the value at which ``function`` gives ``target``.
 
     Secant steps, held inside a bracket once there is one.
@@ -65,7 +65,7 @@ def find_value(
     MasterError
         If it is not found within `MAX_RUNS` runs, or the result does not depend on the value.
     """
-    trials = [Trial(start, function(start))]
+    trials = [CalibrationTrial(start, function(start))]
     while abs(trials[-1].result - target) > tolerance:
         if len(trials) >= MAX_RUNS:
             raise MasterError(
@@ -73,8 +73,8 @@ def find_value(
                 f"giving {trials[-1].result:g}; widen the tolerance or start nearer"
             )
         value = _first_step(trials[0], target, guess) if len(trials) == 1 else _next(trials, target)
-        trials.append(Trial(value, function(value)))
-    return Found(trials[-1].value, trials[-1].result, tuple(trials))
+        trials.append(CalibrationTrial(value, function(value)))
+    return CalibrationResult(trials[-1].value, trials[-1].result, tuple(trials))
 
 
 def find_values(
@@ -82,7 +82,7 @@ def find_values(
     target: float,
     starts: Sequence[float],
     tolerance: float,
-) -> tuple[Found, ...]:
+) -> tuple[CalibrationResult, ...]:
     """Find the values at which every result of ``function`` is ``target``, all of them in the same runs.
 
     Each result must depend mainly on the value in the same place: every value takes its own secant steps.
@@ -102,18 +102,18 @@ def find_values(
         If they are not found within `MAX_RUNS` runs, or a result does not depend on its value.
     """
     values = tuple(starts)
-    trials: list[list[Trial]] = [[] for _ in values]
+    trials: list[list[CalibrationTrial]] = [[] for _ in values]
     for _ in range(MAX_RUNS):
         for own, value, result in zip(trials, values, function(values), strict=True):
-            own.append(Trial(value, result))
+            own.append(CalibrationTrial(value, result))
         if all(abs(own[-1].result - target) <= tolerance for own in trials):
-            return tuple(Found(own[-1].value, own[-1].result, tuple(own)) for own in trials)
+            return tuple(CalibrationResult(own[-1].value, own[-1].result, tuple(own)) for own in trials)
         values = tuple(_next_of_several(own, target, tolerance) for own in trials)
     last = ", ".join(f"{own[-1].value:g} giving {own[-1].result:g}" for own in trials)
     raise MasterError(f"no values found after {MAX_RUNS} runs; the last were {last}; widen the tolerance")
 
 
-def _next_of_several(trials: list[Trial], target: float, tolerance: float) -> float:
+def _next_of_several(trials: list[CalibrationTrial], target: float, tolerance: float) -> float:
     """Return the next value; a good one stays, and runs in which only the others changed tell nothing."""
     last = trials[-1]
     if abs(last.result - target) <= 0.5 * tolerance:
@@ -122,7 +122,7 @@ def _next_of_several(trials: list[Trial], target: float, tolerance: float) -> fl
     return _next([*others, last], target) if others else _first_step(last, target, None)
 
 
-def _first_step(first: Trial, target: float, guess: float | None) -> float:
+def _first_step(first: CalibrationTrial, target: float, guess: float | None) -> float:
     if guess is not None:
         return guess
     miss = target - first.result
@@ -130,7 +130,7 @@ def _first_step(first: Trial, target: float, guess: float | None) -> float:
     return first.value + math.copysign(min(abs(miss), 10.0 * bound), miss)
 
 
-def _next(trials: list[Trial], target: float) -> float:
+def _next(trials: list[CalibrationTrial], target: float) -> float:
     """Return the secant's value; the middle of the bracket if the secant leaves it or has hardly helped."""
     a, b = trials[-2], trials[-1]
     bracket = _bracket(trials, target)
@@ -142,7 +142,7 @@ def _next(trials: list[Trial], target: float) -> float:
     return min(max(value, b.value - span), b.value + span)
 
 
-def _secant(a: Trial, b: Trial, target: float) -> float:
+def _secant(a: CalibrationTrial, b: CalibrationTrial, target: float) -> float:
     if a.result == b.result:
         raise MasterError(
             f"the result {b.result:g} does not depend on the parameter (tried {a.value:g} and {b.value:g})"
@@ -150,7 +150,7 @@ def _secant(a: Trial, b: Trial, target: float) -> float:
     return b.value + (target - b.result) * (b.value - a.value) / (b.result - a.result)
 
 
-def _bracket(trials: list[Trial], target: float) -> tuple[float, float] | None:
+def _bracket(trials: list[CalibrationTrial], target: float) -> tuple[float, float] | None:
     below = [t for t in trials if t.result < target]
     above = [t for t in trials if t.result > target]
     if not below or not above:
@@ -219,4 +219,4 @@ def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     m = found[0]
     comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
     new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"
-    write_whole(path, (text[: m.start()] + new + text[m.end() :]).encode(), "a copy of the scenario elsewhere")
+    write_atomically(path, (text[: m.start()] + new + text[m.end() :]).encode(), "a copy of the scenario elsewhere")

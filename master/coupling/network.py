@@ -13,7 +13,7 @@ import numpy as np
 
 from master.arrays import BoolArray, FloatArray, IntArray
 from master.errors import RunError
-from master.system.components import Connection
+from master.system.connections import Connection
 
 
 class Slave(Protocol):

@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 
 from master.arrays import FloatArray
+from master.evaluation.contact_positions import leading_first, running_position
 from master.evaluation.contact_quality import Quality, early_warning, figures_of
 from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, settling_of
 from master.evaluation.en50367_limits import HEIGHT_RANGE, UPLIFT, Criterion, judge
 from master.evaluation.filters import evaluated, stands_in
 from master.evaluation.line_geometry import (
-    Geometry,
     Slackness,
     Uplift,
     indexed,
@@ -25,8 +25,9 @@ from master.evaluation.line_geometry import (
     slackness,
     support_uplifts,
 )
-from master.recording.recorder import Recording
-from master.system.contacts import Contact, leading_first, running_position
+from master.recording.recording import Recording
+from master.recording.static_geometry import Geometry
+from master.system.contacts import Contact
 
 #: A pantograph's effect on a dropper begins this long before it passes, and is followed this long after [s].
 _BEFORE: Final = 0.2

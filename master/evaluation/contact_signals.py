@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
+from master.evaluation.contact_positions import lateral_position, track_position
 from master.evaluation.contact_quality import Sampled
 from master.evaluation.en50367_limits import LimitChoice
 from master.evaluation.filters import DEFAULT, SETTLING, ForceFilter, evaluated, low_pass, settled
-from master.recording.recorder import Recording
-from master.system.contacts import Contact, lateral_position, track_position
+from master.recording.recording import Recording
+from master.system.contacts import Contact
 
 #: Units that a recorded contact force may have.
 _FORCE_UNITS = ("N", "")

@@ -16,14 +16,11 @@ from typing import Final
 import numpy as np
 
 from master.arrays import FloatArray
+from master.evaluation.contact_positions import strip_centre
 from master.evaluation.run_events import Event
-from master.recording.recorder import Recording
-from master.system.contacts import Contact, strip_centre
+from master.recording.recording import Recording
+from master.system.contacts import Contact
 
-#: The parameter that makes an FMU keep its balance, what it tells then, and how often that is recorded [s].
-MONITOR: Final = "monitor_energy"
-VARIABLES: Final = ("*.energy.*", "*contact.work")
-INTERVAL: Final = 0.05
 DRIFT: Final = "energy drift"
 #: Largest drift of a part, as a share of the energy that has passed through it. The balance of the trapezoidal rule
 #: is exact: it leaves rounding, 1e-11; an integrator with error control leaves less than 1e-7.
@@ -35,7 +32,7 @@ _DRIFT: Final = re.compile(r"(?P<component>.+)\.energy\.drift")
 
 
 @dataclass(frozen=True)
-class Balance:
+class EnergyBalance:
     """The energy balance of a component or of a contact.
 
     Attributes
@@ -71,21 +68,21 @@ class Balance:
         return f"drift {self.drift:.2g} J, at most {self.share:.1g} of {self.passed:.4g} J{kept}"
 
 
-def find_balances(recordings: Sequence[Recording], contacts: Iterable[Contact]) -> tuple[Balance, ...]:
+def find_balances(recordings: Sequence[Recording], contacts: Iterable[Contact]) -> tuple[EnergyBalance, ...]:
     """Return the balances that are recorded: of components, then of contacts."""
     parts = [b for r in recordings for b in _of_parts(r)]
     couplings = (_of_contact(recordings, contact) for contact in contacts)
     return (*parts, *(b for b in couplings if b is not None))
 
 
-def drift_events(balances: Iterable[Balance], end: float) -> Iterator[Event]:
+def drift_events(balances: Iterable[EnergyBalance], end: float) -> Iterator[Event]:
     """Yield an event for every balance that is off by more than its limit, from then to the end of the run [s]."""
     for b in balances:
         if b.exceeded is not None:
             yield Event(DRIFT, b.what, b.exceeded, end - b.exceeded, None, True)
 
 
-def _of_parts(recording: Recording) -> Iterator[Balance]:
+def _of_parts(recording: Recording) -> Iterator[EnergyBalance]:
     for name in recording.names:
         match = _DRIFT.fullmatch(name)
         if match is not None and np.any(passed := _passed(recording, match["component"])):
@@ -101,7 +98,7 @@ def _passed(recording: Recording, component: str) -> FloatArray:
     return total
 
 
-def _of_contact(recordings: Sequence[Recording], contact: Contact) -> Balance | None:
+def _of_contact(recordings: Sequence[Recording], contact: Contact) -> EnergyBalance | None:
     names = f"{contact.prefix}.work", contact.force_input.removesuffix(".force") + ".work"
     recording = next((r for r in recordings if all(n in r for n in names)), None)
     if recording is None or not len(recording.time):
@@ -127,7 +124,7 @@ def _exchanged(recording: Recording, contact: Contact, times: FloatArray) -> Flo
     return work
 
 
-def _balance(what: str, recording: Recording, drift: FloatArray, passed: FloatArray, limit: float) -> Balance:
+def _balance(what: str, recording: Recording, drift: FloatArray, passed: FloatArray, limit: float) -> EnergyBalance:
     beyond = np.flatnonzero(np.abs(drift) > limit * passed[-1])
     first = float(recording.time[beyond[0]]) if beyond.size else None
-    return Balance(what, float(drift[-1]), float(np.abs(drift).max()), float(passed[-1]), limit, first)
+    return EnergyBalance(what, float(drift[-1]), float(np.abs(drift).max()), float(passed[-1]), limit, first)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from master.evaluation.contact_assessment import Assessment
-from master.recording.recorder import Recording
-from master.system.contacts import leading_first, running_position
+from master.evaluation.contact_positions import leading_first, running_position
+from master.recording.recording import Recording
 
 
 @dataclass(frozen=True)
-class Following:
+class FollowerEffect:
     """A pantograph and the one just ahead of it: figures of the follower minus those of the one ahead.
 
     Attributes
@@ -42,20 +42,20 @@ class Following:
         )
 
 
-def followings(recording: Recording, assessments: Sequence[Assessment]) -> tuple[Following, ...]:
+def follower_effects(recording: Recording, assessments: Sequence[Assessment]) -> tuple[FollowerEffect, ...]:
     """Compare every pantograph that has figures with the one ahead of it on the same line."""
-    found: list[Following] = []
+    found: list[FollowerEffect] = []
     for line in dict.fromkeys(a.contact.catenary for a in assessments):
         own = {a.contact.index: a for a in assessments if a.contact.catenary == line}
         ordered = leading_first(recording, [a.contact for a in own.values()])
-        found += [_following(recording, own[ahead.index], own[behind.index]) for ahead, behind in pairwise(ordered)]
+        found += [_effect_of(recording, own[ahead.index], own[behind.index]) for ahead, behind in pairwise(ordered)]
     return tuple(found)
 
 
-def _following(recording: Recording, ahead: Assessment, behind: Assessment) -> Following:
+def _effect_of(recording: Recording, ahead: Assessment, behind: Assessment) -> FollowerEffect:
     places = [float(running_position(recording, a.contact)[0]) for a in (ahead, behind)]
     one, two = ahead.quality, behind.quality
-    return Following(
+    return FollowerEffect(
         ahead.contact.pantograph,
         behind.contact.pantograph,
         abs(places[0] - places[1]),

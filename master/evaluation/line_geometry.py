@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
-from master.coupling.network import Network
 from master.evaluation.filters import stands_in
-from master.recording.recorder import Recording
-from master.system.components import System
+from master.recording.recording import Recording
+from master.recording.static_geometry import Geometry
 
 #: Calculated parameter of a line that closes on itself: the length after which it repeats [m].
 PERIOD: Final = "period"
@@ -22,9 +21,6 @@ PERIOD: Final = "period"
 _MOST_LAPS: Final = 10_000
 _INDEXED: Final = re.compile(r"(support|dropper)\[(\d+)\]\.(.+)")
 _TENSIONED: Final = re.compile(r"(.+?)\.((?:support|dropper)\[\d+\])\.(force|slack)")
-
-#: Values of one component's calculated parameters by variable name.
-Geometry = dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
@@ -88,40 +84,6 @@ class Slackness:
     name: str
     time: FloatArray
     slack: BoolArray
-
-
-class GeometryObserver:
-    """Observer that reads all Real calculated parameters once, when they are known.
-
-    Parameters
-    ----------
-    system : System
-    tell : callable
-        Is given them.
-    """
-
-    def __init__(self, system: System, tell: Callable[[Geometry], None] = lambda _: None) -> None:
-        self._system = system
-        self._tell = tell
-        self.geometry: Geometry = {}
-
-    def begin(self, time: float, network: Network) -> None:
-        """Read."""
-        for component, slave in zip(self._system.components, network.slaves, strict=True):
-            variables = component.fmu.variables.values()
-            names = [v.name for v in variables if v.causality == "calculatedParameter" and v.type == "Real"]
-            group = getattr(slave, "group", None)
-            if names and group is not None:
-                values = group(names)
-                values.read()
-                self.geometry[component.name] = dict(zip(names, values.values.tolist(), strict=True))
-        self._tell(self.geometry)
-
-    def observe(self, index: int, time: float, network: Network) -> None:
-        """Nothing changes."""
-
-    def finish(self) -> None:
-        """Nothing to close."""
 
 
 def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 
 
 @dataclass(frozen=True)

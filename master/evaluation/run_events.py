@@ -13,9 +13,11 @@ from typing import Final
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
-from master.evaluation.line_geometry import Geometry, Slackness, slackness
-from master.recording.recorder import Recording
-from master.system.contacts import Contact, lateral_position, strip_centre, track_position
+from master.evaluation.contact_positions import lateral_position, strip_centre, track_position
+from master.evaluation.line_geometry import Slackness, slackness
+from master.recording.recording import Recording
+from master.recording.static_geometry import Geometry
+from master.system.contacts import Contact
 
 LOST: Final = "contact lost"
 AT_END: Final = "wire beyond the strip's end"

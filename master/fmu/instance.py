@@ -10,7 +10,7 @@ import ctypes
 from collections.abc import Callable, Sequence
 from ctypes import byref, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
 from time import perf_counter
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Final
 
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
@@ -18,7 +18,7 @@ from fmpy.fmi2 import FMU2Slave
 from master.arrays import FloatArray
 from master.errors import SlaveError, one_line
 from master.fmu import fmi_log
-from master.fmu.extraction import Unpacked
+from master.fmu.extraction import ExtractedFmu
 from master.fmu.typed_values import TypedValues
 from master.ssp.ssv import Value
 from master.system.components import Component, Variable
@@ -34,36 +34,6 @@ _LAST_TIME: Final = 2
 _TERMINATED: Final = 3
 #: Largest state that is taken from an FMU [bytes].
 LONGEST_STATE: Final = 1 << 30
-
-
-class Readable(Protocol):
-    """Variables that are read together into an array."""
-
-    values: FloatArray
-
-    def read(self) -> None:
-        """Fill `values`."""
-
-
-@runtime_checkable
-class Recordable(Protocol):
-    """A slave with variables beside those that are exchanged."""
-
-    name: str
-    stepping_time: float
-
-    def group(self, names: Sequence[str]) -> Readable:
-        """Return a group for further variables."""
-
-
-@runtime_checkable
-class Cautious(Protocol):
-    """A slave that may warn."""
-
-    name: str
-
-    def warnings(self) -> tuple[str, ...]:
-        """Return its warnings so far, each once and on one line."""
 
 
 class Group:
@@ -317,7 +287,7 @@ class Instance:
     def _load(self) -> Any:
         fmu = self.component.fmu
         try:
-            self._unpacked = unpacked = Unpacked(fmu)
+            self._unpacked = unpacked = ExtractedFmu(fmu)
         except Exception as error:
             raise self._unloadable(error) from error
         try:

@@ -6,71 +6,24 @@ import csv
 import io
 import itertools
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from master.arrays import FloatArray
 from master.coupling.network import Network
-from master.errors import MasterError
-from master.safety.safe_files import LineFile, plain_cell, safe_cell
-from master.system.variable_names import matcher
+from master.errors import ForeignResultsError, MasterError
+from master.recording.recording import NUMBER_FORMAT, Recording, header, load
+from master.safety.safe_files import AppendOnlyFile, safe_cell
 
 #: Rows kept back before they are written, and the simulated time that they may span [s].
 ROWS_PER_FLUSH: Final = 250
 LONGEST_UNWRITTEN: Final = 1.0
-NUMBER_FORMAT: Final = "%.10g"
-_HEADER: Final = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
+#: What a user can do about results that were changed by others.
+RERUN_ADVICE: Final = "while the run was in progress; run it again, into another folder (--out)"
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Recorded variables over time.
-
-    Attributes
-    ----------
-    time : ndarray, shape (n,)
-        Times [s].
-    names : tuple of str
-        ``component.variable``.
-    units : tuple of str
-        Units, empty where there is none.
-    values : ndarray, shape (n, n_variables)
-        One row per time.
-    """
-
-    time: FloatArray
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: FloatArray
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.names
-
-    def __getitem__(self, name: str) -> FloatArray:
-        column: FloatArray = self.values[:, self.names.index(name)]
-        return column
-
-    def matching(self, pattern: str) -> tuple[str, ...]:
-        """Return the names that match a pattern (`matcher`), in order."""
-        fits = matcher(pattern)
-        return tuple(n for n in self.names if fits(n))
-
-
-EMPTY: Final = Recording(np.zeros(0), (), (), np.zeros((0, 0)))
-
-
-def header(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Return column titles: ``time [s]``, then ``name [unit]``."""
-    titles = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
-    return ["time [s]", *titles]
-
-
-class Source:
+class RecordedValues:
     """Where values of a recording come from: called when a row is due."""
 
     def __init__(self, names: Sequence[str], values: FloatArray, read: Callable[[], None] = lambda: None) -> None:
@@ -89,7 +42,7 @@ class Recorder:
     ----------
     path : Path
         The CSV file.
-    sources : sequence of Source
+    sources : sequence of RecordedValues
         Groups of variables.
     units : mapping
         Unit by name.
@@ -109,7 +62,7 @@ class Recorder:
     def __init__(
         self,
         path: Path,
-        sources: Sequence[Source],
+        sources: Sequence[RecordedValues],
         units: Mapping[str, str],
         every: int = 1,
         keep: int = 0,
@@ -128,7 +81,7 @@ class Recorder:
         self._goes_on = keep > 0
         self._rows = keep
         titles = _title_line(self.names, self.units)
-        self._file = LineFile(path, _end_of_rows(path, titles, keep) if keep else 0)
+        self._file = AppendOnlyFile(path, _end_of_rows(path, titles, keep) if keep else 0)
         if not keep:
             self._file.write(titles.encode())
 
@@ -155,25 +108,33 @@ class Recorder:
         """The file."""
         return self._file.path
 
-    @property
-    def rows(self) -> int:
-        """How many rows the file must have: those kept and those recorded."""
-        return self._rows
-
-    @property
-    def is_as_written(self) -> bool:
-        """Whether the file holds to the last byte what was kept and recorded."""
-        return self._file.is_as_written
-
     def sync(self) -> None:
         """Write what is waiting and wait until it is on the disk."""
         self._write()
         self._file.sync()
 
-    @property
-    def recording(self) -> Recording:
-        """What is in the file."""
-        return load(self._file.path)
+    def read_back(self, is_complete: bool = True) -> Recording:
+        """Return what is in the file.
+
+        Parameters
+        ----------
+        is_complete : bool
+            Whether the file must hold, to the last byte, what was kept and recorded.
+
+        Raises
+        ------
+        ForeignResultsError
+            If it is no longer the file that was written.
+        """
+        if not self.path.is_file():
+            raise ForeignResultsError(f"{self.path} was removed {RERUN_ADVICE}")
+        found = load(self.path)
+        if is_complete and len(found.time) != self._rows:
+            counts = f"has {len(found.time)} rows, {self._rows} were written"
+            raise ForeignResultsError(f"{self.path} {counts}: it was changed {RERUN_ADVICE}")
+        if is_complete and not self._file.is_as_written:
+            raise ForeignResultsError(f"{self.path} is not what was written: it was changed {RERUN_ADVICE}")
+        return found
 
     def _record(self, time: float) -> None:
         values = [time]
@@ -222,39 +183,3 @@ def _end_of_rows(path: Path, titles: str, rows: int) -> int:
     if len(sizes) < rows:
         raise MasterError(f"{path} has {len(sizes)} rows, the run that is to go on had made {rows}: some are lost")
     return len(titles.encode()) + sum(sizes)
-
-
-def load(path: Path) -> Recording:
-    """Read a recording from its CSV file; a last line cut short by a crash is left out.
-
-    Raises
-    ------
-    MasterError
-        If the file is missing or is not such a recording.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise MasterError(f"{path} cannot be read ({error})") from error
-    first, _, rest = text[: text.rfind("\n") + 1].partition("\n")
-    titles = [plain_cell(cell) for cell in next(csv.reader([first]), [])]
-    if titles[:1] != ["time [s]"]:
-        raise MasterError(f"{path} is not a recording: its first column is not 'time [s]'")
-    return _table(path, titles[1:], rest)
-
-
-def _table(path: Path, titles: Sequence[str], rows: str) -> Recording:
-    columns = len(titles) + 1
-    try:
-        table = np.loadtxt(io.StringIO(rows), delimiter=",", ndmin=2, comments=None) if rows else np.zeros((0, columns))
-    except ValueError as error:
-        raise MasterError(f"{path} is not a recording: {error}") from error
-    if table.shape[1] != columns:
-        raise MasterError(f"{path} is not a recording: {columns} titles, but {table.shape[1]} columns")
-    time = table[:, 0]
-    if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
-        raise MasterError(f"{path} is not a recording: its times are not finite, or do not increase from row to row")
-    parts = [m for t in titles if (m := _HEADER.fullmatch(t))]
-    names = tuple(m["name"] for m in parts)
-    units = tuple(m["unit"] or "" for m in parts)
-    return Recording(time, names, units, table[:, 1:])

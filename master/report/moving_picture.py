@@ -15,12 +15,12 @@ from typing import Any, Final
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray, IntArray
+from master.evaluation.contact_positions import strip_centre
 from master.evaluation.contact_signals import Signals
 from master.evaluation.line_geometry import by_section, indexed, laps, slackness
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.charts.sample_packing import packed, packed_integers
 from master.results.run_results import Results
-from master.system.contacts import strip_centre
 
 #: Most frames, and the shortest time between two [s].
 MOST_FRAMES: Final = 1500

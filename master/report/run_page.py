@@ -9,10 +9,12 @@ import numpy as np
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import Signals
 from master.evaluation.filters import SETTLING, ForceFilter
+from master.evaluation.measured_force import MeasuredComparison
 from master.report import html_markup
-from master.report.charts.measured_charts import Comparison, comparison_chart, comparison_rows
+from master.report.charts.chart import Chart
+from master.report.charts.measured_charts import comparison_chart, comparison_rows
 from master.report.charts.output_charts import HEADS, has_contacts, output_charts, output_rows
-from master.report.charts.run_charts import Chart, run_charts
+from master.report.charts.run_charts import run_charts
 from master.report.moving_picture import Movie, make_movie
 from master.report.result_tables import FILTER_HEADS, calibration_line, figure_rows, filter_rows, uplift_line
 from master.report.run_inputs import Input, inputs_of, provenance_rows, quality_rows
@@ -32,14 +34,14 @@ _CONTENTS: Final = (
 _LINE_CHARTS: Final = ("uplift", "dropper", "elevation", "plan")
 
 
-def page(done: Results, measured: Comparison | None = None) -> str:
+def page(done: Results, measured: MeasuredComparison | None = None) -> str:
     """Return the report of a run as HTML.
 
     Parameters
     ----------
     done : Results
         The run, complete or not.
-    measured : Comparison, optional
+    measured : MeasuredComparison, optional
         A measured contact force beside it.
     """
     summary, signals, assessments = done.summary, done.signals, done.assessments()
@@ -120,7 +122,9 @@ def _figures(done: Results, assessments: tuple[Assessment, ...]) -> str:
         f"<h3>{title}, {html_markup.text(a.contact.pantograph)}</h3>{html_markup.criteria(a)}" for a in assessments
     )
     rows = html_markup.table(heads, figure_rows(assessments))
-    said = [f"{f.sentence}." for f in done.followings] + [t for t in (calibration_line(done), uplift_line(done)) if t]
+    said = [f"{f.sentence}." for f in done.follower_effects] + [
+        t for t in (calibration_line(done), uplift_line(done)) if t
+    ]
     notes = f"<p class='note'>{INTERVAL_NOTE} Filter: {html_markup.text(chosen.sentence)}.</p>"
     notes += "".join(f"<p>{html_markup.text(line)}</p>" for line in said)
     notes += "".join(_filters(a, chosen) for a in assessments)
@@ -178,7 +182,7 @@ def _movie(movie: Movie, signals: tuple[Signals, ...]) -> list[str]:
     ]
 
 
-def _measured(found: Comparison, chart: Chart) -> list[str]:
+def _measured(found: MeasuredComparison, chart: Chart) -> list[str]:
     heads = ("low-passed", "simulated", "measured", "difference")
     rows = html_markup.table(heads, comparison_rows(found))
     where = f"compared from {found.start:.1f} m to {found.end:.1f} m"

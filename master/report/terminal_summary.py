@@ -1,4 +1,4 @@
-"""The terminal as a place for text from others: what an FMU says and a file names is shown, never obeyed.
+"""What a run prints at its end, and the terminal as a place for text from others: shown, never obeyed.
 
 Names, titles and messages come from FMUs and files of unknown origin. A control sequence in one of them could move the
 cursor, colour a failed verdict green or set the clipboard; so every character that does not print is written out as
@@ -8,12 +8,28 @@ its escape. Rich's own sequences, for colours, are made after that and stay.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
 from master.errors import printable
+from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_signals import EvaluationSettings
+from master.report.charts.output_charts import has_contacts, outputs_table
+from master.report.result_tables import (
+    FILTER_HEADS,
+    calibration_line,
+    figures_table,
+    filter_rows,
+    plain_table,
+    uplift_line,
+    verdict_table,
+)
+from master.results.run_results import Results
+
+WIDTH: Final = 80
 
 
 class Terminal(Console):
@@ -37,3 +53,89 @@ def printable_json(text: str) -> str:
     {"said": "\u009b2J"}
     """
     return "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text)
+
+
+def show_run(done: Results) -> None:
+    """Print figures, verdicts and what else there is to know of a run."""
+    console = Terminal(width=WIDTH, highlight=False)
+    assessments = done.assessments()
+    if assessments:
+        heads = [a.contact.pantograph for a in assessments]
+        console.print(figures_table(assessments, heads, [done.evaluation.filter]))
+    for assessment in assessments:
+        _show_verdict(console, assessment, done.evaluation)
+    if not has_contacts(done):
+        console.print(outputs_table(done))
+    elif done.not_judged:
+        console.print(f"not judged: {done.not_judged}", style="yellow", markup=False, soft_wrap=True)
+    elif not assessments:
+        console.print("no contact-quality figures: the run has no contact force in the interval of interest")
+    for line in filter(None, (calibration_line(done), uplift_line(done))):
+        console.print(line, markup=False, soft_wrap=True)
+    for effect in done.follower_effects:
+        console.print(effect.sentence, markup=False, soft_wrap=True)
+    for line in _closing_lines(done):
+        console.print(line, markup=False, soft_wrap=True)
+
+
+def _show_verdict(console: Console, assessment: Assessment, settings: EvaluationSettings) -> None:
+    """Print the verdict of a contact, and what makes it less than certain."""
+    if assessment.withheld:
+        text = f"{assessment.contact.pantograph}: not judged: {assessment.withheld}"
+        console.print(text, style="yellow", markup=False, soft_wrap=True)
+    else:
+        console.print(verdict_table(assessment, settings.limits))
+    if rows := filter_rows(assessment.quality, settings.filter):
+        console.print(f"the extremes of {assessment.contact.pantograph} depend on the filter:", markup=False)
+        console.print(plain_table(FILTER_HEADS, rows))
+    for warning in assessment.warnings:
+        console.print(f"warning: {assessment.contact.pantograph}: {warning}", markup=False)
+
+
+def _closing_lines(done: Results) -> list[str]:
+    performance = done.summary["performance"]
+    lines = [
+        f"wall time {performance['wall_time']:.2f} s, "
+        f"initialization {performance['initialisation_time']:.2f} s, "
+        f"real-time factor {performance['real_time_factor']:.2f}, {performance['peak_memory']:.0f} MB",
+    ]
+    lines += [
+        f"contact {p['contact']}: coupling added {p['energy']:.3g} J of {p['transferred']:.4g} J exchanged"
+        for p in done.summary["interface_power"]
+    ]
+    lines += _energy_lines(done.summary["energy"])
+    if tolerance := tolerance_words({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
+        lines.append(tolerance.removeprefix(", "))
+    return [*lines, *_punctuality_lines(performance.get("real_time")), f"results in {done.folder}"]
+
+
+def _energy_lines(found: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the drifts of the energy balances in one line, and a warning for each that is too large."""
+    drifts = ", ".join(f"{b['what']} {b['share']:.1g} of {b['passed']:.4g} J" for b in found)
+    beyond = [b for b in found if b["exceeded"] is not None]
+    warnings = [f"warning: the energy of {b['what']} does not balance: {b['text']}" for b in beyond]
+    return [f"energy drift: {drifts}", *warnings] if found else []
+
+
+def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
+    """Return how a run kept up with the wall clock, in words."""
+    if found is None:
+        return []
+    jitter, late = found["start_jitter"], found["lateness"]
+    return [
+        f"real time x {found['factor']:g}: {found['missed']} of {found['steps']} deadlines missed "
+        f"({100.0 * found['missed_share']:.3g} %), results late by up to {1e3 * late['maximum']:.3g} ms; "
+        f"steps took {1e3 * found['mean_step']:.3g} ms, the longest {1e3 * found['longest_step']:.3g} ms",
+        f"steps began late by {1e3 * jitter['mean']:.3g} ms on average, {1e3 * jitter['percentile_99']:.3g} ms at "
+        f"99 %, {1e3 * jitter['maximum']:.3g} ms at most",
+    ]
+
+
+def tolerance_words(told: Mapping[str, float | None]) -> str:
+    """Return in words which tolerance the FMUs are told, by their components' names; empty if none is."""
+    values = set(told.values())
+    if values <= {None}:
+        return ""
+    if len(values) == 1:
+        return f", tolerance {values.pop():g} for all FMUs"
+    return ", tolerance " + ", ".join(f"{value:g} for {name}" for name, value in told.items() if value is not None)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from master.errors import MasterError
-from master.recording.recorder import Recording, header, load
-from master.results.run_results import FORCES, TIMESERIES
-from master.safety.safe_files import whole_file
+from master.recording.recording import TIMESERIES, Recording, header, load
+from master.results.results_folder import FORCES
+from master.safety.safe_files import atomic_file
 
 
 def write_parquet(folder: Path) -> tuple[Path, ...]:
@@ -33,6 +33,6 @@ def _write(recording: Recording, path: Path) -> Path:
         raise MasterError("Parquet needs pyarrow: pip install 'openpanto[parquet]'") from error
     titles = header(recording.names, recording.units)
     columns = [recording.time, *recording.values.T]
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         parquet.write_table(pyarrow.table(dict(zip(titles, columns, strict=True))), temporary)
     return path

@@ -18,7 +18,7 @@ SAME_PLACE: Final = 0.1
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RunDifference:
     """Differences of one contact between two runs (second minus first).
 
     Attributes
@@ -50,7 +50,7 @@ class Comparison:
         return f"{text}, at equal times, at which the two are up to {self.apart:.3g} m apart: not at the same places"
 
 
-def compare(a: Results, b: Results) -> tuple[Comparison, ...]:
+def compare(a: Results, b: Results) -> tuple[RunDifference, ...]:
     """Compare the contacts that both runs have.
 
     Raises
@@ -63,7 +63,7 @@ def compare(a: Results, b: Results) -> tuple[Comparison, ...]:
     if not pairs:
         reasons = "".join(f"; {run.folder} is not judged: {run.not_judged}" for run in (a, b) if run.not_judged)
         raise MasterError(f"{a.folder} and {b.folder} have no contact in common that has figures{reasons}")
-    return tuple(Comparison(f, s, *_difference(a, b, f, s)) for f, s in pairs)
+    return tuple(RunDifference(f, s, *_difference(a, b, f, s)) for f, s in pairs)
 
 
 def filter_note(runs: Sequence[Results]) -> str:

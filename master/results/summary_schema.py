@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from master.errors import MasterError, one_line
+from master.evaluation.en50367_limits import OwnLimits, Supply
 
 
 class _Loose(BaseModel):
@@ -50,18 +52,15 @@ class _Filter(BaseModel):
     phase: Literal["zero", "causal"] | None = None
 
 
-class _Limits(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+class _Limits(_Loose):
+    supply: Supply = "AC"
+    __pydantic_extra__: dict[str, float | None] = Field(init=False)
 
-    supply: Literal["AC", "DC3", "DC1.5"] = "AC"
-    mean_upper: float | None = None
-    mean_lower: float | None = None
-    maximum: float | None = None
-    sigma_share: float | None = None
-    statistical_minimum: float | None = None
-    nq: float | None = None
-    uplift: float | None = None
-    height_range: float | None = None
+    @model_validator(mode="after")
+    def _only_known(self) -> _Limits:
+        if unknown := set(self.__pydantic_extra__) - {f.name for f in fields(OwnLimits)}:
+            raise ValueError(f"unknown limit: {', '.join(sorted(unknown))}")
+        return self
 
 
 class _Settings(_Loose):

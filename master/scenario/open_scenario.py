@@ -2,79 +2,32 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from master.errors import Problem, RequestError, ScenarioError
-from master.evaluation import energy_balance as energy
 from master.fmu import fmu_provision
 from master.fmu.fmu_description import lacking_binary, read_fmu
-from master.scenario import scenario_checks
-from master.scenario.start_values import out_of_range, settable
-from master.scenario.system_checks import Checker
+from master.scenario import value_checks
+from master.scenario.overrides import Overrides, effective_settings, with_energy, with_values
+from master.scenario.scenario_checks import ScenarioChecks
 from master.ssp.archive import SSD_NAME, Package, Sources, open_package
-from master.ssp.run_settings import DEFAULT_RECORDS, Record, RunSettings, Scheme
+from master.ssp.run_settings import RunSettings
 from master.ssp.ssd import EMPTY, Structure, read_structure
 from master.ssp.ssd_elements import Component as SsdComponent
 from master.ssp.ssm import NOTE
-from master.ssp.ssp_units import COMMON, conversion, split_quantity
 from master.ssp.ssp_xml import Reader
-from master.system.components import Component, Fmu, System, Variable, without
-from master.system.variable_names import matcher
+from master.system.components import Fmu, System, without
 
 DEFAULT_STEP = 1e-3
 #: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
 MAX_STEPS = 10**7
 #: Smallest step beside the times it leads to: rounding then leaves nine digits of it.
 _RESOLUTION = 1e-7
-#: Causalities of what can be recorded.
-_MEASURED = ("output", "local")
-
-
-@dataclass(frozen=True)
-class Overrides:
-    """What the command line changes in a scenario.
-
-    Attributes
-    ----------
-    stop, step : float, optional
-        Stop time and macro step [s].
-    scheme : str, optional
-        Coupling scheme.
-    parameters : dict
-        Values as text by ``component.parameter``, with a unit (``12 kN``) or in the FMU's own.
-    energy : bool
-        Whether every FMU that can is to keep its energy balance, and that is to be recorded.
-    tolerance : float, optional
-        Relative tolerance for all FMUs, instead of that of their default experiments.
-    strict : bool
-        Whether a warning is a problem.
-    outside : tuple of Path
-        Folders outside the scenario whose files it may name.
-    absent : tuple of str
-        Components that take no part.
-    empty : tuple of str
-        Parameters, ``component.parameter``, of a table that has no value for them; a line's must have one.
-    may_stop_early : bool
-        Whether the stop time may lie before the end of the interval of interest.
-    """
-
-    stop: float | None = None
-    step: float | None = None
-    scheme: Scheme | None = None
-    parameters: Mapping[str, str] = field(default_factory=dict)
-    energy: bool = False
-    tolerance: float | None = None
-    strict: bool = False
-    outside: tuple[Path, ...] = ()
-    absent: tuple[str, ...] = ()
-    empty: tuple[str, ...] = ()
-    may_stop_early: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,11 +90,11 @@ def load_system(
         raise ScenarioError(reader.problems)
     provision = _Provision(build and package.writable, tell, scratch)
     fmus = _fmus(sources, structure.components, reader.problems, provision)
-    checker = Checker(structure, fmus, reader.problems, reader.warnings)
+    checker = ScenarioChecks(structure, fmus, reader.problems, reader.warnings)
     connections = checker.connections()
     components = checker.components(connections)
     times = _times(structure, overrides, reader.problems)
-    settings = _settings(structure, overrides, components, reader.problems)
+    settings = effective_settings(structure, overrides, components, reader.problems)
     reader.problems.extend(_filter_problems(settings, times[2]))
     problems = reader.problems or ([w for w in reader.warnings if w.rule != NOTE] if overrides.strict else [])
     if problems:
@@ -150,16 +103,16 @@ def load_system(
     if overrides.tolerance is not None:
         components = tuple(replace(c, tolerance=overrides.tolerance) for c in components)
     if overrides.energy:
-        components, settings = _with_energy(components, settings)
+        components, settings = with_energy(components, settings)
     warnings = tuple(str(w) for w in _sorted(reader.warnings))
     system = System(package.name, components, connections, *times, settings, warnings, overrides.may_stop_early)
-    text = scenario_checks.empty_cells(system, overrides.empty)
-    if text := text or scenario_checks.half_empty_rows(system, overrides.empty, overrides.absent):
+    text = value_checks.empty_cells(system, overrides.empty)
+    if text := text or value_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)
     system = without(system, overrides.absent)
     if overrides.stop is None and _goes_on_until_end(structure):
         system = _until_end(system)
-    found = list(scenario_checks.problems(system, system.may_stop_early))
+    found = list(value_checks.problems(system, system.may_stop_early))
     if found:
         raise ScenarioError([Problem(SSD_NAME, 0, "interval", text) for text in found])
     return system
@@ -174,7 +127,7 @@ def _goes_on_until_end(structure: Structure) -> bool:
 
 
 def _until_end(system: System) -> System:
-    stop = scenario_checks.stop_after_interval(system)
+    stop = value_checks.stop_after_interval(system)
     text = stop if isinstance(stop, str) else _step_problem(system.start, stop, system.step)
     if text or isinstance(stop, str):
         raise ScenarioError([Problem(SSD_NAME, 0, "stop", text)])
@@ -225,7 +178,7 @@ class _Provision:
 
 def _provide(path: Path, provision: _Provision) -> Fmu | str:
     try:
-        place = fmu_provision.ensure(path, provision.tell, provision.scratch) if provision.build else path
+        place = fmu_provision.provide_fmu(path, provision.tell, provision.scratch) if provision.build else path
         if not place.is_file():
             return "is a folder, not an FMU" if place.is_dir() else "does not exist"
         fmu = read_fmu(place)
@@ -271,146 +224,3 @@ def _filter_problems(settings: RunSettings, step: float) -> Iterator[Problem]:
         half = f"half the sampling frequency, {0.5 / step:g} Hz at a macro step of {step:g} s"
         text = f"Filter cutoff {cutoff:g} Hz is not below {half}: it would filter nothing; lower it or the step"
         yield Problem(SSD_NAME, 0, "annotation", text)
-
-
-def _settings(
-    structure: Structure, overrides: Overrides, components: tuple[Component, ...], problems: list[Problem]
-) -> RunSettings:
-    settings = structure.annotations.settings
-    if overrides.scheme is not None:
-        coupling = settings.coupling.model_copy(update={"scheme": overrides.scheme})
-        settings = settings.model_copy(update={"coupling": coupling})
-    names = sorted(c.name for c in structure.components)
-    order = settings.coupling.order
-    if order and sorted(order) != names:
-        text = f"Coupling order '{' '.join(order)}' must name every component once: {' '.join(names)}"
-        problems.append(Problem(SSD_NAME, 0, "annotation", text))
-    if settings.coupling.scheme == "iterative":
-        problems.extend(
-            Problem(
-                SSD_NAME,
-                0,
-                "fmu",
-                f"scheme iterative: the FMU of '{c.name}' cannot save and restore its state",
-            )
-            for c in components
-            if not c.fmu.can_restore
-        )
-    if len(components) == len(structure.components):  # of an FMU that cannot be read nobody knows the variables
-        problems.extend(Problem(SSD_NAME, 0, "annotation", text) for text in _unknown(settings, components))
-    return settings
-
-
-def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterator[str]:
-    """Yield what the settings name and no component has; a pattern that fits nothing is a typing error."""
-    variables = {f"{c.name}.{v.name}": v for c in components for v in c.fmu.variables.values()}
-    recordable = [n for n, v in variables.items() if v.type != "String" and v.causality in _MEASURED]
-    for record in settings.records:
-        for pattern in record.variables if record not in DEFAULT_RECORDS else ():
-            if not any(map(matcher(pattern), recordable)):
-                yield f"Record variables: '{pattern}' fits no output or local variable of the components"
-    wanted = settings.calibration
-    if wanted is not None and (wanted.parameter not in variables or settable(variables[wanted.parameter], "Real")):
-        yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components"
-
-
-def with_values(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
-    """Return components with other parameter values.
-
-    Parameters
-    ----------
-    components : tuple of Component
-    values : mapping
-        Values as text, with a unit or in the FMU's own, by ``component.parameter``.
-
-    Raises
-    ------
-    RequestError
-        If there is no such parameter, or it cannot take the value.
-    """
-    for full, text in values.items():
-        index, variable = find_parameter(components, full)
-        old = components[index]
-        changed = replace(old, parameters={**old.parameters, variable.name: _typed(old.fmu, variable, full, text)})
-        components = (*components[:index], changed, *components[index + 1 :])
-    return components
-
-
-def _with_energy(components: tuple[Component, ...], settings: RunSettings) -> tuple[tuple[Component, ...], RunSettings]:
-    """Make the components that can keep their energy balance do so, and record it."""
-    able = [energy.MONITOR in c.fmu.variables for c in components]
-    if not any(able):
-        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{energy.MONITOR}'; build them anew")
-    watched = tuple(
-        replace(c, parameters={**c.parameters, energy.MONITOR: 1}) if can else c
-        for c, can in zip(components, able, strict=True)
-    )
-    record = Record(variables=energy.VARIABLES, every=energy.INTERVAL)
-    return watched, settings.model_copy(update={"records": (*settings.records, record)})
-
-
-def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, Variable]:
-    """Find ``component.parameter``; returns the component's index and the variable.
-
-    Raises
-    ------
-    RequestError
-        Naming the nearest parameters, if there is no such one.
-    """
-    for index, component in enumerate(components):
-        variable = component.fmu.variables.get(full[len(component.name) + 1 :])
-        if full.startswith(f"{component.name}.") and variable is not None:
-            return index, variable
-    settables = [
-        f"{c.name}.{v.name}" for c in components for v in c.fmu.variables.values() if v.causality == "parameter"
-    ]
-    near = difflib.get_close_matches(full, settables, n=3, cutoff=0.5)
-    hint = f"; did you mean {' or '.join(near)}?" if near else ""
-    raise RequestError(f"there is no parameter '{full}' in the scenario{hint}")
-
-
-def _typed(fmu: Fmu, variable: Variable, full: str, text: str) -> float | int | bool | str:
-    reason = settable(variable, variable.type if variable.type != "Enumeration" else "Integer")
-    if reason:
-        raise RequestError(f"parameter '{full}' {reason}")
-    if variable.type == "String":
-        return text
-    if variable.type == "Boolean":
-        if text.lower() not in ("true", "false", "1", "0"):
-            raise RequestError(f"parameter '{full}': '{text}' is neither true nor false")
-        return text.lower() in ("true", "1")
-    items = dict(variable.items)
-    number = items[text] if text in items else _number(fmu, variable, full, text)
-    reason = out_of_range(variable, number)
-    if reason:
-        raise RequestError(f"parameter '{full}' {reason}")
-    return number
-
-
-def _number(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
-    return _quantity(fmu, variable, full, text) if variable.type == "Real" else _whole(full, text)
-
-
-def _whole(full: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise RequestError(f"parameter '{full}': '{text}' is not a whole number") from None
-
-
-def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
-    """Return a number in the FMU's unit from a text with or without a unit of its own."""
-    number, unit = split_quantity(text)
-    if number is None:
-        example = f", or a number with its unit ('{variable.start or 1} {variable.unit}')" if variable.unit else ""
-        raise RequestError(f"parameter '{full}': '{text}' is not a number{example}")
-    if not unit or unit == variable.unit:
-        return number
-    known = {**fmu.units, **COMMON}
-    if unit not in known:
-        raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known (known: {', '.join(known)})")
-    found = conversion(known[unit], known[variable.unit]) if variable.unit in known else None
-    if found is None:
-        wanted = f"a unit of {variable.unit}" if variable.unit else "no unit: the FMU declares none"
-        raise RequestError(f"parameter '{full}' = {text}: give it in {wanted}")
-    return found(number)

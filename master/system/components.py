@@ -10,8 +10,9 @@ from typing import Final
 
 from master.errors import RequestError
 from master.ssp.run_settings import RunSettings
-from master.ssp.ssp_units import Conversion, Unit
+from master.ssp.ssp_units import Unit
 from master.ssp.ssv import Value
+from master.system.connections import Connection
 
 #: Share of a step by which the stop time may miss a whole number of steps for want of digits.
 _ROUNDING: Final = 1e-6
@@ -99,17 +100,6 @@ class Component:
     def texts(self) -> tuple[str, ...]:
         """Exchanged variables that are strings."""
         return tuple(n for n in (*self.inputs, *self.outputs) if self.fmu.variables[n].type == "String")
-
-
-@dataclass(frozen=True)
-class Connection:
-    """From one component's output to another's input: input = conversion(output)."""
-
-    source: str
-    output: str
-    target: str
-    input: str
-    conversion: Conversion = field(default_factory=Conversion)
 
 
 @dataclass(frozen=True)

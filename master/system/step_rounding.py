@@ -12,7 +12,7 @@ from master.system.variable_names import matcher
 #: Causalities of what is recorded besides the exchanged outputs.
 MEASURED: Final = ("output", "local")
 #: Share of a step by which a time may miss a whole number of steps for want of digits.
-_ROUNDING: Final = 1e-6
+ROUNDING: Final = 1e-6
 
 
 def adjustments(system: System, checkpoint_every: float | None = None) -> tuple[str, ...]:
@@ -30,7 +30,7 @@ def adjustments(system: System, checkpoint_every: float | None = None) -> tuple[
 def _adjustments(system: System, checkpoint_every: float | None) -> Iterator[str]:
     h = system.step
     end = system.start + system.step_count * h
-    if abs(end - system.stop) > _ROUNDING * h:
+    if abs(end - system.stop) > ROUNDING * h:
         yield f"the run ends at {end:.9g} s, not at {system.stop:.9g} s, {_no_multiple(h)}"
     for every in sorted({r.every for r in _used(system)}):
         if text := _changed(every, h):
@@ -51,7 +51,7 @@ def _changed(period: float, step: float) -> str:
 
 
 def _differs(kept: float, period: float, step: float) -> bool:
-    return abs(kept - period) > _ROUNDING * step
+    return abs(kept - period) > ROUNDING * step
 
 
 def steps_in(period: float, step: float) -> int:

@@ -1,8 +1,14 @@
-"""Patterns of variable names, in which ``*`` stands for anything."""
+"""Names of variables that the master knows, and patterns of names, in which ``*`` stands for anything."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
+
+#: The parameter that makes an FMU keep its energy balance, what it says then, and how often that is recorded [s].
+ENERGY_MONITOR: Final = "monitor_energy"
+ENERGY_VARIABLES: Final = ("*.energy.*", "*contact.work")
+ENERGY_INTERVAL: Final = 0.05
 
 
 def matcher(pattern: str) -> Callable[[str], bool]:

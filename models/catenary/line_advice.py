@@ -9,9 +9,9 @@ import math
 from collections.abc import Sequence
 from typing import Final, Protocol
 
+from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition, Contact
 from models.catenary.statics.elasticity import OPERATION_LIMIT, contact_wire_wave_speed
-from models.definition_files.parameter import FloatArray
 
 #: Contact force at which the stiffness of a law with an exponent is taken [N].
 _REFERENCE_FORCE: Final = 200.0

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import FloatArray, IntArray, Snapshot
 from models.catenary.line_model import CatenaryModel, CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.sparse_products import Product, inner
-from models.definition_files.parameter import FloatArray, IntArray, Snapshot
 from models.numerics.energy_ledger import Ledger
 
 #: A force on a strip: pantograph, share of the way from A to B, force [N].
@@ -89,9 +89,9 @@ class LineBalance:
         total = 0.0
         for loaded, load in instants:
             for (s, element), (xi, force) in zip(loaded.tolist(), load.tolist(), strict=True):
-                touch = self._model.wires[s].touch(element, xi)
-                interval = touch.interval
-                rise = touch.modal.dot(self._modal[interval.modes]) + touch.ends.dot(self._attached[interval.ends])
+                interval = self._model.wires[s].interval(element)
+                modal, ends = interval.split(interval.lift(element, xi)[0])
+                rise = modal.dot(self._modal[interval.modes]) + ends.dot(self._attached[interval.ends])
                 total += 0.5 * force * float(rise)
         return total
 

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, fields
-from functools import partial
+from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import BoolArray, FloatArray, IntArray, Snapshot
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
-from models.catenary.contact_and_slack.local_problem import LocalForces, LocalProblem, LocalSolutionError, OpenContact
-from models.catenary.contact_and_slack.wire_response import Meeting, Reaction
+from models.catenary.contact_and_slack.local_problem import (
+    ContactCandidate,
+    LocalForces,
+    LocalProblem,
+    LocalSolutionError,
+)
+from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.interval_modes import IntervalModes, interval_modes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.sparse_products import Product, inner
-from models.catenary.meeting import FreeMotion
+from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_form
 from models.catenary.shape.line_matrices import (
@@ -37,16 +42,13 @@ from models.catenary.shape.wire_intervals import (
     plan_rotation,
     without_rounding,
 )
-from models.catenary.step.numba_engine import make_stepper
-from models.catenary.step.numpy_engine import Known, Stepper, local_motion
+from models.catenary.step.engine_choice import make_engine
+from models.catenary.step.step_engine import AppliedForce, StepEngine
 from models.contact_law import CONTACT_LAWS
-from models.definition_files.parameter import BoolArray, FloatArray, IntArray, Snapshot
 from models.numerics.newmark import Newmark
 
 #: Step sizes whose factorisation is kept.
 _KEPT_STEPS = 3
-#: Intervals of the contact wires whose response is kept.
-_KEPT_INTERVALS = 12
 #: No forces on the contact wires.
 _NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
 
@@ -130,11 +132,10 @@ class StripMotion:
 class _Step:
     """What belongs to one step size; ``pull`` finds what a change of the attachments in it adds to droppers' pulls."""
 
-    stepper: Stepper
+    engine: StepEngine
     pull: Product
-    compliance: Compliance
     local: LocalProblem
-    reactions: dict[tuple[int, int], Reaction] = field(default_factory=dict)
+    responses: ResponseCache
 
 
 class CatenaryModel:
@@ -242,13 +243,15 @@ class CatenaryModel:
         """
         now = self._step(step)
         free_force = self._begin(now, state)
-        contacts, crossings = self._open_contacts(now, state, motion)
+        candidates = self._candidates(now, state, motion)
+        # One that was closed stays among the contacts: other forces of the step may keep it so.
+        contacts = [c for c in candidates if c.penetration > 0.0 or c.impact_velocity > 0.0]
         compliance = self._strip_compliance(contacts, motion)
         forces = now.local.solve(free_force, contacts, compliance, state.slack)
         self._apply(now, contacts, forces)
-        now.stepper.finish(state.motion)
+        now.engine.finish(state.motion)
         self._note(state, contacts, forces)
-        return self._in_lap(self._result(now, state, contacts, crossings, forces), motion.strip)
+        return self._in_lap(self._result(now, state, candidates, contacts, forces), motion.strip)
 
     def push(self, state: CatenaryState, step: float, forces: Sequence[tuple[int, float, float]]) -> None:
         """Advance the line by one time step under given vertical forces on its contact wires.
@@ -272,13 +275,13 @@ class CatenaryModel:
         placed = [(s, *self.wires[s].locate(x), force) for s, x, force in forces]
         for s, element, xi, force in placed:
             interval = self.wires[s].interval(element)
-            point = self._reaction(now, s, interval).point(element - interval.first, xi)
-            now.stepper.apply(point, force)
-            columns = point.reaction.columns
+            point = now.responses.of(interval).point(element, xi)
+            now.engine.apply(point, force)
+            columns = point.response.columns
             pull[columns.dropper_index] += columns.dropper_force @ (force * point.load)
         found = now.local.solve(pull, (), np.zeros((0, 0)), state.slack)
         self._apply(now, (), found)
-        now.stepper.finish(state.motion)
+        now.engine.finish(state.motion)
         state.slack, state.compensation = found.slack, found.compensation
         state.loaded = np.array([(s, element) for s, element, _, _ in placed], dtype=np.int64).reshape(-1, 2)
         state.load = np.array([(xi, force) for _, _, xi, force in placed]).reshape(-1, 2)
@@ -291,10 +294,9 @@ class CatenaryModel:
         strips : ndarray, shape (n_pantographs, 2, 2, 3)
         """
         result = self._empty_result(len(strips))
-        motion = partial(local_motion, motion=state.motion)
 
         def positions(interval: WireInterval) -> list[float]:
-            return interval.positions(motion(interval)[0])
+            return interval.positions(interval.local(state.motion)[0])
 
         for p, strip in enumerate(strips):
             for s, wire in enumerate(self.wires):
@@ -302,12 +304,13 @@ class CatenaryModel:
                 if found is None:
                     continue
                 state.element[p, s] = found.element
-                local, touch = motion(wire.interval(found.element)), wire.touch(found.element, found.xi)
-                rise, speed = local.dot(touch.row).tolist()
-                delta, rate = self._penetration(found.share, touch.height + rise, speed, strip)
+                interval = wire.interval(found.element)
+                local, (row, height) = interval.local(state.motion), interval.lift(found.element, found.xi)
+                rise, speed = local.dot(row).tolist()
+                delta, rate = self._penetration(found.share, height + rise, speed, strip)
                 law = self._law(delta, rate, max(rate, 0.0), self.definition.contact)
                 result.force[p, s] = law.scaled(found.engagement).force
-                result.point[p, s] = *touch.interval.at(found, local[0]), touch.height + rise
+                result.point[p, s] = *interval.at(found, local[0]), height + rise
         return self._in_lap(result, strips)
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
@@ -424,9 +427,10 @@ class CatenaryModel:
     def _new_step(self, step: float) -> _Step:
         newmark = Newmark(step)
         with self._solvable(f"make steps of {step:g} s"):
-            stepper = make_stepper(self.modes, newmark)
+            matrices = StepMatrices(self.modes, newmark)
+            engine = make_engine(matrices)
         by_change = self.dropper_stiffness * (1.0 + newmark.a1 * self.slack_delay)
-        compliance = Compliance(stepper.factor, self.B, by_change)
+        compliance = Compliance(matrices.factor, self.B, by_change)
         local = LocalProblem(
             unilateral=self.unilateral,
             dropper_columns=compliance.dropper_columns,
@@ -434,7 +438,8 @@ class CatenaryModel:
             law=self._law,
             parameters=self.definition.contact,
         )
-        return _Step(stepper, Product(sp.diags(by_change) @ self.B), compliance, local)
+        responses = ResponseCache(engine.response, compliance, len(self.wires))
+        return _Step(engine, Product(sp.diags(by_change) @ self.B), local, responses)
 
     def _begin(self, now: _Step, state: CatenaryState) -> FloatArray:
         """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N].
@@ -445,69 +450,40 @@ class CatenaryModel:
         for j, force in zip(state.slack.tolist(), state.compensation.tolist(), strict=True):
             places, stretch = self._stretch[j]
             pressed[places] -= force * stretch
-        known = []
+        applied = []
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
-            interval = self.wires[s].interval(element)
-            known.append(Known(self._reaction(now, s, interval), element - interval.first, xi, force))
-        now.stepper.begin(state.motion, pressed, known)
+            response = now.responses.of(self.wires[s].interval(element))
+            applied.append(AppliedForce(response, element, xi, force))
+        now.engine.begin(state.motion, pressed, applied)
         pull = self.static.elastic_force.copy()
         self._pull.add(state.motion.attached.ravel(), pull)
-        now.pull.add(now.stepper.attached, pull)
+        now.pull.add(now.engine.attached, pull)
         return pull
 
-    def _open_contacts(
-        self, now: _Step, state: CatenaryState, motion: StripMotion
-    ) -> tuple[list[OpenContact], list[tuple[int, int, Meeting]]]:
-        contacts, crossings = [], []
+    def _candidates(self, now: _Step, state: CatenaryState, motion: StripMotion) -> list[ContactCandidate]:
+        """Return all strips that cross a wire at the end of the step, forces found inside it left out."""
+        candidates = []
         for s, wire in enumerate(self.wires):
-            free = FreeMotion(wire, partial(self._reaction, now, s), now.stepper, state.motion)
             for p, strip in enumerate(motion.strip):
-                met = free.meet(strip, int(state.element[p, s]))
+                if not wire.is_near(strip):
+                    continue
+                met = now.engine.meet(wire, now.responses.of, strip, int(state.element[p, s]), state.motion)
                 if met is None:
                     continue
-                crossings.append((p, s, met))
-                state.element[p, s] = met.crossing.element
-                height = met.point.touch.height + met.rise
-                delta, rate = self._penetration(met.crossing.share, height, met.rate, strip)
+                crossing, point, rise, speed = met
+                state.element[p, s] = crossing.element
+                delta, rate = self._penetration(crossing.share, point.height + rise, speed, strip)
                 impact = float(state.impact_velocity[p, s])
-                # One that was closed stays among the candidates: other forces of the step may keep it so.
-                if delta > 0.0 or impact > 0.0:
-                    contacts.append(OpenContact(p, s, met, delta, rate, impact))
-                self._prepare(now, s, wire.next_interval(met.crossing.element))
-        return contacts, crossings
+                candidates.append(ContactCandidate(p, s, crossing, point, delta, rate, impact))
+                now.responses.prepare(wire.next_interval(crossing.element))
+        return candidates
 
     def _penetration(self, share: float, height: float, rate: float, strip: FloatArray) -> tuple[float, float]:
         """Return penetration and its velocity of a strip, where a wire of some height crosses it."""
         (z_a, v_a), (z_b, v_b) = strip[:, :, 2].tolist()
         return z_a + share * (z_b - z_a) - (height - self._radii), v_a + share * (v_b - v_a) - rate
 
-    def _reaction(self, now: _Step, section: int, interval: WireInterval) -> Reaction:
-        """Return how a wire gives way about an interval; found once per interval that a strip visits."""
-        kept = now.reactions
-        found = kept.get((section, interval.first))
-        if found is None:
-            stepper, columns = now.stepper, now.compliance.units(interval.ends)
-            inverse = stepper.inverse[interval.modes]
-            found = Reaction(
-                interval=interval,
-                inverse=inverse,
-                yielding=inverse[:, None] * stepper.coupling(interval.modes, interval.ends),
-                columns=columns,
-                at_ends=columns.at(interval.ends),
-                slots=stepper.slots(interval.modes),
-                reached=np.arange(len(self.modes.attached))[columns.rows].astype(np.uint64),
-            )
-            while len(kept) >= _KEPT_INTERVALS * len(self.wires):
-                del kept[next(iter(kept))]
-            kept[(section, interval.first)] = found
-        return found
-
-    def _prepare(self, now: _Step, section: int, interval: WireInterval) -> None:
-        """Find a part of how a wire gives way about an interval before a strip gets there: no step shall take long."""
-        if (section, interval.first) not in now.reactions and now.compliance.prepare(interval.ends):
-            self._reaction(now, section, interval)
-
-    def _strip_compliance(self, contacts: Sequence[OpenContact], motion: StripMotion) -> FloatArray:
+    def _strip_compliance(self, contacts: Sequence[ContactCandidate], motion: StripMotion) -> FloatArray:
         """Two contacts of one strip share its retreat."""
         if len(contacts) == 1:
             return motion.compliance[contacts[0].pantograph].reshape(1, 1)
@@ -516,17 +492,17 @@ class CatenaryModel:
             len(owners), len(owners)
         )
 
-    def _apply(self, now: _Step, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
+    def _apply(self, now: _Step, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
         """Add what contact and compensation forces change within the step."""
-        stepper = now.stepper
+        engine = now.engine
         for contact, force in zip(contacts, forces.contact, strict=True):
             if force != 0.0:
-                stepper.apply(contact.meeting.point, force)
+                engine.apply(contact.point, force)
         for j, compensation in zip(forces.slack.tolist(), forces.compensation.tolist(), strict=True):
             column = now.local.dropper_columns[j]
-            stepper.attached[column.rows] -= compensation * column.values[:, 0]
+            engine.attached[column.rows] -= compensation * column.values[:, 0]
 
-    def _note(self, state: CatenaryState, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
+    def _note(self, state: CatenaryState, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
         """Note the forces at the end of the step; the next one begins with them."""
         state.slack, state.compensation = forces.slack, forces.compensation
         state.impact_velocity[...] = 0.0
@@ -536,7 +512,7 @@ class CatenaryModel:
                 state.impact_velocity[contact.pantograph, contact.section] = impact
         state.loaded, state.load = _NOWHERE, _NOTHING
         if contacts:
-            places = [c.meeting.crossing for c in contacts]
+            places = [c.crossing for c in contacts]
             state.loaded = np.array([(c.section, place.element) for c, place in zip(contacts, places, strict=True)])
             state.load = np.array([(place.xi, f) for place, f in zip(places, forces.contact, strict=True)])
 
@@ -544,15 +520,15 @@ class CatenaryModel:
         self,
         now: _Step,
         state: CatenaryState,
-        contacts: Sequence[OpenContact],
-        crossings: Sequence[tuple[int, int, Meeting]],
+        candidates: Sequence[ContactCandidate],
+        contacts: Sequence[ContactCandidate],
         forces: LocalForces,
     ) -> ContactResult:
         result = self._empty_result(len(state.element))
         for contact, force in zip(contacts, forces.contact, strict=True):
             result.force[contact.pantograph, contact.section] = force
-        for p, s, met in crossings:
-            now.stepper.place(met.crossing, met.point, state.motion, result.point[p, s])
+        for p, s, crossing, point, *_ in candidates:
+            now.engine.place(crossing, point, state.motion, result.point[p, s])
         return result
 
     def _in_lap(self, result: ContactResult, strips: FloatArray) -> ContactResult:

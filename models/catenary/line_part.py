@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.arrays import FloatArray, IntArray, Snapshot
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_energy import LineBalance
 from models.catenary.line_model import CatenaryModel, CatenaryState, ContactResult, StripMotion
@@ -13,7 +14,6 @@ from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.statics.elasticity import contact_wire_wave_speed, elasticity
 from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
 from models.contact_law import application_point
-from models.definition_files.parameter import FloatArray, IntArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import StripExtrapolation
 from models.numerics.newmark import steps_within

@@ -7,7 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import BoolArray, FloatArray, ParameterError
+from models.arrays import BoolArray, FloatArray
+from models.definition_files.parameter import ParameterError
 
 #: Contact force at the first instant that is warned of, and that no line is meant for [N]: EN 50367 allows 400 N
 #: at most while running, and a strip that is pushed into the wire on purpose is so by a few centimetres.

@@ -1,55 +1,5 @@
-"""Command line of the physics: one module a verb, each with ``add(subparsers)`` and ``run(arguments)``."""
+"""The command line of the physics, ``python -m models VERB``: one ``*_command`` a verb, put together by `physics_main`.
 
-from __future__ import annotations
-
-import argparse
-import sys
-from collections.abc import Sequence
-
-from models.catenary.contact_and_slack.local_problem import LocalSolutionError
-from models.catenary.shape.form_finding import EquilibriumError
-from models.catenary.step.numba_engine import KernelError
-from models.commands import couple_command, identify_command, pantograph_command, statics_command
-from models.definition_files.parameter import ParameterError
-from models.definition_files.toml_reader import DefinitionError, printable
-from models.library import UnknownNameError
-from models.pantograph.multibody.mechanism import MechanismError
-
-_VERBS = (couple_command, statics_command, pantograph_command, identify_command)
-#: What a user can cause; everything else is a defect and keeps its traceback.
-_USER_ERRORS = (
-    DefinitionError,
-    EquilibriumError,
-    KernelError,
-    LocalSolutionError,
-    MechanismError,
-    ParameterError,
-    UnknownNameError,
-)
-
-
-def main(argv: Sequence[str]) -> int:
-    """Run ``python -m models``; return 0, 1 (failed or invalid) or 2 (a command line that was not understood)."""
-    parser = argparse.ArgumentParser(prog="python -m models", description="Physics of lines and pantographs.")
-    subparsers = parser.add_subparsers(dest="verb", required=True)
-    for verb in _VERBS:
-        verb.add(subparsers)
-    arguments = parser.parse_args(argv)
-    try:
-        code = int(arguments.run(arguments))
-        if sys.stdout is not None:  # closed by the caller
-            sys.stdout.flush()  # here, where an error can still be told
-    except OSError as error:
-        text = f"{error.filename or 'standard output'}: {error.strerror or error}"
-        print(f"error: {printable(text)}", file=sys.stderr)
-        return 1
-    except _USER_ERRORS as error:
-        print(f"error: {printable(str(error))}", file=sys.stderr)
-        return 1
-    except MemoryError:
-        print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 1
-    return code
+Of the other packages the room may import the master's filters and figures of a contact force alone, so that both judge
+a run alike; it does not travel inside an FMU, and may use rich and matplotlib.
+"""

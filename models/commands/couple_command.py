@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from master.evaluation.contact_quality import Quality, Sampled, early_warning, figures_of
 from master.evaluation.filters import SETTLING, ForceFilter, evaluated, low_pass, stands_in
+from models.arrays import FloatArray
 from models.catenary import line_advice as limits
 from models.catenary.definition.line_definition import SHORTEST_STEP
 from models.catenary.line_model import CatenaryModel
@@ -32,8 +33,8 @@ from models.commands.physics_options import (
     warn,
 )
 from models.coupled.monolithic import CoupledModel, CoupledRecord
-from models.definition_files.parameter import FloatArray, ParameterError
-from models.library import load_line, load_lumped
+from models.definition_files.parameter import ParameterError
+from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_advice import working_height_warning
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 

@@ -12,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from models.arrays import FloatArray
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.physics_options import add_settings, finite, new_folder, print_table, settings, warn
-from models.definition_files.parameter import FloatArray, ParameterError
-from models.library import load_pantograph
+from models.definition_files.parameter import ParameterError
+from models.library.catalogue import load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig

@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.definition_files.parameter import FloatArray, ParameterError
+from models.arrays import FloatArray
+from models.definition_files.parameter import ParameterError
 
 #: What a file that is being written is called.
 _PART: Final = ".part"

@@ -18,7 +18,7 @@ from models.commands import statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
-from models.library import load_line
+from models.library.catalogue import load_line
 
 
 @dataclass(frozen=True)

@@ -1,34 +1,158 @@
 """Frozen dataclasses whose fields know their unit, range and meaning.
 
-One declaration serves three readers: the definition file is checked against it, an FMU shows it as a
-parameter, and a report prints it.
+One declaration serves three readers: the definition file is checked against it, an FMU shows it as a parameter, and a
+report prints it. A definition declares what it consists of, numbers and the tables that hold them::
+
+    @dataclass(frozen=True, kw_only=True)
+    class Line:
+        tension: float = quantity("N", "tension", minimum=500.0, maximum=1e5)
+        mesh: Mesh = part(Mesh, default=Mesh())                 # [mesh]
+        bodies: tuple[Body, ...] = named("body", Body)          # [body.NAME]
+
+and `read` fills it, `parameters` lists its tunable numbers, `with_values` changes them. What depends on more than one
+field, a class says in a method ``problems()``, which yields pairs of a key (may be empty) and a text.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Final, Protocol, TypeVar, runtime_checkable
 
 from models.definition_files.parameter import Parameter, ParameterError
 from models.definition_files.si_units import shown
 from models.definition_files.toml_reader import SMALLEST, Quantity, Table, beyond_all, in_its_unit
 
 _META = "openpanto"
+#: Names of elements: parts of dotted parameter names.
+_NAME: Final = re.compile(r"[\w-]+")
+XYZ: Final = ("x", "y", "z")
 T = TypeVar("T")
 
 
+@runtime_checkable
+class Checked(Protocol):
+    """A dataclass with values that must fit together."""
+
+    def problems(self) -> Iterable[tuple[str, str]]:
+        """Yield a key and what is wrong with it, for every problem."""
+
+
+class _Spec(Protocol):
+    """What a field knows of itself."""
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        """Read the field from a table."""
+
+
 @dataclass(frozen=True)
-class _Spec:
+class _Number:
+    """A number, or several with a label each."""
+
     unit: str
     description: str
     minimum: float
     maximum: float
-    positive: bool
-    integer: bool
-    tunable: bool
+    positive: bool = False
+    integer: bool = False
+    tunable: bool = True
+    labels: tuple[str, ...] = ()
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        if default is None and not table.has(name):
+            return None
+        fallback = None if default in (dataclasses.MISSING, None) else default
+        if self.integer:
+            return table.integer(name, default=fallback, minimum=int(self.minimum), maximum=int(self.maximum))
+        limits: dict[str, Any] = {"minimum": self.minimum, "maximum": self.maximum, "positive": self.positive}
+        if self.labels:
+            return table.quantities(name, self.unit, length=len(self.labels), default=fallback, **limits)
+        return table.quantity(name, self.unit, default=fallback, **limits)
+
+    def names(self, name: str) -> tuple[str, ...]:
+        """Return the names of the parameters that a field of some name makes."""
+        return tuple(f"{name}.{label}" for label in self.labels) or (name,)
+
+    def values(self, value: Any) -> tuple[float, ...]:
+        """Return the numbers that a field holds."""
+        return tuple(map(float, value)) if self.labels else (float(value),)
+
+    def replaced(self, old: Any, name: str, wanted: str, value: float) -> Any:
+        """Return the field's value with one of its numbers replaced."""
+        if not self.labels:
+            return int(value) if self.integer else float(value)
+        return tuple(
+            float(value) if n == wanted else component for n, component in zip(self.names(name), old, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class _Direction:
+    """A direction in space, kept as a unit vector."""
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        if default is None and not table.has(name):
+            return None
+        x, y, z = table.quantities(name, "1", length=3)
+        length = math.sqrt(x * x + y * y + z * z)
+        if length == 0.0:
+            table.problem(name, "the axis has no direction: all its components are 0")
+            return x, y, z
+        return x / length, y / length, z / length
+
+
+@dataclass(frozen=True)
+class _Text:
+    """A text, one of the choices if there are any."""
+
+    choices: Iterable[str] | None
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        return table.text(name, default=None if default is dataclasses.MISSING else default, choices=self.choices)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A dataclass in a table of its own."""
+
+    cls: type[Any]
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        if default is dataclasses.MISSING:
+            return read(self.cls, table.required_table(name))
+        inner = table.table(name)
+        return default if inner is None else read(self.cls, inner)
+
+
+@dataclass(frozen=True)
+class _Named:
+    """Dataclasses with a name, in tables ``[key.NAME]``; their class may depend on the text ``kind`` in each."""
+
+    key: str
+    kinds: type[Any] | Mapping[str, type[Any]]
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        every = table.table(self.key)
+        if every is None:
+            return ()
+        for given in every.names():
+            if not _NAME.fullmatch(given):
+                every.problem(given, "a name is made of letters, digits, '_' and '-'")
+        inner = ((given, every.table(given)) for given in every.names())
+        read_all = (self._read_one(given, one) for given, one in inner if one is not None)
+        return tuple(item for item in read_all if item is not None)
+
+    def _read_one(self, name: str, table: Table) -> Any:
+        if isinstance(self.kinds, type):
+            return read(self.kinds, table, name=name)
+        kind = table.text("kind", choices=self.kinds)
+        if kind in self.kinds:
+            return read(self.kinds[kind], table, name=name)
+        table.accept_all()  # what the other keys mean depends on the kind
+        return None
 
 
 def quantity(
@@ -41,25 +165,73 @@ def quantity(
     positive: bool = False,
     tunable: bool = True,
 ) -> Any:
-    """Declare a physical value of a dataclass; ``default=None`` makes it optional without a value."""
-    spec = _Spec(unit, description, minimum, maximum, positive, integer=False, tunable=tunable)
-    return dataclasses.field(default=default, metadata={_META: spec})
+    """Declare a physical value; ``default=None`` makes it optional without a value.
+
+    ``{name}`` in a description stands for the name of the element that it belongs to.
+    """
+    return _field(_Number(unit, description, minimum, maximum, positive, tunable=tunable), default)
+
+
+def vector(
+    unit: str,
+    description: str,
+    *,
+    labels: tuple[str, ...] = XYZ,
+    default: Any = dataclasses.MISSING,
+    minimum: float = -math.inf,
+    maximum: float = math.inf,
+    tunable: bool = True,
+) -> Any:
+    """Declare physical values written as one list, a tuple; the parameters are NAME.LABEL."""
+    return _field(_Number(unit, description, minimum, maximum, tunable=tunable, labels=labels), default)
+
+
+def direction(*, default: Any = dataclasses.MISSING) -> Any:
+    """Declare a direction in space, written with any length and kept as a unit vector."""
+    return _field(_Direction(), default)
 
 
 def count(description: str, *, default: Any = dataclasses.MISSING, minimum: int = 0, maximum: int = 10**6) -> Any:
-    """Declare a whole number of a dataclass."""
-    spec = _Spec("1", description, minimum, maximum, positive=False, integer=True, tunable=True)
+    """Declare a whole number."""
+    return _field(_Number("1", description, minimum, maximum, integer=True), default)
+
+
+def monitoring() -> Any:
+    """Declare the number of a definition that says whether the balance is kept."""
+    return count("whether the energy balance is kept, for energy.* and contact.work: 0 no, 1 yes", default=0, maximum=1)
+
+
+def text(*, default: Any = dataclasses.MISSING, choices: Iterable[str] | None = None) -> Any:
+    """Declare a text."""
+    return _field(_Text(choices), default)
+
+
+def part(cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:
+    """Declare a dataclass that has a table of its own; ``default=None`` makes it optional."""
+    return _field(_Part(cls), default)
+
+
+def named(key: str, kinds: type[Any] | Mapping[str, type[Any]]) -> Any:
+    """Declare the tables ``[key.NAME]``: a tuple of dataclasses with a ``name``, of the class that ``kind`` says."""
+    return _field(_Named(key, kinds), dataclasses.MISSING)
+
+
+def _field(spec: _Spec, default: Any) -> Any:
     return dataclasses.field(default=default, metadata={_META: spec})
 
 
 def read(cls: type[T], table: Table, **given: Any) -> T:
-    """Fill a dataclass from a table; fields without a declared quantity come from ``given``."""
+    """Fill a dataclass from a table; fields that declare nothing come from ``given``."""
     values = dict(given)
-    for name, spec, default in _specs(cls):
-        if name in values:
-            continue
-        values[name] = _read_one(table, name, spec, default)
-    return cls(**values)
+    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        spec: _Spec | None = field.metadata.get(_META)
+        if spec is not None and field.name not in values:
+            values[field.name] = spec.read(table, field.name, field.default)
+    result = cls(**values)
+    if isinstance(result, Checked):
+        for key, problem in result.problems():
+            table.problem(key, problem)
+    return result
 
 
 def parameters(obj: Any, provenance: Mapping[str, Quantity], prefix: str = "") -> Iterator[Parameter]:
@@ -74,17 +246,14 @@ def parameters(obj: Any, provenance: Mapping[str, Quantity], prefix: str = "") -
         Dotted path of ``obj``.
     """
     for field in dataclasses.fields(obj):
-        value = getattr(obj, field.name)
-        name = f"{prefix}.{field.name}" if prefix else field.name
-        spec = field.metadata.get(_META)
-        if spec is not None and spec.tunable and value is not None:
-            yield _parameter(name, value, spec, provenance)
-        elif dataclasses.is_dataclass(value):
-            yield from parameters(value, provenance, name)
-        elif isinstance(value, tuple):
-            for index, item in enumerate(value, 1):
-                if dataclasses.is_dataclass(item):
-                    yield from parameters(item, provenance, f"{name}[{index}]")
+        spec, value = field.metadata.get(_META), getattr(obj, field.name)
+        if isinstance(spec, _Number):
+            if spec.tunable and value is not None:
+                description = spec.description.replace("{name}", getattr(obj, "name", ""))
+                yield from _listed(_joined(prefix, field.name), value, spec, description, provenance)
+        else:
+            for name, item in _inside(field, value):
+                yield from parameters(item, provenance, _joined(prefix, name))
 
 
 def with_values(obj: T, values: Mapping[str, float]) -> T:
@@ -93,78 +262,80 @@ def with_values(obj: T, values: Mapping[str, float]) -> T:
     Raises
     ------
     ParameterError
-        If a name is unknown or a value not finite, not whole where it must be, or out of range.
+        If a name is unknown, a value is not finite, not whole where it must be, or out of range, or if the values do
+        not fit together.
     """
     for name, value in values.items():
-        obj = _replaced(obj, name.split("."), name, value)
+        obj = _replaced(obj, name, name, value)
+    if found := [": ".join(filter(None, problem)) for problem in _problems(obj) if values]:
+        raise ParameterError("\n".join(found))
     return obj
 
 
-def _specs(cls: type[Any]) -> Iterator[tuple[str, _Spec, Any]]:
-    for field in dataclasses.fields(cls):
-        spec = field.metadata.get(_META)
-        if spec is not None:
-            yield field.name, spec, field.default
+def _joined(*names: str) -> str:
+    return ".".join(filter(None, names))
 
 
-def _read_one(table: Table, name: str, spec: _Spec, default: Any) -> float | int | None:
-    if default is None and not table.has(name):
-        return None
-    fallback = None if default in (dataclasses.MISSING, None) else default
-    if spec.integer:
-        return table.integer(name, default=fallback, minimum=int(spec.minimum), maximum=int(spec.maximum))
-    return table.quantity(
-        name, spec.unit, default=fallback, minimum=spec.minimum, maximum=spec.maximum, positive=spec.positive
-    )
+def _inside(field: dataclasses.Field[Any], value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the dataclasses in a field with their dotted names: one, numbered ones or named ones."""
+    spec = field.metadata.get(_META)
+    if dataclasses.is_dataclass(value):
+        yield field.name, value
+    elif isinstance(spec, _Named):
+        yield from ((f"{spec.key}.{item.name}", item) for item in value)
+    elif isinstance(value, tuple):
+        numbered = ((f"{field.name}[{index}]", item) for index, item in enumerate(value, 1))
+        yield from ((name, item) for name, item in numbered if dataclasses.is_dataclass(item))
 
 
-def _parameter(name: str, value: float, spec: _Spec, provenance: Mapping[str, Quantity]) -> Parameter:
+def _problems(obj: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield what does not fit together in a dataclass and those inside it, with dotted keys."""
+    if isinstance(obj, Checked):
+        yield from ((_joined(prefix, key), problem) for key, problem in obj.problems())
+    for field in dataclasses.fields(obj):
+        for name, item in _inside(field, getattr(obj, field.name)):
+            yield from _problems(item, _joined(prefix, name))
+
+
+def _listed(
+    name: str, value: Any, spec: _Number, description: str, provenance: Mapping[str, Quantity]
+) -> Iterator[Parameter]:
+    """Yield the parameters of one field."""
     origin = provenance.get(name)
-    return Parameter(
-        name=name,
-        value=float(value),
-        unit=spec.unit,
-        description=spec.description,
-        minimum=spec.minimum if math.isfinite(spec.minimum) else (0.0 if spec.positive else None),
-        maximum=spec.maximum if math.isfinite(spec.maximum) else None,
-        source=origin.source if origin is not None else "choice: default",
-        is_integer=spec.integer,
-    )
+    for full, label, number in zip(spec.names(name), spec.labels or ("",), spec.values(value), strict=True):
+        yield Parameter(
+            name=full,
+            value=number,
+            unit=spec.unit,
+            description=f"{description}, {label}" if label else description,
+            minimum=spec.minimum if math.isfinite(spec.minimum) else (0.0 if spec.positive else None),
+            maximum=spec.maximum if math.isfinite(spec.maximum) else None,
+            source=origin.source if origin is not None else "choice: default",
+            is_integer=spec.integer,
+        )
 
 
-def _replaced(obj: Any, path: list[str], name: str, value: float) -> Any:
-    key, index = _indexed(path[0])
-    fields = {f.name: f for f in dataclasses.fields(obj)} if dataclasses.is_dataclass(obj) else {}
-    if key not in fields:
-        raise ParameterError(f"parameter '{name}': there is none of this name")
-    if len(path) > 1:
-        return dataclasses.replace(obj, **{key: _replaced_inside(getattr(obj, key), index, path, name, value)})
-    spec = fields[key].metadata.get(_META)
-    if spec is None or index is not None:
+def _replaced(obj: Any, path: str, name: str, value: float) -> Any:
+    """Return a dataclass with the number at a dotted path replaced; ``name`` is the whole of it."""
+    for field in dataclasses.fields(obj):
+        spec, old = field.metadata.get(_META), getattr(obj, field.name)
+        if isinstance(spec, _Number):
+            if path in spec.names(field.name) and not (spec.labels and old is None):
+                _check(name, value, spec)
+                return dataclasses.replace(obj, **{field.name: spec.replaced(old, field.name, path, value)})
+            continue
+        for index, (inner, item) in enumerate(_inside(field, old)):
+            if path.startswith(f"{inner}."):
+                new = _replaced(item, path[len(inner) + 1 :], name, value)
+                if isinstance(old, tuple):
+                    new = (*old[:index], new, *old[index + 1 :])
+                return dataclasses.replace(obj, **{field.name: new})
+    if any(path == field.name for field in dataclasses.fields(obj)):
         raise ParameterError(f"parameter '{name}': is not a number that can be set")
-    _check(name, value, spec)
-    return dataclasses.replace(obj, **{key: int(value) if spec.integer else float(value)})
+    raise ParameterError(f"parameter '{name}': there is none of this name")
 
 
-def _replaced_inside(inner: Any, index: int | None, path: list[str], name: str, value: float) -> Any:
-    if index is None:
-        return _replaced(inner, path[1:], name, value)
-    if not isinstance(inner, tuple) or not 1 <= index <= len(inner):
-        raise ParameterError(f"parameter '{name}': there is none of this name")
-    changed = list(inner)
-    changed[index - 1] = _replaced(inner[index - 1], path[1:], name, value)
-    return tuple(changed)
-
-
-def _indexed(key: str) -> tuple[str, int | None]:
-    """Split ``stage[2]`` into its name and number."""
-    name, bracket, rest = key.partition("[")
-    number = rest[:-1]
-    is_index = bracket and rest.endswith("]") and number.isascii() and number.isdigit() and len(number) <= 9
-    return (name, int(number)) if is_index else (key, None)
-
-
-def _check(name: str, value: float, spec: _Spec) -> None:
+def _check(name: str, value: float, spec: _Number) -> None:
     if text := beyond_all(value):
         raise ParameterError(f"parameter '{name}': {value:g} {text}")
     if spec.integer and not float(value).is_integer():

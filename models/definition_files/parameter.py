@@ -1,20 +1,10 @@
-"""What a model shows to whoever couples it: parameters with unit and source, state as plain arrays."""
+"""The tunable numbers of a definition: value, unit, range and source."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
-
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
-
-#: A model's whole state, bit for bit: name -> array.
-Snapshot = dict[str, npt.NDArray[np.generic]]
 
 
 @dataclass(frozen=True)

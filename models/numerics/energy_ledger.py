@@ -11,12 +11,10 @@ other than a force has changed the state.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from models.definition_files.field_schema import count
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 
 #: Names of the values of a balance, and what they are.
 BALANCE = (
@@ -27,11 +25,6 @@ BALANCE = (
 )
 #: The values where no balance is kept: numbers, as hosts and comparisons of states have their troubles with NaN.
 NO_BALANCE = np.zeros(len(BALANCE))
-
-
-def monitoring() -> Any:
-    """Declare the number of a definition that says whether the balance is kept."""
-    return count("whether the energy balance is kept, for energy.* and contact.work: 0 no, 1 yes", default=0, maximum=1)
 
 
 @dataclass

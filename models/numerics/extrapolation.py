@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 
 #: How far, as a share of a step's travel, a position may be off its time and still stamp it.
 _STAMP_TOLERANCE = 0.25

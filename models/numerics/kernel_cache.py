@@ -28,11 +28,17 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
+#: Environment variable that chooses between compiled kernels and NumPy.
+SWITCH: Final = "OPENPANTO_KERNEL"
 _LOG: Final = logging.getLogger("openpanto")
 #: Length of the checksum before the content of a file [bytes].
 _DIGEST: Final = hashlib.sha256().digest_size
 #: Folders that a warning has named in this process.
 _named: set[str] = set()
+
+
+class KernelError(RuntimeError):
+    """The compiled kernels were asked for and are not to be had."""
 
 
 def load_kernels(name: str, source: bytes) -> ModuleType:

@@ -21,9 +21,9 @@ from typing import Final
 import numpy as np
 from scipy.optimize import least_squares
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import ComplexArray, FloatArray
 from models.definition_files.toml_reader import LARGEST, SMALLEST, DefinitionError, Problem
-from models.pantograph.lumped.lumped_rig import ComplexArray, chain_stiffness
+from models.pantograph.lumped.lumped_rig import chain_stiffness
 
 #: What a response file may hold: displacement per force [m/N], force per acceleration [kg], per displacement [N/m].
 RESPONSE_KINDS: Final = ("receptance", "apparent_mass", "dynamic_stiffness")

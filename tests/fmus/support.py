@@ -19,7 +19,7 @@ from fmpy.fmi2 import (
 )
 
 from fmus.builder.fmu_build import ROOTS, Recipe
-from models.library import line_path
+from models.library.catalogue import line_path
 
 TOY = Path(__file__).parent / "toy"
 

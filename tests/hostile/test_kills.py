@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from master.recording.recorder import load
+from master.recording.recording import load
 from tests.effort import count
 from tests.master.conftest import SSV, ssd_text, toy_fmus  # noqa: F401 (a fixture)
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fmus.builder.fmu_build import build, recipe
-from master.fmu.extraction import Unpacked
+from master.fmu.extraction import ExtractedFmu
 from master.fmu.fmu_description import read_fmu
 from master.fmu.instance import Instance
 from master.system.components import Component
@@ -107,7 +107,7 @@ def test_the_next_instance_knows_nothing_of_the_last(pantograph):
 
 def test_the_folder_of_a_library_that_is_gone_is_removed(pantograph, tmp_path):
     copy = shutil.copy(pantograph.path, tmp_path)
-    unpacked = Unpacked(replace(pantograph, path=Path(copy)))  # its library was never loaded
+    unpacked = ExtractedFmu(replace(pantograph, path=Path(copy)))  # its library was never loaded
     assert Path(unpacked.folder).is_dir()
     unpacked.release()
     assert not Path(unpacked.folder).exists()

@@ -10,7 +10,7 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 
 from master.commands.main import main
-from master.recording.recorder import load
+from master.recording.recording import load
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 from master.system.contacts import find_contacts

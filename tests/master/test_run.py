@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from master.errors import MasterError, RunError
-from master.recording.recorder import load
+from master.evaluation.contact_positions import strip_centre, track_position
+from master.recording.recording import load
 from master.results import run_results
 from master.run import run
-from master.scenario.open_scenario import Overrides, open_scenario
-from master.system.contacts import strip_centre, track_position
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 ROOT = Path(__file__).parents[2]
 FORCE = "catenary.pantograph[1].contact.force"

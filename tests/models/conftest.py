@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 import models
-from models.catenary.definition.line_definition import CatenaryDefinition, read
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_reading import read
 from models.definition_files.toml_reader import Table
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 
 LIBRARY = Path(models.__file__).parent / "library"

@@ -1,4 +1,4 @@
-"""Contact geometry in plan and the contact law."""
+"""The contact law, and a strip on a line that feels it."""
 
 import numpy as np
 import pytest
@@ -6,30 +6,11 @@ from scipy.integrate import solve_ivp
 
 from models.catenary.definition.line_definition import Contact
 from models.catenary.line_model import CatenaryModel, StripMotion
-from models.catenary.step.numpy_engine import local_motion
-from models.contact_law import continuous_contact, crossing
+from models.contact_law import continuous_contact
 
 
 def _strip(x, z, y=0.0, half=0.7, vz=0.0, skew=0.0):
     return np.array([[[x + skew, y + half, z], [80.0, 0.0, vz]], [[x - skew, y - half, z], [80.0, 0.0, vz]]])
-
-
-def test_crossing_of_a_staggered_wire():
-    share, xi = crossing(np.array([3.0, 0.7, 5.0]), np.array([3.0, -0.7, 5.0]), (2.0, 0.1), (4.0, -0.1))
-    assert (share, xi) == pytest.approx((0.5, 0.5))
-
-
-def test_crossing_of_a_skewed_strip_satisfies_both_lines():
-    a, b = np.array([3.2, 0.7, 5.0]), np.array([2.9, -0.7, 5.1])
-    i, j = (2.0, 0.25), (4.0, -0.1)
-    share, xi = crossing(a, b, i, j)
-    on_strip = a[:2] + share * (b - a)[:2]
-    on_wire = np.array(i) + xi * (np.array(j) - np.array(i))
-    assert on_strip == pytest.approx(on_wire)
-
-
-def test_parallel_lines_do_not_cross():
-    assert crossing(np.array([0.0, 0.0]), np.array([1.0, 0.0]), (0.0, 1.0), (1.0, 1.0)) is None
 
 
 def test_force_is_elastic_and_never_pulls():
@@ -232,9 +213,10 @@ def test_a_contact_keeps_the_velocity_of_its_impact_until_it_opens(short_line):
 def _penetration(model, state, z, speed):
     """Depth and velocity of the only contact, from where the wire is and how it moves."""
     ((_, element),), ((xi, _),) = state.loaded.tolist(), state.load.tolist()
-    touch = model.wires[0].touch(element, xi)
-    rise, rate = (float(row @ touch.row) for row in local_motion(touch.interval, state.motion))
-    return z - (touch.height + rise), speed - rate
+    interval = model.wires[0].interval(element)
+    row, height = interval.lift(element, xi)
+    rise, rate = (float(moved @ row) for moved in interval.local(state.motion))
+    return z - (height + rise), speed - rate
 
 
 def test_uplift_and_point_of_contact_move_with_the_wire(model):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from fmus.__main__ import main as fmus
 from master.commands.main import main as master
-from models.commands import main as models
+from models.commands.physics_main import main as models
 from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_quick, assert_refused
 
 MAINS = {"master": master, "models": models, "fmus": fmus}

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.catenary.definition.line_definition import read
-from models.commands import main
+from models.catenary.definition.line_reading import read
+from models.commands.physics_main import main
 from models.definition_files.toml_reader import DefinitionError, Table
-from models.library import line_path, load_line, load_pantograph, pantograph_path
+from models.library.catalogue import line_path, load_line, load_pantograph, pantograph_path
 from tests.robustness.mutation import changes
 from tests.robustness.support import ANSWER_SECONDS, PROFILE, TRIED, ask, assert_quick, assert_worded
 

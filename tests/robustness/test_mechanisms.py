@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.commands import main
-from models.library import pantograph_path
+from models.commands.physics_main import main
+from models.library.catalogue import pantograph_path
 from tests.effort import count
 from tests.robustness.mutation import changes
 from tests.robustness.support import PROFILE, TRIED, Answer, ask, assert_lines

@@ -13,7 +13,7 @@ import pytest
 
 from fmus.builder.fmu_build import build, recipe
 from master.commands.main import main as master
-from models.commands import main as models
+from models.commands.physics_main import main as models
 from tests.robustness.support import TRIED, ask, assert_lines
 
 ROOT = Path(__file__).parents[2]

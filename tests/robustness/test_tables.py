@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from master.batch.study.family import STUDY, VARIANTS, load_family
 from master.commands.main import main as master
 from master.errors import MasterError
-from master.report.charts.measured_charts import read_measured
+from master.evaluation.measured_force import read_measured
 from master.safety.safe_files import plain_cell, safe_cell
-from models.commands import main as models
+from models.commands.physics_main import main as models
 from models.definition_files.toml_reader import DefinitionError
 from models.pantograph.identification import read_response
 from tests.effort import count

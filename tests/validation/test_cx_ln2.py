@@ -15,7 +15,7 @@ from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter
 from models.catenary.line_model import CatenaryModel
 from models.coupled.monolithic import CoupledModel
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 
 pytestmark = pytest.mark.slow
 

@@ -19,7 +19,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from master.errors import MasterError, Problem, RequestError, ScenarioError
-from master.results.run_results import write_text
+from master.results.results_folder import write_text
 
 STUDY: Final = "study.toml"
 VARIANTS: Final = "variants.csv"

@@ -9,11 +9,12 @@ import numpy as np
 from master.arrays import BoolArray, FloatArray
 from master.batch.study.family import Interval
 from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_positions import leading_first, track_position
 from master.evaluation.contact_quality import Quality
 from master.evaluation.filters import interval_mask
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.results.run_results import Results
-from master.system.contacts import Contact, leading_first, track_position
+from master.system.contacts import Contact
 
 
 @dataclass(frozen=True)

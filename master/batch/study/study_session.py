@@ -13,7 +13,7 @@ from master.batch.study.study_outcome import GENERATOR, Done, Outcome, as_csv, a
 from master.batch.study.study_page import page
 from master.batch.study.variants import Runner, finished
 from master.errors import InterruptedRunError, MasterError, Problem, RequestError, ScenarioError
-from master.results import run_results
+from master.results import results_folder, run_summary
 from master.safety.supervision import unfinished
 
 JSON: Final = "study.json"
@@ -58,14 +58,14 @@ def study(
         If the folder holds something else.
     """
     check(family, chosen, runner)
-    with run_results.taken_over(folder, JSON, GENERATOR, "study"), unfinished(folder / JSON):
+    with results_folder.taken_over(folder, JSON, GENERATOR, "study"), unfinished(folder / JSON):
         return _study(family, chosen, folder, runner, again, show)
 
 
 def _study(
     family: Family, chosen: Sequence[Variant], folder: Path, runner: Runner, again: bool, show: Callable[[Done], None]
 ) -> Outcome:
-    state = Outcome(family, datetime.now(UTC).isoformat(timespec="seconds"), run_results.versions())
+    state = Outcome(family, datetime.now(UTC).isoformat(timespec="seconds"), run_summary.versions())
     write(state, folder)
     try:
         for variant in family.variants:
@@ -99,9 +99,9 @@ def check(family: Family, chosen: Sequence[Variant], runner: Runner) -> None:
 
 def write(state: Outcome, folder: Path) -> None:
     """Write what there is so far."""
-    run_results.write_json(folder / JSON, as_data(state))
-    run_results.write_text(folder / CSV, as_csv(state))
-    run_results.write_text(folder / PAGE, page(state))
+    results_folder.write_json(folder / JSON, as_data(state))
+    results_folder.write_text(folder / CSV, as_csv(state))
+    results_folder.write_text(folder / PAGE, page(state))
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class _Task:
 
 
 def _with_variant(state: Outcome, variant: Variant, runner: Runner, task: _Task) -> Outcome:
-    if not task.wanted and not run_results.is_ours(task.folder):
+    if not task.wanted and not results_folder.is_ours(task.folder):
         return state
     try:
         with runner.opened(state.family, variant) as system:

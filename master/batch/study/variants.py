@@ -10,20 +10,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from master.batch.calibration import Found, find_values
+from master.batch.calibration import CalibrationResult, find_values
 from master.batch.study.family import Calibration, Family, Interval, Variant
-from master.coupling.fmu_warnings import CautionObserver
+from master.coupling.fmu_warnings import FmuWarningObserver
 from master.coupling.macro_steps import Observer
 from master.errors import MasterError, RequestError
-from master.results import run_results
+from master.results import results_folder, run_results
 from master.results.run_results import Results
 from master.run import run
-from master.scenario.open_scenario import Overrides, find_parameter, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides, find_parameter
 from master.system.components import System
 from master.system.step_rounding import adjustments
 
 #: Makes the observers of one run, and takes them away after it.
-Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
+ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 @contextmanager
@@ -46,7 +47,7 @@ class Runner:
         Whether missing or stale FMUs are built.
     """
 
-    watching: Watching = unwatched
+    watching: ObserverFactory = unwatched
     tell: Callable[[str], None] = lambda _: None
     build: bool = True
 
@@ -54,7 +55,7 @@ class Runner:
         """Run one system."""
         for text in adjustments(system):
             self.tell(f"{system.name}: warning: {text}")
-        cautions = CautionObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
+        cautions = FmuWarningObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
         with self.watching(system) as observers:
             return run(system, folder, [cautions, *observers])
 
@@ -75,7 +76,7 @@ class Runner:
 
 def finished(folder: Path, system: System) -> Results | None:
     """Return the results in a folder if they are those of just this system, complete."""
-    if not run_results.is_ours(folder):
+    if not results_folder.is_ours(folder):
         return None
     found = run_results.read(folder)
     return found if found.summary.get("status") == "complete" and _is_of(found.summary, system) else None
@@ -90,7 +91,7 @@ def _is_of(summary: dict[str, Any], system: System) -> bool:
     return bool(json.loads(json.dumps(wanted)) == [found, summary.get("settings")])
 
 
-def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, Found]:
+def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, CalibrationResult]:
     """Find the pantographs' parameters that give each the wanted mean force, by ``component.parameter``.
 
     Raises

@@ -14,14 +14,15 @@ from master.coupling.macro_steps import Observer
 from master.errors import InterruptedRunError, MasterError
 from master.results.run_results import Results
 from master.run import run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.system.components import System
 
 #: Folder of the runs within the verification's folder.
 RUNS: Final = "runs"
 
 #: Makes the observers of one run, and takes them away after it.
-Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
+ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 def content_key(system: System) -> str:
@@ -65,7 +66,7 @@ class Runs:
     """
 
     folder: Path
-    watching: Watching
+    watching: ObserverFactory
     tell: Callable[[str], None] = lambda _: None
     build: bool = True
     _done: dict[str, Results | MasterError] = field(default_factory=dict)

@@ -11,11 +11,11 @@ import numpy as np
 
 from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment
+from master.evaluation.contact_positions import track_position
 from master.evaluation.contact_quality import Filtered, Quality
 from master.evaluation.filters import interval_mask
 from master.evaluation.line_geometry import Uplift, indexed, passages, period_of, slackness
 from master.results.run_results import Results
-from master.system.contacts import track_position
 
 #: A support belongs to a place along the track within this distance [m].
 SUPPORT_TOLERANCE: Final = 1.0

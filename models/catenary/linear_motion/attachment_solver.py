@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 from scipy.sparse.linalg import splu
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 #: Half-bandwidth up to which a band solver is used.
 _WIDEST_BAND = 64

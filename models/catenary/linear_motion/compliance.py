@@ -9,9 +9,9 @@ from typing import overload
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import FloatArray, IntArray
 from models.catenary.linear_motion.attachment_solver import CUT, Factor
 from models.catenary.linear_motion.sparse_products import Product
-from models.definition_files.parameter import FloatArray, IntArray
 
 #: Droppers whose response is kept.
 _KEPT_DROPPERS = 256

@@ -27,9 +27,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import BoolArray, FloatArray, IntArray
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.wire_intervals import Interval, turns, without_rounding
-from models.definition_files.parameter import BoolArray, FloatArray, IntArray, ParameterError
+from models.definition_files.parameter import ParameterError
 
 #: In-plane and out-of-plane degrees of freedom of a node, in axes along the wire.
 _PLANES = ((0, 2, 4), (1, 3, 5))

@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
+from models.arrays import FloatArray, Snapshot
 from models.catenary.linear_motion.interval_modes import IntervalModes
-from models.definition_files.parameter import FloatArray, Snapshot
 
 
 class Packed(Protocol):

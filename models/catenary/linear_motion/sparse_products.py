@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 try:  # The routine behind scipy's own product, which spends a third of a small product on looking at its operands.
     from scipy.sparse._sparsetools import bsr_matvec as _bsr_matvec

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 #: Degrees of freedom of a node.
 NODE_DOFS = 6

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from models.arrays import FloatArray
 from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.line_matrices import (
@@ -29,7 +30,6 @@ from models.catenary.shape.line_matrices import (
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.wire_intervals import attachments
-from models.definition_files.parameter import FloatArray
 
 #: Form finding ends when no reference point moves by more than this [m].
 _TOLERANCE = 1e-9

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import FloatArray, IntArray
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition, Dropper
 from models.catenary.shape.beam_elements import (
     NODE_DOFS,
@@ -18,7 +19,6 @@ from models.catenary.shape.beam_elements import (
     to_global,
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
-from models.definition_files.parameter import FloatArray, IntArray
 
 #: What holds a wire without anchors along the track at every support [N/m]: soft enough to be of no account (a span of
 #: messenger wire on it has a period of half a minute), but the wire has a place.

@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
+from models.arrays import BoolArray, FloatArray, IntArray
 from models.catenary.shape.line_mesh import CatenaryMesh, Chain
-from models.definition_files.parameter import BoolArray, FloatArray, IntArray
 
 #: Entries below this share of their diagonal are what rotating a matrix leaves of zeros.
 _ROUNDING = 1e-12

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from models.arrays import BoolArray, FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire
 from models.catenary.contact_and_slack.local_problem import LocalProblem
 from models.catenary.definition.line_definition import CatenaryDefinition, Span, Wire
@@ -21,7 +22,6 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.linear_motion.attachment_solver import factorised
 from models.catenary.linear_motion.compliance import Compliance
 from models.contact_law import CONTACT_LAWS
-from models.definition_files.parameter import BoolArray, FloatArray
 
 #: Highest speed of operation over the wave speed (EN 50119; section 2.1 of the 2012 thesis).
 OPERATION_LIMIT = 0.7
@@ -275,7 +275,9 @@ class _StaticResponse:
     def uplift(self, wire: ContactWire, x: float, force: float) -> float:
         """Return the rise of a contact wire under a vertical force on it [m]."""
         model = self._model
-        interval, _, modal, ends, _ = wire.touch(*wire.locate(x))
+        element, xi = wire.locate(x)
+        interval = wire.interval(element)
+        modal, ends = interval.split(interval.lift(element, xi)[0])
         load = self._rest.copy()
         load[interval.ends] += force * ends
         displacement = self._solve(load)

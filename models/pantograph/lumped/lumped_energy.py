@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import Ledger
-
-if TYPE_CHECKING:
-    from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 
 
 class LumpedBalance:

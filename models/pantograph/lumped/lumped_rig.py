@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import ComplexArray, FloatArray
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel
-
-ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

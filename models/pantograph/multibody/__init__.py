@@ -1,1 +1,5 @@
-"""A small multibody library: rigid bodies, joints and forces given as data, and pantographs made of them."""
+"""Pantographs as mechanisms: rigid bodies, joints between them, force elements, under a force on the strip.
+
+From the definition (`mechanism_definition`, `mechanism_reading`) by the equations (`mechanism`), their assembly, energy
+and integration to `multibody_part`, which a co-simulation steps. The room may import what every pantograph has.
+"""

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.elements.force_elements import ForceElements, gravity_loads
 from models.pantograph.multibody.elements.joints import JOINT_ROWS, Constraints, ConstraintValues, GapRow, Pair, Row
 from models.pantograph.multibody.elements.moving_vectors import Kinematics, MovingVectors, VectorPool

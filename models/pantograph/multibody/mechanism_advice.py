@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition

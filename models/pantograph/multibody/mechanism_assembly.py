@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, IntArray
+from models.arrays import FloatArray, IntArray
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 
 #: Largest violation of an assembled mechanism [m or 1].

@@ -21,7 +21,7 @@ from models.definition_files import field_schema
 from models.definition_files.parameter import Parameter, ParameterError
 from models.definition_files.si_units import SI
 from models.definition_files.toml_reader import DefinitionError, Table
-from models.pantograph.lumped.lumped_definition import Operation
+from models.pantograph.operation import Operation
 
 Triple = tuple[float, float, float]
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import Ledger
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 

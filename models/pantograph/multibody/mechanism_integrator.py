@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_assembly import project
 

@@ -3,134 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, Snapshot
+from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
 from models.pantograph.multibody.analysis.mechanism_statics import equilibrium, settle_springs
+from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_advice import working_height_warning
 from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
-
-#: A contact point that wanders faster across the track than this has jumped, from wire to wire say [m/s].
-_FASTEST_SWEEP: Final = 5.0
-
-
-@dataclass
-class LateralExtrapolation:
-    """Lateral position of the contact over a step: linear through its last two values, held after a jump.
-
-    Attributes
-    ----------
-    times, values : ndarray, shape (2,)
-        Last value first [s, m].
-    rate : float
-        [m/s]
-    """
-
-    times: FloatArray = field(default_factory=lambda: np.zeros(2))
-    values: FloatArray = field(default_factory=lambda: np.zeros(2))
-    rate: float = 0.0
-
-    def start(self, time: float, value: float) -> None:
-        """Forget everything but one value."""
-        self.times[:] = time
-        self.values[:] = value
-        self.rate = 0.0
-
-    def receive(self, time: float, value: float) -> None:
-        """Take a value that holds at ``time``; one for the same time replaces the last."""
-        if time > self.times[0] + 1e-12:
-            self.times[1], self.values[1] = self.times[0], self.values[0]
-            self.times[0] = time
-        self.values[0] = value
-        elapsed = float(self.times[0] - self.times[1])
-        rate = float(self.values[0] - self.values[1]) / elapsed if elapsed > 0.0 else 0.0
-        self.rate = rate if abs(rate) <= _FASTEST_SWEEP else 0.0
-
-    def at(self, time: float) -> float:
-        """Return the position at ``time`` [m]."""
-        return float(self.values[0]) + self.rate * (time - float(self.times[0]))
-
-    def snapshot(self) -> Snapshot:
-        """Return the whole state."""
-        rate = np.array([self.rate])
-        return {"lateral.times": self.times.copy(), "lateral.values": self.values.copy(), "lateral.rate": rate}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Take over a snapshot."""
-        self.times[...] = snapshot["lateral.times"]
-        self.values[...] = snapshot["lateral.values"]
-        self.rate = float(snapshot["lateral.rate"][0])
-
-
-@dataclass
-class BaseMotion:
-    """The roof's vertical motion over a step: smooth, and at its end where the inputs lead.
-
-    A cubic joins where the base is to where its received height and velocity, and the trend of the velocity, will have
-    taken it by the end of the step; so the base never jumps, whatever the inputs do.
-
-    Attributes
-    ----------
-    now : ndarray, shape (2,)
-        Height and velocity of the base [m, m/s].
-    received : ndarray, shape (2,)
-        Velocity received last [m/s], and how long before this step that was (0: never) [s].
-    cubic : ndarray, shape (4,)
-        Coefficients of the present step, constant one first.
-    """
-
-    now: FloatArray = field(default_factory=lambda: np.zeros(2))
-    received: FloatArray = field(default_factory=lambda: np.zeros(2))
-    cubic: FloatArray = field(default_factory=lambda: np.zeros(4))
-
-    def start(self, base: FloatArray) -> None:
-        """Begin at a height and velocity."""
-        self.now[...] = base
-        self.received[...] = base[1], 0.0
-        self.cubic[...] = base[0], base[1], 0.0, 0.0
-
-    def receive(self, base: FloatArray, step: float) -> None:
-        """Plan the motion over a step from the height and velocity at its beginning, shape (2,)."""
-        z, v = float(base[0]), float(base[1])
-        since = float(self.received[1])
-        trend = (v - float(self.received[0])) / since if since > 0.0 else 0.0
-        end, end_speed = z + v * step + 0.5 * trend * step**2, v + trend * step
-        z0, v0 = float(self.now[0]), float(self.now[1])
-        mean = (end - z0) / step
-        self.cubic[...] = z0, v0, (3.0 * mean - 2.0 * v0 - end_speed) / step, (v0 + end_speed - 2.0 * mean) / step**2
-        self.received[...] = v, step
-
-    def at(self, tau: float) -> tuple[float, float, float]:
-        """Return height, velocity and acceleration at ``tau`` [s] after the step's beginning."""
-        a, b, c, d = self.cubic.tolist()
-        return (
-            a + tau * (b + tau * (c + tau * d)),
-            b + tau * (2.0 * c + 3.0 * tau * d),
-            2.0 * c + 6.0 * tau * d,
-        )
-
-    def finish(self, step: float) -> None:
-        """Move to the end of the step."""
-        self.now[...] = self.at(step)[:2]
-
-    def snapshot(self) -> Snapshot:
-        """Return the whole state."""
-        names = ("now", "received", "cubic")
-        return {f"base.{name}": getattr(self, name).copy() for name in names}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Take over a snapshot."""
-        for name in ("now", "received", "cubic"):
-            getattr(self, name)[...] = snapshot[f"base.{name}"]
 
 
 class MultibodyPantographPart:

@@ -10,7 +10,7 @@ import pytest
 from fmus.__main__ import main
 from fmus.builder.fmu_build import MARK, BuildError, build, content_hash, fingerprint, recipe
 from master.fmu import fmu_provision
-from models.library import line_path, pantograph_path
+from models.library.catalogue import line_path, pantograph_path
 from tests.fmus.support import Instance
 
 
@@ -60,13 +60,13 @@ def test_the_guid_follows_the_file_and_not_its_place(own, tmp_path):
 
 def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
     path, told = build(recipe(str(own / "Light.toml")), tmp_path), []
-    assert fmu_provision.ensure(path, told.append) == path
+    assert fmu_provision.provide_fmu(path, told.append) == path
     assert told == []
     (own / "Light.toml").write_text((own / "Light.toml").read_text().replace("168", "170"))
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert told == ["building Pantograph_Light.fmu again: its sources have changed"]
     assert fmu_provision.stored_guid(path) == fingerprint(recipe(str(own / "Light.toml")))
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert len(told) == 1
 
 

@@ -7,7 +7,7 @@ import pytest
 from fmus.builder.fmu_build import build, recipe
 from models.catenary.line_advice import slack_warning
 from models.catenary.line_part import CatenaryPart
-from models.library import line_names, load_line
+from models.library.catalogue import line_names, load_line
 from tests.fmus.support import Instance, refused, short_line_recipe
 
 SPEEDS = [f"pantograph[1].{end}.vx" for end in "AB"]

@@ -10,9 +10,10 @@ import numpy as np
 
 import models.definition_files.si_units as units
 import toy.law
+from models.arrays import FloatArray, Snapshot
 from models.definition_files import field_schema
 from models.definition_files.field_schema import count, quantity
-from models.definition_files.parameter import FloatArray, Parameter, Snapshot
+from models.definition_files.parameter import Parameter
 from models.definition_files.toml_reader import Quantity, Table
 
 assert units.SI["m"] == ("m", 1.0)

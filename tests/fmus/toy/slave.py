@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from toy.part import ToyDefinition, ToyPart, load
 
 

@@ -6,8 +6,9 @@ import common
 
 from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
-from master.run import loaded
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.run import connected_fmus
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 archive, step, count, out = common.arguments()
 
@@ -31,7 +32,7 @@ collector = Collector()
 overrides = Overrides(count * step, step, "jacobi", may_stop_early=True)
 with open_scenario(Path(archive), overrides, build=False) as scenario:
     watch = common.Watch()
-    with loaded(scenario.system) as network:
+    with connected_fmus(scenario.system) as network:
         outcome = simulate(network, Jacobi(), TimeGrid(0.0, step, count), [collector])
 if outcome.error:
     raise SystemExit(str(outcome.error))

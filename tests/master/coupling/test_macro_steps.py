@@ -12,7 +12,7 @@ from master.coupling.network import Network
 from master.errors import MasterError, SlaveError
 from master.safety.interruption import interruptible
 from master.ssp.ssp_units import Conversion
-from master.system.components import Connection
+from master.system.connections import Connection
 
 
 def counter(fake_slave, flow=lambda s, u, t, h: s + 1.0):

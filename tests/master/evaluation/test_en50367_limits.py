@@ -11,7 +11,7 @@ from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_quality import Filtered, assess
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits, judge, limits_at
 from master.evaluation.filters import DEFAULT
-from master.report import verdict_table
+from master.report.result_tables import verdict_table
 from master.system.contacts import Contact
 
 STEP = 1e-3

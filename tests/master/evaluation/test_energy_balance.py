@@ -7,7 +7,7 @@ import pytest
 
 from master.commands.main import main
 from master.evaluation.energy_balance import COUPLING_LIMIT, DRIFT, PART_LIMIT, drift_events, find_balances
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.run_inputs import quality_rows
 from master.system.contacts import Contact
 

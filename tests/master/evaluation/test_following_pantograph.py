@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from master.evaluation.following_pantograph import followings, leading_first
-from master.recording.recorder import Recording
+from master.evaluation.contact_positions import leading_first
+from master.evaluation.following_pantograph import follower_effects
+from master.recording.recording import Recording
 from master.system.contacts import Contact
 
 TIME = np.linspace(0.0, 1.0, 11)
@@ -37,7 +38,7 @@ def test_differences_are_the_follower_s_minus_the_leader_s(speed):
         "two": SimpleNamespace(mean=101.0, sigma=25.0, minimum=40.0, maximum=190.0),
     }
     assessed = [SimpleNamespace(contact=c, quality=quality[c.pantograph]) for c in contacts]
-    (found,) = followings(recording, assessed)
+    (found,) = follower_effects(recording, assessed)
     sign = -1.0 if speed > 0.0 else 1.0  # "two" leads where they go forward
     assert (found.leading, found.trailing) == (("two", "one") if speed > 0.0 else ("one", "two"))
     assert found.distance == 200.0

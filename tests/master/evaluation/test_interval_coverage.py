@@ -13,10 +13,12 @@ from master.commands.main import main
 from master.errors import RequestError
 from master.evaluation.en50367_limits import LimitChoice
 from master.evaluation.interval_coverage import never_touched, shortfall
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.report.html_markup import verdict
-from master.results.run_results import Results, figures, read
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.results.run_results import Results, read
+from master.results.run_summary import figures
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.system.contacts import Contact
 from tests.master.batch.study.conftest import STUDY
 

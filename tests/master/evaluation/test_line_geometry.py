@@ -7,7 +7,7 @@ import pytest
 
 from master.evaluation.filters import stands_in
 from master.evaluation.line_geometry import laps, met, support_uplifts
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 
 RING = {"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}
 

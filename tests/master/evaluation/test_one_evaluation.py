@@ -17,19 +17,20 @@ from master.evaluation.contact_assessment import assess_contacts
 from master.evaluation.contact_quality import figures_of
 from master.evaluation.contact_signals import EvaluationSettings, contact_signals
 from master.evaluation.filters import BEFORE_CHOICE, DEFAULT, SETTLING, ForceFilter
-from master.recording.recorder import Recording, load
-from master.report import figure_rows
-from master.report.charts.run_charts import interval_shape
-from master.results import run_difference, run_results
+from master.recording.recording import Recording, load
+from master.report.charts.line_charts import interval_band
+from master.report.result_tables import figure_rows
+from master.results import results_folder, run_difference, run_results
 from master.results.run_results import Results
 from master.run import run
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from master.system.contacts import Contact
 from models.catenary.line_model import CatenaryModel
-from models.commands import main as physics
 from models.commands.couple_command import Evaluated, write_timeseries
+from models.commands.physics_main import main as physics
 from models.coupled.monolithic import CoupledModel
-from models.library import load_line, load_lumped
+from models.library.catalogue import load_line, load_lumped
 
 ROOT = Path(__file__).parents[3]
 CONTACT = Contact(1, "catenary", "pantograph", "catenary.pantograph[1].contact")
@@ -43,7 +44,7 @@ def go(toy, folder, text, **overrides):
 
 def statistics(folder, name=CONTACT.prefix):
     """What a user makes of the results file, without this package."""
-    with (folder / run_results.FORCES).open(newline="") as file:
+    with (folder / results_folder.FORCES).open(newline="") as file:
         rows = list(csv.DictReader(file))
     force = np.array([float(r[f"{name}.filtered_force [N]"]) for r in rows if r[f"{name}.in_interval"] == "1"])
     return {"mean": force.mean(), "sigma": force.std(), "maximum": force.max(), "minimum": force.min()}
@@ -55,7 +56,7 @@ def test_a_users_own_statistics_of_the_force_file_are_the_figures(toy, toy_text,
     told = json.loads((done.folder / "summary.json").read_text())["quality"][0]
     found = statistics(done.folder)
     assert {name: told[name] for name in found} == found  # to the last bit
-    (done.folder / run_results.FORCES).unlink()
+    (done.folder / results_folder.FORCES).unlink()
     assert main(["report", str(done.folder)]) == 0
     assert statistics(done.folder) == found
 
@@ -112,8 +113,8 @@ def test_without_an_interval_figures_begin_after_the_raising(toy, toy_text, tmp_
     assert begin == pytest.approx(signals.time[first] + SETTLING, abs=1.5e-3)
     quality = done.assessments()[0].quality
     assert (quality.start, quality.end) == pytest.approx((50.0 * begin, 125.0), abs=0.1)
-    (band,) = interval_shape(done, (0.0, 125.0))  # drawn as it was evaluated
-    assert (band["x0"], band["x1"]) == pytest.approx((quality.start, quality.end))
+    (band,) = interval_band(done, (0.0, 125.0))  # drawn as it was evaluated
+    assert (band.start, band.end) == pytest.approx((quality.start, quality.end))
 
 
 def made_up(bump=0.05, where=(50.0, 100.0, 150.0), moment=0.3, slack=None):
@@ -174,8 +175,8 @@ def test_figures_of_older_results_are_made_with_the_filter_of_their_time(toy, to
     summary = {k: v for k, v in old.summary.items() if k not in ("format", "judged_by")}
     summary["settings"] = {k: v for k, v in summary["settings"].items() if k not in ("filter", "limits")}
     summary["filter"] = "zero-phase low-pass 0-20 Hz by discrete Fourier transform"
-    run_results.write_json(old.folder / "summary.json", summary)
-    (old.folder / run_results.FORCES).unlink()
+    results_folder.write_json(old.folder / "summary.json", summary)
+    (old.folder / results_folder.FORCES).unlink()
     read = run_results.read(old.folder)
     assert read.evaluation.filter == BEFORE_CHOICE
     assert read.assessments()[0].quality.sigma == sigma
@@ -191,13 +192,13 @@ def test_figures_of_older_results_are_made_with_the_filter_of_their_time(toy, to
     assert (told["same_filter"], told["rms"]) == (False, 0.0)  # one force, one filter for the difference
     assert main(["report", str(old.folder)]) == 0
     again = json.loads((old.folder / "summary.json").read_text())
-    assert (again["format"], again["quality"][0]["sigma"]) == (run_results.FORMAT, sigma)
+    assert (again["format"], again["quality"][0]["sigma"]) == (results_folder.FORMAT, sigma)
     assert run_results.read(old.folder).evaluation.filter == BEFORE_CHOICE
 
 
 def test_results_of_a_newer_version_are_refused(toy, toy_text, tmp_path):
     done = go(toy, tmp_path / "out", toy_text(""))
-    run_results.write_json(done.folder / "summary.json", {**done.summary, "format": run_results.FORMAT + 1})
+    results_folder.write_json(done.folder / "summary.json", {**done.summary, "format": results_folder.FORMAT + 1})
     with pytest.raises(MasterError, match="has format 3, this version reads up to 2"):
         run_results.read(done.folder)
 

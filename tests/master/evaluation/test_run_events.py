@@ -9,7 +9,7 @@ import pytest
 
 from master.commands.main import main
 from master.evaluation.run_events import AT_END, LOST, SLACK, Event, find_events
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.system.contacts import Contact
 
 CONTACT = Contact(1, "line", "pan", "line.pantograph[1].contact")

@@ -12,10 +12,10 @@ from master.batch.study.family import Family, Interval, Settings, Variant
 from master.batch.study.study_outcome import Done, Outcome, as_data
 from master.batch.study.study_table import figures_table
 from master.evaluation.interval_coverage import shortfall
-from master.recording.recorder import Recording
-from master.report import page
+from master.recording.recording import Recording
 from master.report.comparison_page import comparison_page
-from master.results import run_difference, run_results
+from master.report.run_page import page
+from master.results import run_difference, run_summary
 from master.results.run_results import Results
 from master.system.contacts import Contact
 
@@ -49,7 +49,7 @@ def test_a_run_that_is_not_complete_has_figures_and_no_verdict(status):
     (found,) = done.assessments()
     assert found.quality.mean == pytest.approx(140.0, abs=5.0)
     assert "figures so far" in found.withheld
-    (data,) = run_results.figures(done)["quality"]
+    (data,) = run_summary.figures(done)["quality"]
     assert (data["passed"], data["criteria"]) == (None, [])
     assert made(**LIMITS).assessments()[0].passed
 
@@ -61,7 +61,7 @@ def test_limits_that_nothing_was_held_to_are_named():
     assert found.passed
     assert found.unchecked.startswith("not checked: uplift at supports, for no support")
     assert "contact height range, for the height" in found.unchecked
-    assert run_results.figures(bare)["quality"][0]["unchecked"] == found.unchecked
+    assert run_summary.figures(bare)["quality"][0]["unchecked"] == found.unchecked
     assert found.unchecked in page(bare)
     between = made(interval=(110.0, 140.0), **LIMITS).assessments()[0]
     assert "uplift at supports" in between.unchecked

@@ -12,10 +12,13 @@ from master.commands.main import main
 from master.coupling.coupling_schemes import Iterative, Jacobi
 from master.errors import MasterError, RequestError, RunError
 from master.recording import checkpoint
-from master.recording.checkpoint import Continuation, index_at, pack, unpack
-from master.recording.recorder import load
-from master.run import loaded
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.recording.checkpoint import pack, unpack
+from master.recording.checkpoint_writer import index_at
+from master.recording.continuation import Continuation
+from master.recording.recording import load
+from master.run import connected_fmus
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 
 def go(scenario, folder, *options):
@@ -121,7 +124,10 @@ def test_an_fmu_that_restores_less_than_its_state_is_found_out(toy, saved):
     wrong = replace(found, outputs={**found.outputs, "pantograph.A.z": 1.0})
     with open_scenario(toy, Overrides(), build=False) as scenario:
         way = Continuation(wrong, "state")
-        with loaded(scenario.system) as network, pytest.raises(RunError, match="does not restore its whole state"):
+        with (
+            connected_fmus(scenario.system) as network,
+            pytest.raises(RunError, match="does not restore its whole state"),
+        ):
             way.prepare(network, Jacobi(), way.grid(scenario.system))
 
 
@@ -135,9 +141,9 @@ def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
     with open_scenario(toy, Overrides(scheme="iterative"), build=False) as scenario:
         for renewed, expected in (((), found.memory.tolist()), (("pantograph",), [])):
             way, scheme = Continuation(found, "state", renewed=renewed), Iterative()
-            with loaded(scenario.system) as network:
+            with connected_fmus(scenario.system) as network:
                 way.prepare(network, scheme, way.grid(scenario.system))
-                assert scheme.memory().tolist() == expected
+                assert scheme.save().tolist() == expected
                 if not renewed:
                     assert dict(zip(network.output_names, network.outputs.tolist(), strict=True)) == found.outputs
                     told = dict(zip(network.input_names, network.inputs.tolist(), strict=True))
@@ -146,10 +152,10 @@ def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
 
 def test_a_scheme_does_not_take_another_s_memory(toy, saved):
     found = replace(checkpoint.read(saved[1]), memory=np.array([1.0, 2.0]))
-    with open_scenario(toy, Overrides(), build=False) as scenario, loaded(scenario.system) as network:
+    with open_scenario(toy, Overrides(), build=False) as scenario, connected_fmus(scenario.system) as network:
         way, scheme = Continuation(found, "state"), Iterative()
         way.prepare(network, scheme, way.grid(scenario.system))
-        assert not scheme.memory().size
+        assert not scheme.save().size
 
 
 def test_fmus_that_cannot_serialise_are_named(toy):
@@ -163,7 +169,7 @@ def test_fmus_that_cannot_serialise_are_named(toy):
 def test_a_checkpoint_of_another_version_is_refused_in_one_sentence(tmp_path):
     path = tmp_path / "checkpoint.state"
     path.write_bytes(b"openpanto checkpoint 0\nwhatever came then")
-    with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 1: begin the run anew"):
+    with pytest.raises(MasterError, match="is a checkpoint of format 0, this version reads 2: start the run again"):
         checkpoint.read(path)
     path.write_bytes(b"something else")
     with pytest.raises(MasterError, match="is not a checkpoint"):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
 from master.results.run_results import Results
 from master.system.contacts import Contact
 

@@ -6,9 +6,9 @@ import subprocess
 
 import pytest
 
-from master import report
 from master.report import html_markup
 from master.report.comparison_page import comparison_page
+from master.report.run_page import page
 
 BROWSER = next((b for b in ("chromium", "chromium-browser", "google-chrome") if shutil.which(b)), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH: pages cannot be tried out")
@@ -36,7 +36,7 @@ def look_at(path, profile, *more):
 @pytest.fixture
 def page_of_run(made_up, tmp_path):
     path = tmp_path / "report.html"
-    path.write_text(report.page(made_up()), encoding="utf-8")
+    path.write_text(page(made_up()), encoding="utf-8")
     return path
 
 
@@ -84,7 +84,7 @@ def test_comparisons_are_drawn(made_up, tmp_path):
 @pytest.mark.slow
 def test_an_incomplete_run_has_a_page_that_works(made_up, tmp_path):
     path = tmp_path / "report.html"
-    path.write_text(report.page(made_up("interrupted", with_geometry=False)), encoding="utf-8")
+    path.write_text(page(made_up("interrupted", with_geometry=False)), encoding="utf-8")
     dom, said = look_at(path, tmp_path / "profile")
     assert said == []
     assert "Incomplete." in dom

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from master.errors import MasterError
-from master.report.charts.measured_charts import compare_measured, comparison_rows, read_measured
+from master.evaluation.measured_force import compare_measured, read_measured
+from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import columns, comparison_page
 from master.report.run_inputs import differing_inputs
 

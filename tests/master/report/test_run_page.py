@@ -8,9 +8,11 @@ import re
 import numpy as np
 import pytest
 
-from master import report
-from master.recording.recorder import Recording
+from master.recording.recording import Recording
+from master.report import run_page
+from master.report.charts.interactive_figure import interactive_figure
 from master.report.charts.run_charts import run_charts
+from master.report.result_tables import figure_rows
 from master.report.run_inputs import inputs_of, quality_rows
 from master.results.run_results import Results
 from master.system.contacts import Contact
@@ -25,11 +27,11 @@ def charts_of(run):
 
 
 def traces_of(chart):
-    return {t["name"]: t for t in chart.figure["data"]}
+    return {t["name"]: t for t in interactive_figure(chart)["data"]}
 
 
 def test_text_is_escaped_and_incompleteness_is_said_first(made_up):
-    page = report.page(made_up("failed"))
+    page = run_page.page(made_up("failed"))
     assert "&lt;made&gt; &amp; up" in page
     assert "<b>Incomplete.</b> This run is failed at t = 1 s. the wire &lt;broke&gt;" in page
     assert "<broke>" not in page
@@ -40,7 +42,7 @@ def test_text_is_escaped_and_incompleteness_is_said_first(made_up):
 
 
 def test_the_first_screen_has_what_en_50367_asks_for(made_up):
-    page = report.page(made_up())
+    page = run_page.page(made_up())
     tiles = page[page.index("class='tiles'") : page.index("<h2>Figures")]
     names = re.findall(r"class='name'><span>([^<]*)<", tiles)
     assert names == ["Fm", "\u03c3", "Fmax", "Fmin", "uplift", "loss"]
@@ -50,19 +52,19 @@ def test_the_first_screen_has_what_en_50367_asks_for(made_up):
 def test_every_criterion_has_its_clause(made_up):
     (assessment,) = made_up().assessments()
     assert all(c.source.startswith("EN 50367") and c.origin in ("recalled", "read") for c in assessment.criteria)
-    page = report.page(made_up())
+    page = run_page.page(made_up())
     assert all(f"{c.source}; {c.origin}" in page for c in assessment.criteria)
 
 
 def test_the_page_forbids_itself_the_network(made_up):
-    page = report.page(made_up())
+    page = run_page.page(made_up())
     assert "Content-Security-Policy" in page
     assert "default-src 'none'" in page
     assert not re.search(r"<(script|img|link)[^>]*(src|href)='http", page)
 
 
 def test_charts_are_json_with_units_on_every_axis(made_up):
-    page = report.page(made_up())
+    page = run_page.page(made_up())
     (text,) = re.findall(r"<script type='application/json' id='charts'>(.*?)</script>", page)
     charts = json.loads(text)
     assert len(charts) >= 9
@@ -77,7 +79,7 @@ def test_supports_stand_where_they_are(made_up):
     drawn = traces_of(chart)
     assert sorted(set(unpacked(drawn["support"]["x"]))) == [50.0, 100.0]  # 150 m is beyond the run
     assert sorted(set(unpacked(drawn["dropper"]["x"]))) == [55.0, 80.0, 105.0, 130.0]
-    (band,) = chart.figure["layout"]["shapes"]
+    (band,) = interactive_figure(chart)["layout"]["shapes"]
     assert (band["x0"], band["x1"]) == (50.0, 110.0)
 
 
@@ -102,13 +104,13 @@ def test_droppers_are_marked_slack_when_the_line_says_so(made_up, told_slack):
 
 
 def test_uplift_bars_are_in_millimetres_at_their_supports(made_up):
-    (bars,) = charts_of(made_up())["uplift"].figure["data"]
+    (bars,) = interactive_figure(charts_of(made_up())["uplift"])["data"]
     assert unpacked(bars["x"]).tolist() == [50.0, 100.0, 150.0]
     assert unpacked(bars["y"]) == pytest.approx([40.0] * 3)
 
 
 def test_histograms_sum_to_100_percent(made_up):
-    (bars,) = charts_of(made_up())["histogram"].figure["data"]
+    (bars,) = interactive_figure(charts_of(made_up())["histogram"])["data"]
     assert unpacked(bars["y"]).sum() == pytest.approx(100.0, rel=1e-5)
 
 
@@ -117,12 +119,12 @@ def test_what_has_no_data_has_no_chart(made_up):
     assert set(charts_of(bare)) == {"force_catenary_1", "histogram", "spectrum"}
     nothing = [dataclasses.replace(r, time=r.time[:0], values=r.values[:0]) for r in made_up().recordings]
     empty = dataclasses.replace(made_up("failed"), recordings=tuple(nothing))
-    assert "No contact-quality figures" in report.page(empty)
+    assert "No contact-quality figures" in run_page.page(empty)
 
 
 def test_rows_give_a_dash_where_there_is_no_value(made_up):
     (assessment,) = made_up().assessments()
-    rows = {r[0]: r[1] for r in report.figure_rows([assessment])}
+    rows = {r[0]: r[1] for r in figure_rows([assessment])}
     assert rows["contact on strip, least [mm]"] == "-"
     assert float(rows["mean force [N]"]) == pytest.approx(assessment.quality.mean, abs=0.05)
     assert float(rows["contact height range [mm]"]) == pytest.approx(18.0, rel=0.05)
@@ -183,5 +185,5 @@ def longest_run(contacts, seconds, supports, droppers):
 
 def test_the_longest_run_stays_below_8_megabytes():
     """30 s, four pantographs, 50 spans, every dropper recorded, no interval to choose from, and all of it noise."""
-    page = report.page(longest_run(contacts=4, seconds=30.0, supports=50, droppers=400))
+    page = run_page.page(longest_run(contacts=4, seconds=30.0, supports=50, droppers=400))
     assert len(page.encode()) < 8e6

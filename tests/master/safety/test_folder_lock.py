@@ -15,7 +15,7 @@ import pytest
 
 from master.commands.main import main
 from master.recording import checkpoint
-from master.recording.recorder import load
+from master.recording.recording import load
 from master.results import run_results
 from master.safety import folder_lock
 from master.safety.folder_lock import LOCK, OWNER, FolderInUseError, claimed
@@ -149,7 +149,7 @@ def test_a_second_run_is_refused_and_the_first_is_not_disturbed(toy, tmp_path, c
 def test_what_a_run_writes_is_not_read(toy, tmp_path, capsys, busy, verb):
     folder, _ = busy
     if verb == "resume":
-        (folder / checkpoint.NAME).write_bytes(b"openpanto checkpoint 1\n")
+        (folder / checkpoint.NAME).write_bytes(b"openpanto arrays 1\n")
         assert main([str(toy), "--no-build", "--resume", str(folder)]) == 1
         return
     arguments = ["report", str(folder)] if verb == "report" else ["compare", str(folder), str(folder)]
@@ -223,7 +223,7 @@ def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsy
 
     monkeypatch.setattr("master.recording.recorder.load", replaced)
     assert go(toy, folder, "--stop", "0.1") == 1
-    assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
+    assert "timeseries.csv is not what was written: it was changed while the run was in progress" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == "failed"
     assert "quality" not in summary

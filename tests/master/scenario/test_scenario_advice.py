@@ -9,7 +9,8 @@ import pytest
 from master.commands.main import main
 from master.scenario.scenario_advice import warnings
 from master.ssp.run_settings import RunSettings
-from master.system.components import Component, Connection, Fmu, System, Variable
+from master.system.components import Component, Fmu, System, Variable
+from master.system.connections import Connection
 
 
 def component(name, **values):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from master.errors import RequestError
-from master.scenario.open_scenario import with_values
+from master.scenario.overrides import with_values
 from master.ssp.ssp_units import COMMON, Unit, split_quantity
 from master.system.components import Component, Fmu, Variable
 from models.definition_files.si_units import SI

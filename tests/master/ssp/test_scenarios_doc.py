@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from master.errors import ScenarioError
-from master.scenario.open_scenario import Overrides, open_scenario
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 from tests.foreign_fmus import (
     binding,
     compile_library,

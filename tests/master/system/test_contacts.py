@@ -5,12 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from master.coupling.coupling_power import PowerObserver, power_residual
+from master.coupling.coupling_power import CouplingPowerObserver, power_residual
 from master.coupling.network import Network
+from master.evaluation.contact_positions import lateral_position
 from master.evaluation.line_geometry import indexed, support_uplifts
-from master.recording.recorder import Recording
-from master.system.components import Connection
-from master.system.contacts import Contact, find_contacts, lateral_position
+from master.recording.recording import Recording
+from master.system.connections import Connection
+from master.system.contacts import Contact, find_contacts
 
 
 def test_contacts_are_found_by_their_connections_in_the_order_of_the_ports():
@@ -86,10 +87,10 @@ def test_interface_power_is_summed_over_the_steps(fake_slave):
     random = np.random.default_rng(1)
     given, told = random.normal(size=(2, 50, 3))
     rows = list(zip(given, told, strict=True))
-    whole, first, second = (PowerObserver(contacts, network) for _ in range(3))
+    whole, first, second = (CouplingPowerObserver(contacts, network) for _ in range(3))
     observed(whole, network, rows)
     observed(first, network, rows[:20])
-    second.recall(json.loads(json.dumps(first.memory())))
+    second.restore(json.loads(json.dumps(first.save())))
     observed(second, network, rows[20:])
     assert second.summary(0.01) == whole.summary(0.01)
     (found,) = whole.summary(0.01)

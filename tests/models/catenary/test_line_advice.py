@@ -17,7 +17,7 @@ from models.catenary.line_advice import (
 )
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics.elasticity import contact_wire_wave_speed, wave_speed
-from models.commands import main
+from models.commands.physics_main import main
 
 
 def test_the_speed_is_compared_with_the_waves_of_the_longest_span(ln2):

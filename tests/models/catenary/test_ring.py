@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from models.catenary.definition.line_definition import read
+from models.catenary.definition.line_reading import read
 from models.catenary.line_energy import LineBalance
 from models.catenary.line_model import CatenaryModel, StripMotion
 from models.catenary.line_part import CatenaryPart
@@ -19,7 +19,7 @@ from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics.elasticity import elasticity
 from models.coupled.monolithic import CoupledModel
 from models.definition_files.toml_reader import DefinitionError, Table
-from models.library import line_names, line_path, load_line
+from models.library.catalogue import line_names, line_path, load_line
 
 STEP, SPAN = 1e-3, 50.0
 #: Contact forces that differ by less are the same but for rounding [N].
@@ -450,7 +450,7 @@ def test_kernels_go_round_as_numpy_does(ring_maker, cx, monkeypatch):
         monkeypatch.setenv("OPENPANTO_KERNEL", kernel)
         line = CatenaryModel(ring_maker(10))
         record = CoupledModel(line, [cx.with_values({"start_position": 1485.0, "raise_duration": 0.05})]).run(0.4, STEP)
-        assert type(line._step(STEP).stepper).__name__ == {"numpy": "Stepper", "numba": "CompiledStepper"}[kernel]
+        assert type(line._step(STEP).engine).__name__ == {"numpy": "NumpyEngine", "numba": "NumbaEngine"}[kernel]
         records.append(record)
     plain, compiled = records
     assert plain.contact_point[-1, 0, 0] > 1500.0

@@ -7,13 +7,15 @@ from scipy.sparse.linalg import spsolve
 
 from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter
+from models.catenary.contact_and_slack.crossing import engagement
 from models.catenary.line_model import CatenaryModel, StripMotion
 from models.catenary.line_part import CatenaryPart
-from models.contact_law import application_point, engagement
+from models.contact_law import application_point
 from models.coupled.monolithic import CoupledModel
-from models.library import load_pantograph
+from models.library.catalogue import load_pantograph
 from models.numerics.newmark import Newmark
-from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
+from models.pantograph.lumped.lumped_model import LumpedModel
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from tests.models.nodal_line import NodalLine
 
 START = 70.0

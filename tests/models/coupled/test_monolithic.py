@@ -7,10 +7,11 @@ from scipy.sparse.linalg import spsolve
 
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
-from models.commands import main
+from models.commands.physics_main import main
 from models.coupled.monolithic import CoupledModel
 from models.numerics.newmark import Newmark
-from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
+from models.pantograph.lumped.lumped_model import LumpedModel
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from tests.models.nodal_line import NodalLine
 
 START, STOP = 60.0, 1.2

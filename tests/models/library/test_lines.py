@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.catenary.shape.line_mesh import build_mesh
-from models.library import line_names, line_path, load_line
+from models.library.catalogue import line_names, line_path, load_line
 
 SOURCE_LINES = ("C270", "LN1", "LN2", "LN6", "Re330", "Shinkansen", "generic_simple")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.definition_files.toml_reader import DefinitionError, Table
-from models.library import load_pantograph
+from models.library.catalogue import load_pantograph
 from models.pantograph.lumped.lumped_definition import read_lumped
 from models.pantograph.lumped.lumped_model import LumpedModel
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.catenary.line_part import CatenaryPart
-from models.library import load_line
-from models.pantograph.lumped.lumped_model import LumpedPantographPart
+from models.library.catalogue import load_line
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 
 BASE, NOWHERE = np.zeros(2), np.array([[[[50.0, y, -50.0], [0.0, 0.0, 0.0]] for y in (0.7, -0.7)]])
 WATCHED = {"monitor_energy": 1}

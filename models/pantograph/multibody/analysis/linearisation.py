@@ -10,13 +10,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import ComplexArray, FloatArray
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import null_space
-
-ComplexArray = npt.NDArray[np.complex128]
 
 #: Difference step, in scaled coordinates of the size of the motion below [m, rad].
 _STEP: Final = 1e-3

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import ComplexArray, FloatArray
 from models.pantograph.multibody.analysis.linearisation import (
-    ComplexArray,
     Mode,
     apparent_mass,
     base_transmission,

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.analysis.linearisation import stiffness
 from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_assembly import assemble, coordinate, null_space, project

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.elements.moving_vectors import Handle, Kinematics, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross
 from models.pantograph.multibody.mechanism_definition import Force

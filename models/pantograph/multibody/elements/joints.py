@@ -23,7 +23,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 from models.pantograph.multibody.elements.moving_vectors import GROUND, Handle, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross, normals
 from models.pantograph.multibody.mechanism_definition import Joint

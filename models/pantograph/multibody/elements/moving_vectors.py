@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray, IntArray
+from models.arrays import FloatArray, IntArray
 
 #: Body number of vectors fixed to the ground.
 GROUND: Final = -1

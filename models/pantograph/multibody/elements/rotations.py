@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.definition_files.parameter import FloatArray
+from models.arrays import FloatArray
 
 
 def _rotation_table() -> FloatArray:

@@ -9,7 +9,7 @@ from master.batch.study.study_session import study
 from master.batch.study.variants import Runner, calibrate_variant
 from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError, RequestError
-from master.results.run_results import is_ours
+from master.results.results_folder import is_ours
 from master.system.components import without
 
 

@@ -10,7 +10,7 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 
 from master.fmu.fmu_description import read_fmu
-from master.fmu.isolation import IsolatedInstance, Isolation
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 from master.system.components import Component
 
 CRASHER = '''

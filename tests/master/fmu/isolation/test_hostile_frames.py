@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from master.errors import SlaveError
-from master.fmu.isolation import IsolatedInstance, Isolation, isolated_instance
+from master.fmu.isolation import isolated_instance
 from master.fmu.isolation.channel import HEADER, LONGEST_TEXT, Answer, Channel, EndedError, ProtocolError
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 
 
 class Puppet:

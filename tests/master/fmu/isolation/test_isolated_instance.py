@@ -15,7 +15,7 @@ import pytest
 
 from master.errors import SlaveError
 from master.fmu.instance import Instance
-from master.fmu.isolation import IsolatedInstance, Isolation
+from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
 
 ROOT = Path(__file__).parents[4]
 
@@ -194,7 +194,7 @@ def test_a_child_in_an_endless_loop_ends_with_its_master(crasher_fmu):
         import numpy as np
         from pathlib import Path
         from master.fmu.fmu_description import read_fmu
-        from master.fmu.isolation import IsolatedInstance, Isolation
+        from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
         from master.system.components import Component
         fmu = read_fmu(Path({str(crasher_fmu)!r}))
         toy = IsolatedInstance(Component("toy", fmu, {{"deed": 3}}, ("u",), ("pid",)), Isolation())

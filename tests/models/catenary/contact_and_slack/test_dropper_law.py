@@ -8,7 +8,7 @@ import pytest
 from models.catenary.shape.line_matrices import slack_delay
 from models.catenary.shape.line_mesh import build_mesh
 from models.definition_files.toml_reader import DefinitionError
-from models.library import line_names, load_line
+from models.library.catalogue import line_names, load_line
 
 
 def test_the_law_is_tension_unless_the_file_says_otherwise(line_maker):

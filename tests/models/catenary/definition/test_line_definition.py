@@ -4,11 +4,11 @@ import tomllib
 
 import pytest
 
-import models.library
-from models.catenary.definition.line_definition import Rayleigh, load, read
+from models.catenary.definition.line_definition import Rayleigh
+from models.catenary.definition.line_reading import load, read
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError, Table
-from models.library import line_names, line_path, load_line
+from models.library.catalogue import UnknownNameError, line_names, line_path, load_line
 
 SOURCE = "test"
 
@@ -209,5 +209,5 @@ def test_changing_every_parameter_to_its_own_value_changes_nothing(name):
 
 
 def test_unknown_lines_are_told_with_the_known_ones():
-    with pytest.raises(models.library.UnknownNameError, match="Re330"):
+    with pytest.raises(UnknownNameError, match="Re330"):
         load_line("LN7")

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.wire_intervals import attachments, intervals, plan_angles, plan_rotation, without_rounding
-from models.library import load_line
+from models.library.catalogue import load_line
 from tests.models.nodal_line import NodalLine
 
 

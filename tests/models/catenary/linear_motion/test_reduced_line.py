@@ -9,7 +9,7 @@ from models.catenary.line_part import CatenaryPart
 from models.catenary.statics.elasticity import elasticity
 from models.coupled.monolithic import CoupledModel
 from models.definition_files.parameter import ParameterError
-from models.library import line_names, load_line
+from models.library.catalogue import line_names, load_line
 from models.numerics.newmark import Newmark
 from tests.models.nodal_line import NodalLine
 

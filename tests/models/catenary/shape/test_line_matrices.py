@@ -13,7 +13,7 @@ from models.catenary.definition.line_definition import COMPONENTS, Damping, Drop
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.line_matrices import assemble, beam_properties, compression_ratio, dropper_stiffness
 from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
-from models.library import line_names, load_line
+from models.library.catalogue import line_names, load_line
 
 GRAVITY = 9.81
 

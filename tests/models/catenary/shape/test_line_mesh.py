@@ -7,7 +7,7 @@ import pytest
 
 from models.catenary.definition.line_definition import COMPONENTS
 from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
-from models.library import line_names, load_line
+from models.library.catalogue import line_names, load_line
 
 
 @pytest.fixture(scope="module", params=line_names())

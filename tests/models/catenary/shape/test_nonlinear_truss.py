@@ -11,7 +11,7 @@ import pytest
 
 from models.catenary.line_model import CatenaryModel
 from models.catenary.statics import elasticity
-from models.library import load_line
+from models.library.catalogue import load_line
 from tests.models.nonlinear_truss import Truss
 
 FORCE = 100.0

@@ -14,7 +14,7 @@ from models.catenary.shape.line_matrices import pendulum_stiffness
 from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics import elasticity
 from models.definition_files.parameter import ParameterError
-from models.library import line_names, load_line
+from models.library.catalogue import line_names, load_line
 from tests.models import nodal_line
 
 GRAVITY = 9.81

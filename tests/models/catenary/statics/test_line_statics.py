@@ -9,8 +9,8 @@ import pytest
 from models.catenary.definition.line_definition import Wire
 from models.catenary.line_model import CatenaryModel
 from models.catenary.statics import elasticity
-from models.commands import main
-from models.library import line_names, load_line
+from models.commands.physics_main import main
+from models.library.catalogue import line_names, load_line
 from tests.models.nodal_line import NodalLine
 
 

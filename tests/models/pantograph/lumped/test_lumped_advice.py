@@ -2,7 +2,7 @@
 
 import pytest
 
-from models.library import load_lumped
+from models.library.catalogue import load_lumped
 from models.pantograph.lumped.lumped_advice import working_height_warning
 
 

@@ -6,7 +6,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 from models.definition_files.parameter import ParameterError
-from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
+from models.pantograph.lumped.lumped_model import LumpedModel
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 
 POINT, BASE = np.zeros(3), np.zeros(2)
 

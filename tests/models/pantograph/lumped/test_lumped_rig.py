@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from models.pantograph.lumped.lumped_definition import Stage
-from models.pantograph.lumped.lumped_model import LumpedModel, LumpedPantographPart
+from models.pantograph.lumped.lumped_model import LumpedModel
+from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from models.pantograph.lumped.lumped_rig import apparent_mass, contact_force_over_height, modes
 
 

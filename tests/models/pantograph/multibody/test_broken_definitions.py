@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.commands import main
 from models.commands.pantograph_command import friction_warning
+from models.commands.physics_main import main
 from models.definition_files.toml_reader import DefinitionError
-from models.library import pantograph_path
+from models.library.catalogue import pantograph_path
 from models.pantograph.multibody import mechanism_definition
 from models.pantograph.multibody.analysis.mechanism_rig import Rig
 from models.pantograph.multibody.mechanism import MechanismError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.definition_files.parameter import ParameterError
-from models.library import load_pantograph
+from models.library.catalogue import load_pantograph
 from models.pantograph.multibody.analysis.mechanism_rig import Rig
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from models.pantograph.working_height import Raised

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.library import load_pantograph
+from models.library.catalogue import load_pantograph
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 
 

@@ -5,8 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, settle_springs
+from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
 from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
-from models.pantograph.multibody.multibody_part import BaseMotion, LateralExtrapolation, MultibodyPantographPart
+from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from tests.models.pantograph.multibody.mechanisms import library
 from tests.models.pantograph.multibody.test_mechanisms import run
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from master.coupling.network import Network
-from master.coupling.track_watch import TrackWatch
+from master.coupling.off_wire_stop import OffWireStop
 from master.errors import RunError
 from master.system.contacts import Contact
-from tests.master.scenario.test_scenario_checks import pantograph, system
+from tests.master.scenario.test_value_checks import pantograph, system
 
 CONTACT = Contact(1, "line", "train", "line.contact")
 EXTENT = {"line": {"contact_wire.begin": 10.0, "contact_wire.end": 500.0}}
@@ -26,7 +26,7 @@ def watching(fake_slave, x, known=EXTENT, stop=5.0, start=0.0, **starts):
 
     show(0.0, x)
     run = system(pantograph(**{**RAISED, **starts}), stop=stop, start=start)
-    watch = TrackWatch(run, [CONTACT], network, lambda: known)
+    watch = OffWireStop(run, [CONTACT], network, lambda: known)
     watch.begin(start, network)
 
     def at(time, force, place):

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from master.coupling.network import Network
 from master.errors import RunError
-from master.evaluation.line_geometry import Geometry
-from master.scenario.scenario_checks import final_position, parameter_value
 from master.system.components import System
 from master.system.contacts import Contact
+from master.system.pantograph_motion import final_position, parameter_value
 
 #: Calculated parameters of a line that ends: where its contact wires begin and end along the track [m].
 BEGIN: Final = "contact_wire.begin"
@@ -22,7 +21,7 @@ LONGEST_RISE: Final = 1.0
 _RAISING: Final = ("raise_start", "raise_duration")
 
 
-class TrackWatch:
+class OffWireStop:
     """Observer that ends a run whose pantograph is not under the wire.
 
     What is not told by an FMU is not looked at: where its wire ends, where a pantograph will be, when it is raised.
@@ -39,7 +38,11 @@ class TrackWatch:
     """
 
     def __init__(
-        self, system: System, contacts: Sequence[Contact], network: Network, geometry: Callable[[], Geometry]
+        self,
+        system: System,
+        contacts: Sequence[Contact],
+        network: Network,
+        geometry: Callable[[], Mapping[str, Mapping[str, float]]],
     ) -> None:
         self._system = system
         self._contacts = tuple(contacts)

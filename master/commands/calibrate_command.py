@@ -1,0 +1,124 @@
+"""The verb ``calibrate``."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from master.batch import calibration
+from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say, say_warnings
+from master.commands.run_command import run_shown
+from master.errors import MasterError, Problem, RequestError, ScenarioError
+from master.results import run_results
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import find_parameter
+from master.ssp.archive import SSD_NAME, Package, Sources
+from master.ssp.run_settings import Calibration
+from master.ssp.ssd import read_structure
+from master.ssp.ssp_xml import Reader
+from master.system.components import System
+
+
+def add_calibrate(verbs: Any) -> None:
+    """Declare ``calibrate`` and its options."""
+    text = "find the parameter value that gives the wanted mean force and store it in the scenario"
+    parser = add_verb(verbs, "calibrate", text, _calibrate, scenario=True)
+    add_overrides(parser)
+    parser.add_argument(
+        "--parameter", metavar="COMPONENT.PARAMETER", help="what to change; default: as the scenario says"
+    )
+    parser.add_argument(
+        "--mean", type=positive_number, metavar="N", help="wanted mean force [N]; default: as the scenario says"
+    )
+    parser.add_argument("--tolerance", type=positive_number, metavar="N", help="how near is enough [N], default 0.1")
+    parser.add_argument("--dry-run", action="store_true", help="do not store the value")
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    is_stored = not (options.dry_run or options.set)
+    is_folder = options.scenario.is_dir()
+    with calibration.unchanged(options.scenario) if is_stored and is_folder else nullcontext(lambda: None) as check:
+        return _calibrated(options, is_stored, check)
+
+
+def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[], None]) -> int:
+    with open_scenario(options.scenario, overrides_of(options), say, not options.no_build) as scenario:
+        system = scenario.system
+        say_warnings(system)
+        task = _task(options, system)
+        place = _place(scenario.package, task.parameter) if is_stored else None
+        found = _found(system, task)
+        print(
+            f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
+            f"({len(found.trials)} runs; filter {_filter_of(system)})"
+        )
+        if place is not None:
+            note = (
+                f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) after {_filter_of(system)}, with "
+                f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
+                f"in {len(found.trials)} runs of 'python -m master calibrate'"
+            )
+            check()
+            calibration.store_value(*place, found.value, note)
+            print(f"stored in {place[0]}")
+    return 0
+
+
+def _filter_of(system: System) -> str:
+    return run_results.filter_of(system.settings.filter.model_dump()).short
+
+
+def _found(system: System, task: Calibration) -> calibration.CalibrationResult:
+    start = _start_value(system, task.parameter)
+    return calibration.find_value(lambda value: _trial(system, task, value), task.mean_force, start, task.tolerance)
+
+
+def _task(options: argparse.Namespace, system: System) -> Calibration:
+    known = system.settings.calibration
+    parameter = options.parameter or (known.parameter if known else None)
+    mean = options.mean or (known.mean_force if known else None)
+    if parameter is None or mean is None:
+        raise RequestError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
+    tolerance = options.tolerance or (known.tolerance if known else 0.1)
+    return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
+
+
+def _start_value(system: System, parameter: str) -> float:
+    index, variable = find_parameter(system.components, parameter)
+    component = system.components[index]
+    if variable.type != "Real":
+        raise RequestError(f"parameter '{parameter}' is not Real and cannot be calibrated")
+    return float(component.parameters.get(variable.name, variable.start or 0.0))
+
+
+def _trial(system: System, task: Calibration, value: float) -> float:
+    index, variable = find_parameter(system.components, task.parameter)
+    component = system.components[index]
+    changed = replace(component, parameters={**component.parameters, variable.name: value})
+    components = (*system.components[:index], changed, *system.components[index + 1 :])
+    with tempfile.TemporaryDirectory(prefix="calibrate-") as folder:
+        done = run_shown(replace(system, components=components), Path(folder), quiet=False)
+        for assessment in done.assessments():
+            if assessment.quality.contact == task.contact:
+                say(f"{task.parameter} = {value:.6g}: mean force {assessment.quality.mean:.3f} N")
+                return assessment.quality.mean
+    raise MasterError(f"contact {task.contact} has no figures in the interval of interest; nothing to calibrate on")
+
+
+def _place(package: Package, parameter: str) -> tuple[Path, str]:
+    """Return the ``.ssv`` file that holds a parameter, and its name there."""
+    if not package.writable:
+        raise RequestError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
+    structure = read_structure(Sources(package.root), Reader(SSD_NAME))
+    for c in structure.components:
+        for binding in c.bindings:
+            for p in binding.parameters.parameters:
+                if f"{c.name}.{binding.prefix}{p.name}" == parameter:
+                    return package.root / p.file, p.name
+    text = f"parameter '{parameter}' is not in the scenario's parameter files; add it, or use --dry-run"
+    raise ScenarioError([Problem(SSD_NAME, 0, "calibration", text)])

@@ -1,0 +1,270 @@
+"""A measured contact force beside the simulated one: read, filtered alike, compared."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from master.arrays import BoolArray, FloatArray
+from master.errors import MasterError, one_line
+from master.evaluation.contact_signals import Signals
+from master.evaluation.filters import low_pass
+
+_TITLE: Final = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")
+_POSITIONS: Final = ("x", "position", "track position", "distance", "chainage", "km")
+_TIMES: Final = ("t", "time")
+_FORCES: Final = ("f", "fc", "force", "contact force")
+#: Units of each kind of column and their factors.
+_LENGTHS: Final = {"m": 1.0, "km": 1e3, "": 1.0}
+_DURATIONS: Final = {"s": 1.0, "ms": 1e-3, "": 1.0}
+_NEWTONS: Final = {"n": 1.0, "kn": 1e3, "": 1.0}
+#: Magnitude beyond which no time, place or force lies; sums and squares stay finite.
+_LARGEST: Final = 1e12
+#: Share of the interval of interest that counts as all of it: rows of a measurement seldom stand on its ends.
+_WHOLE: Final = 0.99
+_SPELLED: Final = {"m": "m", "km": "km", "s": "s", "ms": "ms", "n": "N", "kn": "kN"}
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measured contact force.
+
+    Attributes
+    ----------
+    source : str
+        File name.
+    over_time : bool
+        Whether the abscissa is time [s]; otherwise track position [m].
+    abscissa, force : ndarray, shape (n,)
+        Increasing abscissa and force [N].
+    """
+
+    source: str
+    over_time: bool
+    abscissa: FloatArray
+    force: FloatArray
+
+
+@dataclass(frozen=True)
+class MeasuredComparison:
+    """Measured and simulated low-passed force at the same instants.
+
+    Attributes
+    ----------
+    source : str
+        File name of the measurement.
+    pantograph : str
+        The simulated one.
+    position, simulated, measured : ndarray, shape (n,)
+        Track position [m] and forces [N] where both are known within the interval of interest.
+    part : str
+        Which part of the interval of interest that is; empty if all of it.
+    coarse : str
+        That the measurement's rows are too far apart for the filter's band; empty if they are not.
+    """
+
+    source: str
+    pantograph: str
+    position: FloatArray
+    simulated: FloatArray
+    measured: FloatArray
+    part: str = ""
+    coarse: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the figures do not say themselves."""
+        return tuple(filter(None, (self.part, self.coarse)))
+
+    @property
+    def start(self) -> float:
+        """First track position compared [m]."""
+        return float(self.position[0])
+
+    @property
+    def end(self) -> float:
+        """Last track position compared [m]."""
+        return float(self.position[-1])
+
+    @property
+    def correlation(self) -> float | None:
+        """Pearson's coefficient, None where a force is constant."""
+        if min(self.simulated.std(), self.measured.std()) <= 1e-9:
+            return None
+        return float(np.corrcoef(self.simulated, self.measured)[0, 1])
+
+    @property
+    def rms(self) -> float:
+        """Root mean square difference [N]."""
+        return float(np.sqrt(np.mean((self.simulated - self.measured) ** 2)))
+
+
+def read_measured(path: Path) -> Measurement:
+    """Read a CSV file with a header: one column of position or time, one of force; units in brackets.
+
+    Positions may be in m or km, times in s or ms, forces in N or kN. Columns are separated by commas or
+    semicolons; further columns are left out.
+
+    Raises
+    ------
+    MasterError
+        If it cannot be read, a column is missing, there twice or in another unit, a cell is no finite number, or
+        the abscissa does not increase.
+    """
+    rows = _rows(path)
+    titles = [_title(t) for t in rows[0].cells] if rows else []
+    place, over_time = _abscissa(path, titles)
+    force = _find(path, titles, _FORCES)
+    if force is None:
+        raise MasterError(f"{path} has no column named force (e.g. 'force [N]')")
+    for row in rows[1:]:
+        if len(row.cells) != len(titles):
+            raise MasterError(f"{path}:{row.line}: has {len(row.cells)} cells, the head has {len(titles)}")
+    known = _DURATIONS if over_time else _LENGTHS
+    factors = (_factor(path, titles[place], known), _factor(path, titles[force], _NEWTONS))
+    values = [_column(path, rows[1:], i, f) for i, f in zip((place, force), factors, strict=True)]
+    return _checked(path, over_time, rows[1:], *values)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A row that is not empty, with the line of the file that it ends in."""
+
+    line: int
+    cells: list[str]
+
+
+def _rows(path: Path) -> list[_Row]:
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        reader = csv.reader(lines, delimiter=";" if lines and ";" in lines[0] else ",")
+        return [_Row(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
+    except OSError as error:
+        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
+    except UnicodeDecodeError as error:
+        raise MasterError(f"{path} is not UTF-8 text (byte {error.start})") from error
+    except csv.Error as error:
+        raise MasterError(f"{path} is not a table of separated values ({error})") from error
+
+
+def _title(title: str) -> tuple[str, str]:
+    match = _TITLE.fullmatch(title.strip())
+    return (match["name"].lower(), (match["unit"] or "").lower()) if match else (title.lower(), "")
+
+
+def _abscissa(path: Path, titles: Sequence[tuple[str, str]]) -> tuple[int, bool]:
+    for names, over_time in ((_POSITIONS, False), (_TIMES, True)):
+        found = _find(path, titles, names)
+        if found is not None:
+            return found, over_time
+    raise MasterError(f"{path} has no column named position or time (e.g. 'position [m]', 'time [s]')")
+
+
+def _find(path: Path, titles: Sequence[tuple[str, str]], names: Sequence[str]) -> int | None:
+    found = [i for i, (name, _) in enumerate(titles) if name in names]
+    if len(found) > 1:
+        columns = " and ".join(f"'{titles[i][0]}' (column {i + 1})" for i in found)
+        raise MasterError(f"{path} has several columns of the same meaning: {one_line(columns)}; remove all but one")
+    return found[0] if found else None
+
+
+def _factor(path: Path, title: tuple[str, str], known: Mapping[str, float]) -> float:
+    name, unit = title
+    if name == "km" and unit == "":
+        return 1e3
+    if unit not in known:
+        units = " or ".join(_SPELLED[u] for u in known if u)
+        raise MasterError(f"{path}: column '{name}' has the unit '{one_line(unit)}'; {units} is needed")
+    return known[unit]
+
+
+def _column(path: Path, rows: Sequence[_Row], index: int, factor: float) -> FloatArray:
+    return factor * np.array([_number(path, row, index) for row in rows])
+
+
+def _number(path: Path, row: _Row, index: int) -> float:
+    text = row.cells[index].strip()
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    # Python reads 1_000, and the digits of every script; in a table they are slips of the pen.
+    if not abs(value) <= _LARGEST or "_" in text or not text.isascii():
+        raise MasterError(f"{path}:{row.line}: '{one_line(text)}' in column {index + 1} is not a finite number")
+    return value
+
+
+def _checked(path: Path, over_time: bool, rows: Sequence[_Row], abscissa: FloatArray, force: FloatArray) -> Measurement:
+    if len(abscissa) < 3:
+        raise MasterError(f"{path} must hold at least three rows of numbers; it holds {len(abscissa)}")
+    back = np.flatnonzero(np.diff(abscissa) <= 0.0)
+    if back.size:
+        line, what = rows[int(back[0]) + 1].line, "time" if over_time else "position"
+        value = rows[int(back[0]) + 1].cells
+        text = f"the {what} does not increase from the row before ({one_line(', '.join(value))})"
+        raise MasterError(f"{path}:{line}: {text}")
+    return Measurement(path.name, over_time, abscissa, force)
+
+
+def compare_measured(s: Signals, measurement: Measurement) -> MeasuredComparison:
+    """Put a measurement beside a simulated contact; both are low-passed with the run's filter.
+
+    The measured force is brought to the simulation's instants, then filtered as the simulated one is.
+
+    Raises
+    ------
+    MasterError
+        If it does not overlap the interval of interest.
+    """
+    there = s.time if measurement.over_time else s.position
+    known = (there >= measurement.abscissa[0]) & (there <= measurement.abscissa[-1])
+    both = known & s.inside & np.isfinite(s.shown)
+    if np.count_nonzero(both) < 3:
+        first, last = measurement.abscissa[0], measurement.abscissa[-1]
+        unit = "s" if measurement.over_time else "m"
+        raise MasterError(
+            f"{measurement.source} ({first:g} {unit} to {last:g} {unit}) lies outside the interval of interest"
+        )
+    filtered = _filtered(s, measurement, there, known)
+    texts = _part(s, both), _coarse(s, measurement, there, both)
+    return MeasuredComparison(
+        measurement.source, s.contact.pantograph, s.position[both], s.filtered[both], filtered[both], *texts
+    )
+
+
+def _part(s: Signals, both: BoolArray) -> str:
+    shared, whole = np.count_nonzero(both), np.count_nonzero(s.inside)
+    if shared >= _WHOLE * whole:
+        return ""
+    return f"only {100.0 * shared / whole:.3g} % of the interval of interest is measured: both columns are of that part"
+
+
+def _coarse(s: Signals, measurement: Measurement, there: FloatArray, both: BoolArray) -> str:
+    """Return that neighbouring rows are too far apart, in what is compared, to tell the force up to the cut-off."""
+    rows = np.interp(measurement.abscissa, *_increasing(there[both], s.time[both]), left=np.nan, right=np.nan)
+    times = np.concatenate(([s.time[both][0]], rows[np.isfinite(rows)], [s.time[both][-1]]))
+    longest, needed = float(np.diff(times).max()), 0.5 / s.filter.cutoff
+    if longest <= needed * (1.0 + 1e-6):
+        return ""
+    return (
+        f"rows of the measurement lie up to {1e3 * longest:.3g} ms apart; {s.filter.cutoff:g} Hz needs at most "
+        f"{1e3 * needed:g} ms: what lies between them is a straight line, and its sigma and extremes are too small"
+    )
+
+
+def _increasing(places: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    order = np.argsort(places, kind="stable")
+    return places[order], times[order]
+
+
+def _filtered(s: Signals, measurement: Measurement, there: FloatArray, known: BoolArray) -> FloatArray:
+    filtered = np.full(len(there), np.nan)
+    filtered[known] = low_pass(np.interp(there[known], measurement.abscissa, measurement.force), s.step, s.filter)
+    return filtered

@@ -1,0 +1,29 @@
+"""What a run's folder is given to look at: ``report.html``, and every chart that goes to paper as PNG and SVG."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from master.evaluation.measured_force import MeasuredComparison
+from master.report.charts.run_charts import file_charts
+from master.report.charts.static_figure import static_figure
+from master.report.run_page import page
+from master.results import results_folder
+from master.results.run_results import Results
+from master.safety.safe_files import atomic_file, write_atomically
+
+#: Endings of the charts' files, and what is asked of each format: no date, so that equal runs have equal files.
+_FORMATS: Final[dict[str, dict[str, Any]]] = {"svg": {"metadata": {"Date": None}}, "png": {"dpi": 130}}
+
+
+def write(done: Results, measured: MeasuredComparison | None = None) -> Path:
+    """Write the charts' files and ``report.html`` into the run's folder, and return the report's path."""
+    path = done.folder / results_folder.REPORT
+    write_atomically(path, page(done, measured).encode())
+    for name, charts in file_charts(done).items():
+        figure = static_figure(charts)
+        for ending, options in _FORMATS.items():
+            with atomic_file(done.folder / f"{name}.{ending}") as temporary:
+                figure.savefig(temporary, format=ending, **options)
+    return path

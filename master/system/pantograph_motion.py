@@ -1,0 +1,32 @@
+"""Where pantographs will be, as far as the parameters of their FMUs say."""
+
+from __future__ import annotations
+
+import math
+
+from master.system.components import Component, System
+from master.system.contacts import find_contacts
+
+
+def parameter_value(component: Component, name: str) -> float | None:
+    """Return the value that a Real parameter will have, None if there is no such parameter or no value."""
+    variable = component.fmu.variables.get(name)
+    if variable is None or variable.causality != "parameter" or variable.type != "Real":
+        return None
+    try:
+        value = float(component.parameters.get(name, variable.start or math.nan))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def pantographs(system: System) -> tuple[Component, ...]:
+    """Return the components that are told a contact force, each once."""
+    names = dict.fromkeys(c.pantograph for c in find_contacts(system.connections))
+    return tuple(system.component(name) for name in names)
+
+
+def final_position(system: System, pantograph: Component) -> float | None:
+    """Return where a pantograph is at the stop time [m], None if its FMU does not tell start and speed."""
+    start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
+    return None if start is None or speed is None else start + speed * (system.stop - system.start)

@@ -1,0 +1,55 @@
+"""``python -m models``: the verbs, and how their errors reach the user."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from models.catenary.contact_and_slack.local_problem import LocalSolutionError
+from models.catenary.shape.form_finding import EquilibriumError
+from models.commands import couple_command, identify_command, pantograph_command, statics_command
+from models.definition_files.parameter import ParameterError
+from models.definition_files.toml_reader import DefinitionError, printable
+from models.library.catalogue import UnknownNameError
+from models.numerics.kernel_cache import KernelError
+from models.pantograph.multibody.mechanism import MechanismError
+
+_VERBS = (couple_command, statics_command, pantograph_command, identify_command)
+#: What a user can cause; everything else is a defect and keeps its traceback.
+_USER_ERRORS = (
+    DefinitionError,
+    EquilibriumError,
+    KernelError,
+    LocalSolutionError,
+    MechanismError,
+    ParameterError,
+    UnknownNameError,
+)
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run ``python -m models``; return 0, 1 (failed or invalid) or 2 (a command line that was not understood)."""
+    parser = argparse.ArgumentParser(prog="python -m models", description="Physics of lines and pantographs.")
+    subparsers = parser.add_subparsers(dest="verb", required=True)
+    for verb in _VERBS:
+        verb.add(subparsers)
+    arguments = parser.parse_args(argv)
+    try:
+        code = int(arguments.run(arguments))
+        if sys.stdout is not None:  # closed by the caller
+            sys.stdout.flush()  # here, where an error can still be told
+    except OSError as error:
+        text = f"{error.filename or 'standard output'}: {error.strerror or error}"
+        print(f"error: {printable(text)}", file=sys.stderr)
+        return 1
+    except _USER_ERRORS as error:
+        print(f"error: {printable(str(error))}", file=sys.stderr)
+        return 1
+    except MemoryError:
+        print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 1
+    return code

@@ -19,7 +19,7 @@ from fmus.builder.fmu_build import (
     recipe,
     why_no_loader,
 )
-from fmus.builder.standalone import bundled_platform, runtime_of, write_runtime
+from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
 from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
 from models.definition_files.toml_reader import printable

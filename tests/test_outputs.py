@@ -13,7 +13,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from fmus.builder import fmu_build as building
-from fmus.builder.fmu_build import BuildError
+from fmus.builder import recipe
+from fmus.builder.recipe import BuildError
 from master.batch.calibration import store_value
 from master.errors import MasterError
 from master.safety import safe_files
@@ -104,7 +105,7 @@ def test_an_fmu_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(building, "archive", lambda *_: b"new")
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(BuildError, match=r"Pantograph_CX\.fmu cannot be written \(No space left on device\)"):
-        building.build(building.recipe("Pantograph_CX"), tmp_path)
+        building.build(recipe.recipe("Pantograph_CX"), tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 

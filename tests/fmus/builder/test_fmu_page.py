@@ -10,9 +10,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-from fmus.builder.fmu_build import archive, recipe
+from fmus.builder.fmu_build import archive
 from fmus.builder.fmu_page import rows
 from fmus.builder.icon import SIZE, icon
+from fmus.builder.recipe import recipe
 from fmus.slave.ports import Signal
 from tests.fmus.support import toy_recipe
 

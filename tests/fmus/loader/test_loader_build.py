@@ -14,7 +14,8 @@ import fmpy
 import pytest
 
 from fmus.builder import fmu_build as builder
-from fmus.builder.fmu_build import archive, build, fingerprint, recipe
+from fmus.builder.fmu_build import archive, build
+from fmus.builder.recipe import fingerprint, recipe
 from fmus.loader import loader_build
 from fmus.loader.fmu_opening import forget, problem
 from tests.fmus.support import toy_recipe

@@ -15,7 +15,8 @@ import pytest
 import scipy
 
 from fmus.__main__ import main
-from fmus.builder.fmu_build import BuildError, build
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import BuildError
 from fmus.builder.standalone_fmu import write_runtime
 from fmus.loader import fmu_opening, loader_build
 from fmus.loader.elf_library import ElfError, is_aligned, needed, soname

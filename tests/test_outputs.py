@@ -38,7 +38,7 @@ WHOLE = {
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_whole", "write_csv", "write_figure"},
     "models/numerics/kernel_cache.py": None,
-    "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_whole"},
+    "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_atomically"},
     "fmus/loader/runtime.py": {"_archive", "_replace"},
 }
 #: Functions that are called ``write_text`` and ``save`` and are no writing by a file's name.
@@ -85,7 +85,7 @@ def full(*_):
         (lambda p: physics_files.write_text(p, "new"), OSError),
         (lambda p: physics_files.write_csv(p, ["a"], [np.zeros(3)]), OSError),
         (lambda p: physics_files.write_figure(p, Figure(), 50), OSError),
-        (lambda p: building._write_whole(p, b"new"), OSError),
+        (lambda p: building._write_atomically(p, b"new"), OSError),
     ],
 )
 def test_a_full_disk_leaves_the_old_file_and_names_it(tmp_path, monkeypatch, write, raised):

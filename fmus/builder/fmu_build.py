@@ -1,4 +1,4 @@
-"""Building FMUs: from a definition and the sources to one deterministic archive."""
+"""From a recipe to one archive: the same sources give the same bytes."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, indent, tostring
 
 from fmus.builder.fmu_page import About, page
-from fmus.builder.icon import icon
-from fmus.builder.recipe import MARK, BuildError, Recipe, _binaries, _gather, _Sources, content_hash
+from fmus.builder.recipe import MARK, BuildError, FmuSources, Recipe, content_hash, gather, platform_libraries
 from fmus.builder.source_bundle import BundleError, rewrite
 from fmus.loader.loader_build import DESCRIPTION, LoaderError, with_loader, with_windows_loader
 
@@ -69,13 +68,13 @@ def build(wanted: Recipe, folder: Path, loader: bool = True, runtime: Mapping[st
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
     try:
-        _write_whole(path, data)
+        _write_atomically(path, data)
     except OSError as error:
         raise BuildError(f"{path} cannot be written ({error.strerror or error})") from error
     return path
 
 
-def _write_whole(path: Path, data: bytes) -> None:
+def _write_atomically(path: Path, data: bytes) -> None:
     """Write the file beside its place, of any process's own name there, and put it in its place when it is whole."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".tmp")
     try:
@@ -113,7 +112,7 @@ def archive(
     BuildError
         If the definition or the sources do not make an FMU, or a runtime has no loader to open it.
     """
-    gathered = _gather(wanted)
+    gathered = gather(wanted)
     files = _contents(wanted, gathered)
     if runtime:
         files = _with_runtime(files, wanted.name, runtime)
@@ -154,7 +153,7 @@ def _zipped(files: Mapping[str, bytes]) -> bytes:
 def why_no_loader() -> str:
     """Return why FMUs that are built here get pythonfmu's own library instead of our loader; empty if they do not."""
     try:
-        with_loader(_binaries("X"), "X")
+        with_loader(platform_libraries("X"), "X")
     except LoaderError as error:
         return str(error)
     return ""
@@ -177,7 +176,7 @@ def _mark(guid: str, files: Mapping[str, bytes], origin: Mapping[str, str]) -> b
     return "".join(f"{key}={value}\n" for key, value in lines.items()).encode()
 
 
-def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:
+def _contents(wanted: Recipe, sources: FmuSources) -> dict[str, bytes]:
     script = f"{wanted.name}_{sources.package.removeprefix('openpanto_')}"
     resources = {
         "slavemodule.txt": script.encode(),
@@ -193,11 +192,11 @@ def _contents(wanted: Recipe, sources: _Sources) -> dict[str, bytes]:
     except BundleError as error:
         raise BuildError(f"{wanted.name}: {error}") from error
     files = {f"resources/{name}": data for name, data in resources.items()}
-    files["model.png"] = icon(wanted.name.partition("_")[0].lower())
+    files["model.png"] = sources.icon
     return {**files, **_describe(wanted, sources, script, resources), **sources.binaries, **sources.licenses}
 
 
-def _script(wanted: Recipe, sources: _Sources) -> str:
+def _script(wanted: Recipe, sources: FmuSources) -> str:
     # Everything is imported at once: the folder of the first of two instances may be gone later.
     names = [name for name, module in sources.modules.items() if not module.is_optional]
     imports = "\n".join(f"import {sources.package}.{name}" for name in names)
@@ -214,7 +213,7 @@ def _script(wanted: Recipe, sources: _Sources) -> str:
     )
 
 
-def _describe(wanted: Recipe, sources: _Sources, script: str, resources: Mapping[str, bytes]) -> dict[str, bytes]:
+def _describe(wanted: Recipe, sources: FmuSources, script: str, resources: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return model description and page, made by the packed sources themselves: so they are known to import."""
     with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
         for name, data in resources.items():
@@ -246,7 +245,7 @@ def _description(root: Element) -> bytes:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _page(wanted: Recipe, sources: _Sources, slave: Any) -> bytes:
+def _page(wanted: Recipe, sources: FmuSources, slave: Any) -> bytes:
     definition = sources.definition.decode("utf-8")
     said = About(wanted.name, wanted.title, sources.fingerprint, slave.models, slave.limits, definition)
     return page(said, slave.table, slave.parameters)

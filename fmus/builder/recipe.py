@@ -1,4 +1,4 @@
-"""Recipe."""
+"""What an FMU is made of: its recipe by name or file, all sources that decide its bytes, and their hash, the GUID."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from fmus.loader.pythonfmu_repair import repaired
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARY = REPOSITORY / "models" / "library"
+_ICONS = Path(__file__).resolve().parent / "icons"
 PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
 #: Packages that are carried inside an FMU; pythonfmu too, for another FMU may bring another version of it.
 ROOTS: Mapping[str, Path] = {
@@ -33,9 +34,9 @@ _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
 #: Sources that are not carried along but decide about an FMU's bytes.
 _BUILDERS = (
     "builder/fmu_build.py",
+    "builder/recipe.py",
     "builder/source_bundle.py",
     "builder/fmu_page.py",
-    "builder/icon.py",
     "loader/pythonfmu_repair.py",
 )
 #: Most pantograph ports of a line: each costs variables, and no train has more.
@@ -86,17 +87,19 @@ class Recipe:
 
 
 @dataclass(frozen=True)
-class _Sources:
+class FmuSources:
     """All that decides about an FMU's bytes, and the hash of it."""
 
     modules: Mapping[str, Module]
     definition: bytes
+    icon: bytes
     binaries: Mapping[str, bytes]
     licenses: Mapping[str, bytes]
     fingerprint: str
 
     @property
     def package(self) -> str:
+        """Name of the package inside the FMU that holds the modules."""
         return f"openpanto_{self.fingerprint.replace('-', '')[:12]}"
 
 
@@ -131,20 +134,24 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
     kind, _, rest = name.partition("_")
     stem, ports = _split_ports(rest, pantographs)
     if kind == "Catenary" and (path := _definition("lines", stem)) is not None:
-        suffix = f"_P{ports}" if ports > 1 else ""
-        return Recipe(
-            f"Catenary_{stem}{suffix}",
-            _head(path).get("title") or f"Overhead contact line {stem}",
-            "fmus.slave.catenary_slave",
-            "CatenarySlave",
-            path,
-            {"pantographs": ports},
-        )
+        return _line_recipe(path, _head(path).get("title", ""), ports)
     path = _definition("pantographs", rest) if kind == "Pantograph" else None
     if path is not None and (adapter := _PANTOGRAPHS.get(_head(path).get("type", ""))):
-        return Recipe(name, _head(path).get("title") or f"Pantograph {rest}", *adapter, path)
+        return _pantograph_recipe(path, _head(path).get("title", ""), adapter)
     known = ", ".join(known_names()) or "none"
     raise UnknownFmuError(f"There is no FMU '{name}'; known are {known} (and NAME_P2: a line for two pantographs).")
+
+
+def _line_recipe(path: Path, title: str, ports: int, is_own: bool = False) -> Recipe:
+    name = f"Catenary_{path.stem}" + (f"_P{ports}" if ports > 1 else "")
+    title = title or f"Overhead contact line {path.stem}"
+    settings = {"pantographs": ports}
+    return Recipe(name, title, "fmus.slave.catenary_slave", "CatenarySlave", path, settings, is_own=is_own)
+
+
+def _pantograph_recipe(path: Path, title: str, adapter: tuple[str, str], is_own: bool = False) -> Recipe:
+    title = title or f"Pantograph {path.stem}"
+    return Recipe(f"Pantograph_{path.stem}", title, *adapter, path, is_own=is_own)
 
 
 def _own_recipe(path: Path, ports: int) -> Recipe:
@@ -155,35 +162,27 @@ def _own_recipe(path: Path, ports: int) -> Recipe:
         raise BuildError(f"{path} cannot be read ({error.strerror})") from error
     except ValueError as error:
         raise BuildError(f"{path} is not a TOML file ({error})") from error
-    stem, kind = path.stem, data.get("type")
-    if not (stem.isascii() and stem.replace("_", "a").isalnum()):
+    if not (path.stem.isascii() and path.stem.replace("_", "a").isalnum()):
         raise BuildError(f"{path}: the FMU gets the file's name, which may hold letters, digits and _ only")
-    title = data.get("title") if isinstance(data.get("title"), str) else ""
-    if isinstance(kind, str) and kind in _PANTOGRAPHS:
+    title, kind = (text if isinstance(text := data.get(key), str) else "" for key in ("title", "type"))
+    if adapter := _PANTOGRAPHS.get(kind):
         if ports > 1:
             raise BuildError(f"{path} is a pantograph; only lines have pantograph ports")
-        return Recipe(f"Pantograph_{stem}", title or f"Pantograph {stem}", *_PANTOGRAPHS[kind], path, is_own=True)
+        return _pantograph_recipe(path, title, adapter, is_own=True)
     if "spans" in data or "contact_wire" in data:
-        suffix = f"_P{ports}" if ports > 1 else ""
-        line = title or f"Overhead contact line {stem}"
-        name, settings = f"Catenary_{stem}{suffix}", {"pantographs": ports}
-        return Recipe(name, line, "fmus.slave.catenary_slave", "CatenarySlave", path, settings, is_own=True)
+        return _line_recipe(path, title, ports, is_own=True)
     kinds = " or ".join(f"'{name}'" for name in _PANTOGRAPHS)
     raise BuildError(f"{path} defines neither a line (no [spans]) nor a pantograph (type {kinds})")
 
 
 def fingerprint(wanted: Recipe) -> str:
     """Return the content hash of an FMU, its GUID, without building it."""
-    return _gather(wanted).fingerprint
+    return gather(wanted).fingerprint
 
 
 def content_hash(files: Mapping[str, bytes]) -> str:
     """Return a SHA-256 of an FMU's files but the mark, which holds it: of an FMU that nobody changed by hand."""
-    whole = hashlib.sha256()
-    for name, data in sorted(files.items()):
-        if name != MARK:
-            whole.update(f"{name}\0{len(data)}\0".encode() + data)
-    return whole.hexdigest()
+    return _digest({name: data for name, data in files.items() if name != MARK})
 
 
 def _definitions(folder: str) -> list[Path]:
@@ -211,7 +210,14 @@ def _split_ports(text: str, pantographs: int | None) -> tuple[str, int]:
     return text, pantographs or 1
 
 
-def _gather(wanted: Recipe) -> _Sources:
+def gather(wanted: Recipe) -> FmuSources:
+    """Return all that decides about an FMU's bytes.
+
+    Raises
+    ------
+    BuildError
+        If a source is missing, or cannot be carried inside an FMU.
+    """
     try:
         modules = collect(wanted.module, wanted.roots, _EMPTIED)
         definition = wanted.definition.read_bytes()
@@ -219,12 +225,17 @@ def _gather(wanted: Recipe) -> _Sources:
         raise BuildError(f"{wanted.name}: {error}") from error
     except OSError as error:
         raise BuildError(f"{wanted.name}: {error.filename} cannot be read ({error.strerror})") from error
-    binaries, licenses = _binaries(wanted.name), _licenses()
+    icon, binaries, licenses = _icon(wanted.name), platform_libraries(wanted.name), _licenses()
     pieces = {f"module/{n}": m.source.encode() for n, m in modules.items()} | binaries | licenses
-    # The build itself decides about the bytes as well.
-    pieces |= {"recipe": _recipe_bytes(wanted), **_builders()}
-    pieces["definition"] = definition
-    return _Sources(modules, definition, binaries, licenses, _hash(pieces))
+    pieces |= {"definition": definition, "icon": icon, "recipe": _recipe_bytes(wanted)}
+    pieces |= _builders()  # the build itself decides about the bytes as well
+    return FmuSources(modules, definition, icon, binaries, licenses, _guid(pieces))
+
+
+def _icon(name: str) -> bytes:
+    """Return the picture of a kind of FMU, 96 x 96 pixels: a line, a pantograph, or both for any other kind."""
+    path = _ICONS / f"{name.partition('_')[0].lower()}.png"
+    return (path if path.is_file() else _ICONS / "other.png").read_bytes()
 
 
 def _builders() -> dict[str, bytes]:
@@ -238,16 +249,21 @@ def _recipe_bytes(wanted: Recipe) -> bytes:
     return json.dumps(texts, sort_keys=True).encode()
 
 
-def _hash(pieces: Mapping[str, bytes]) -> str:
-    """Return a SHA-256 over names and contents, cut and written as a GUID."""
-    whole = hashlib.sha256()
-    for name, data in sorted(pieces.items()):
-        whole.update(f"{name}\0{len(data)}\0".encode() + data)
-    digest = whole.hexdigest()
+def _guid(pieces: Mapping[str, bytes]) -> str:
+    digest = _digest(pieces)
     return "-".join([digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32]])
 
 
-def _binaries(name: str) -> dict[str, bytes]:
+def _digest(pieces: Mapping[str, bytes]) -> str:
+    """Return a SHA-256 over names and contents."""
+    whole = hashlib.sha256()
+    for name, data in sorted(pieces.items()):
+        whole.update(f"{name}\0{len(data)}\0".encode() + data)
+    return whole.hexdigest()
+
+
+def platform_libraries(name: str) -> dict[str, bytes]:
+    """Return pythonfmu's own libraries, by their places in an FMU."""
     folder = PYTHONFMU / "resources" / "binaries"
     files = sorted(p for p in folder.rglob("*") if p.suffix in _PLATFORMS)
     return {f"binaries/{p.parent.name}/{name}{p.suffix}": repaired(p.read_bytes()) for p in files}

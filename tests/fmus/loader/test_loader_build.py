@@ -49,7 +49,7 @@ def test_the_guid_covers_the_sources_and_not_the_compiled_bytes(monkeypatch):
     assert b"other" in archive(toy_recipe())
     assert fingerprint(toy_recipe()) == before
     changed = {**loader_build.sources(), "loader.c": b"int main(void) {}"}
-    monkeypatch.setattr("fmus.builder.fmu_build.sources", lambda: changed)
+    monkeypatch.setattr("fmus.builder.recipe.sources", lambda: changed)
     assert fingerprint(toy_recipe()) != before
 
 

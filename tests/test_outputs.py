@@ -29,12 +29,11 @@ WRITES = {"write_text", "write_bytes", "savefig", "savetxt", "write_table", "sav
 #: Functions that may: they write beside the file's place, into memory, or into a temporary folder of their own.
 WHOLE = {
     "master/safety/folder_lock.py": {"_sign"},
-    "master/results/run_results.py": {"write_forces"},
+    "master/results/results_folder.py": {"write_forces"},
     "master/safety/safe_files.py": {"write_atomically"},
     "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},
-    "master/batch/verification/verification_page.py": {"_picture"},
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_whole", "write_csv", "write_figure"},
     "models/numerics/kernel_cache.py": None,

@@ -10,7 +10,8 @@ from typing import ClassVar
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, load
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_reading import load
 from models.catenary.line_advice import slack_law_warning, slack_warning, speed_warning, step_warning
 from models.catenary.line_part import CatenaryPart
 

@@ -1,4 +1,4 @@
-"""``python -m master verify``."""
+"""The verb ``verify``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from rich.console import Console
 
@@ -15,28 +15,28 @@ from master.batch.verification.case_runs import RUNS, Runs
 from master.batch.verification.verification_outcome import CaseOutcome
 from master.batch.verification.verification_session import JSON, PAGE, verify
 from master.batch.verification.verification_table import list_table, show_case
+from master.commands.command_options import add_verb
 from master.coupling.macro_steps import Observer
 from master.report.progress import ProgressObserver
-from master.report.terminal_summary import Terminal, printable_json
+from master.report.terminal_summary import WIDTH, Terminal, printable_json
 from master.system.components import System
 
-HELP: Final = "run reference cases and judge every figure"
 _DEFAULT_FOLDER: Final = Path("results") / "verify"
-_WIDTH: Final = 80
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what may stand behind ``verify``."""
+def add_verify(verbs: Any) -> None:
+    """Declare ``verify`` and its options."""
+    parser = add_verb(verbs, "verify", "run reference cases and judge every figure", _verify)
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name of a case, or a case file; default: all")
-    parser.add_argument("--list", action="store_true", help="say which cases there are and run nothing")
+    parser.add_argument("--list", action="store_true", help="list the cases and run nothing")
     parser.add_argument("--out", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help="default: results/verify")
     parser.add_argument("--quiet", action="store_true", help="no progress, no tables; page and exit code only")
     parser.add_argument("--json", action="store_true", help=f"print {JSON} instead of tables")
     parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Verify; returns 0 if every row that is meant to hold does, 1 if not."""
+def _verify(options: argparse.Namespace) -> int:
+    """Verify; return 0 if every row that must hold does, 1 if not."""
     cases = load_cases(find_cases(options.cases))
     if options.list:
         Terminal(width=_width()).print(list_table(cases))
@@ -61,8 +61,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _width() -> int | None:
-    """Return 80 where nobody looks, the terminal's own width otherwise."""
-    return None if Terminal().is_terminal else _WIDTH
+    """Return 80 where nobody looks on, else the width of the terminal."""
+    return None if Terminal().is_terminal else WIDTH
 
 
 def _failing(cases: Sequence[CaseOutcome]) -> Iterator[str]:

@@ -1,10 +1,12 @@
-"""Charts of a study, as dictionaries that plotly.js draws."""
+"""Charts of a study: figures of its variants side by side, forces, changes of wire and histories."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
+
+import numpy as np
 
 from master.arrays import BoolArray, FloatArray
 from master.batch.study.family import Interval
@@ -14,23 +16,15 @@ from master.evaluation.contact_positions import track_position
 from master.evaluation.contact_signals import contact_signals
 from master.evaluation.filters import settled
 from master.recording.static_geometry import Geometry
-from master.report.charts.run_charts import (
-    Axes,
-    Chart,
-    Curve,
-    common_edges,
-    curve_trace,
-    grouped_bars,
-    line_marks,
-    shares,
-)
+from master.report.charts.chart import Axis, Bars, Chart, Curve, stroke
+from master.report.charts.force_charts import SHARE, TRACK, force_bars
+from master.report.charts.line_charts import line_marks
 from master.results.run_results import Results
 
 #: How far to both sides of a change of wires the forces are drawn [m].
 _MARGIN: Final = 15.0
-_FORCE: Final = "contact force, low-passed [N]"
+_FORCE: Final = Axis("contact force, low-passed", "N")
 _STATISTICS: Final = ("maximum", "minimum", "amplitude", "mean", "sigma", "statistical_minimum")
-_MARKS: Final = {"yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}}
 
 
 def interval_charts(outcome: Outcome, interval: Interval, found: Sequence[Entry]) -> list[Chart]:
@@ -53,13 +47,12 @@ def _roles(found: Sequence[Entry]) -> dict[str, list[Entry]]:
 
 
 def _statistics(number: int, role: str, found: Sequence[Entry]) -> Chart:
-    names = [s.replace("_", " ") for s in _STATISTICS]
-    traces = [
-        {**grouped_bars(i, e.variant), "x": names, "y": [getattr(e.assessment.quality, s) for s in _STATISTICS]}
+    names = tuple(s.replace("_", " ") for s in _STATISTICS)
+    bars = tuple(
+        Bars(e.variant, names, np.array([getattr(e.assessment.quality, s) for s in _STATISTICS]), i)
         for i, e in enumerate(found)
-    ]
-    layout = {**Axes("", _FORCE).layout(), "barmode": "group"}
-    return Chart(f"statistics_{number}_{role}", f"Statistics, {role}", {"data": traces, "layout": layout}, "", 380)
+    )
+    return Chart(f"statistics_{number}_{role}", f"Statistics, {role}", Axis("figure"), _FORCE, bars)
 
 
 def _filtered(done: Results, e: Entry) -> tuple[FloatArray, FloatArray, BoolArray]:
@@ -70,30 +63,22 @@ def _filtered(done: Results, e: Entry) -> tuple[FloatArray, FloatArray, BoolArra
 
 
 def _forces(key: str, done: Results, own: Sequence[Entry]) -> Chart:
-    traces = []
+    curves = []
     for i, e in enumerate(own):
         position, force, inside = _filtered(done, e)
-        traces.append(curve_trace(position[inside], force[inside], Curve(i, e.pantograph)))
+        curves.append(Curve(e.pantograph, position[inside], force[inside], stroke(i)))
     limits = (own[0].interval.start, own[0].interval.end)
-    traces += line_marks(done, own[0].assessment.contact.catenary, limits)
-    axes = Axes("track position of the contact [m]", _FORCE, extra=dict(_MARKS))
-    title = f"Contact force, {own[0].variant}"
-    return Chart(f"force_{key}", title, {"data": traces, "layout": axes.layout()}, "", 340)
+    marks = line_marks(done, own[0].assessment.contact.catenary, limits)
+    return Chart(f"force_{key}", f"Contact force, {own[0].variant}", TRACK, _FORCE, (*curves, *marks), height=340)
 
 
 def _histogram(key: str, done: Results, own: Sequence[Entry]) -> Chart:
     cuts = []
     for e in own:
         _, force, inside = _filtered(done, e)
-        cuts.append(force[inside])
-    edges = common_edges(cuts)
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    traces = [
-        {**grouped_bars(i, e.pantograph), "x": middles.tolist(), "y": shares(cut, edges).tolist()}
-        for i, (e, cut) in enumerate(zip(own, cuts, strict=True))
-    ]
-    layout = {**Axes(_FORCE, "share of time [%]").layout(), "barmode": "group"}
-    return Chart(f"histogram_{key}", f"Histogram, {own[0].variant}", {"data": traces, "layout": layout}, "", 300)
+        cuts.append((e.pantograph, force[inside]))
+    title = f"Histogram, {own[0].variant}"
+    return Chart(f"histogram_{key}", title, _FORCE, SHARE, force_bars(cuts), height=300)
 
 
 def sharing_charts(outcome: Outcome) -> list[Chart]:
@@ -116,14 +101,11 @@ def _sharing(key: str, done: Results, e: Entry) -> Chart:
     assert forces is not None
     assert e.sharing is not None
     near = (position >= e.sharing.start - _MARGIN) & (position <= e.sharing.end + _MARGIN)
-    traces = [
-        curve_trace(position[near], forces[near, s], Curve(s, f"section {s + 1}")) for s in range(forces.shape[1])
-    ]
-    total = Curve(forces.shape[1], "total", 1.2)
-    traces.append(curve_trace(position[near], forces[near].sum(axis=1), total))
-    axes = Axes("track position of the contact [m]", "contact force, as computed [N]")
+    count = forces.shape[1]
+    curves = [Curve(f"section {s + 1}", position[near], forces[near, s], stroke(s)) for s in range(count)]
+    curves.append(Curve("total", position[near], forces[near].sum(axis=1), stroke(count, 1.2)))
     title = f"From wire to wire, {e.variant}, {e.pantograph}"
-    return Chart(key, title, {"data": traces, "layout": axes.layout()}, "", 340)
+    return Chart(key, title, TRACK, Axis("contact force, as computed", "N"), tuple(curves), height=340)
 
 
 def history_charts(outcome: Outcome) -> list[Chart]:
@@ -132,26 +114,27 @@ def history_charts(outcome: Outcome) -> list[Chart]:
     if wanted is None:
         return []
     chosen = [d for d in outcome.done if d.name in wanted.variants]
-    made = (
-        _history(chosen, wanted.position, _Kind("support", "uplift", "Uplift at the support", "uplift [mm]", 1e3)),
-        _history(chosen, wanted.position, _Kind("dropper", "force", "Force in the dropper", "dropper force [N]")),
+    kinds = (
+        _Kind("support", "uplift", "Uplift at the support", Axis("uplift", "mm"), 1e3),
+        _Kind("dropper", "force", "Force in the dropper", Axis("dropper force", "N")),
     )
+    made = (_history(chosen, wanted.position, kind) for kind in kinds)
     return [c for c in made if c is not None]
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """What a history shows: thing, variable, title, label and scale of the axis."""
+    """What a history shows: thing, variable, title, axis, and the factor to its unit."""
 
     thing: str
     variable: str
     title: str
-    label: str
+    axis: Axis
     scale: float = 1.0
 
 
 def _history(chosen: Sequence[Done], position: float, kind: _Kind) -> Chart | None:
-    traces: list[dict[str, Any]] = []
+    curves = []
     where = None
     for i, done in enumerate(chosen):
         found = _nearest(done.results.geometry, kind.thing, position)
@@ -160,14 +143,11 @@ def _history(chosen: Sequence[Done], position: float, kind: _Kind) -> Chart | No
         if found is None or recording is None:
             continue
         where = found[1]
-        values = kind.scale * recording[name]
-        traces.append(curve_trace(recording.time, values, Curve(i, done.name, 1.5)))
+        curves.append(Curve(done.name, recording.time, kind.scale * recording[name], stroke(i, 1.5)))
     if where is None:
         return None
-    axes = Axes("time [s]", kind.label)
-    return Chart(
-        f"history_{kind.thing}", f"{kind.title} at {where:.1f} m", {"data": traces, "layout": axes.layout()}, "", 340
-    )
+    title = f"{kind.title} at {where:.1f} m"
+    return Chart(f"history_{kind.thing}", title, Axis("time", "s"), kind.axis, tuple(curves), height=340)
 
 
 def _nearest(geometry: Geometry, kind: str, position: float) -> tuple[str, float] | None:

@@ -17,7 +17,7 @@ from master.batch.study.study_outcome import (
     verdict,
 )
 from master.report import html_markup
-from master.report.charts.run_charts import Chart
+from master.report.charts.chart import Chart
 from master.report.run_page import INTERVAL_NOTE
 
 _STATUS = {
@@ -44,18 +44,13 @@ def page(outcome: Outcome) -> str:
         body.append(f"<h2>{html_markup.text(title)}</h2>")
         if found:
             body += _tables(found, judged_by(outcome.done))
-            body += _place(study_charts.interval_charts(outcome, interval, found), drawn)
+            body += html_markup.placed(study_charts.interval_charts(outcome, interval, found), drawn)
     body += _sharing(outcome)
-    body += _place(study_charts.sharing_charts(outcome), drawn)
+    body += html_markup.placed(study_charts.sharing_charts(outcome), drawn)
     if histories := study_charts.history_charts(outcome):
-        body += ["<h2>Histories</h2>", *_place(histories, drawn)]
+        body += ["<h2>Histories</h2>", *html_markup.placed(histories, drawn)]
     body += [f"<p class='note'>Contact forces: {html_markup.text(f)}.</p>" for f in filters(outcome)]
     return html_markup.document(outcome.family.name, body, drawn)
-
-
-def _place(made: Sequence[Chart], drawn: list[Chart]) -> list[str]:
-    drawn += made
-    return [html_markup.chart(c) for c in made]
 
 
 def _tables(found: Sequence[Entry], title: str) -> list[str]:

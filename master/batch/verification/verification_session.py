@@ -8,10 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from master.batch.verification import verification_page
 from master.batch.verification.case import Case
 from master.batch.verification.case_runs import Runs
 from master.batch.verification.verification_outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
+from master.batch.verification.verification_page import page
 from master.errors import InterruptedRunError
 from master.results import results_folder, run_summary
 from master.safety.supervision import unfinished
@@ -47,33 +47,26 @@ def verify(
         If the folder holds something else.
     """
     with results_folder.taken_over(folder, JSON, GENERATOR, "verification"), unfinished(folder / JSON):
-        return _verify(cases, runs, show, _Writer(folder))
+        return _verify(cases, runs, show, folder)
 
 
-def _verify(cases: Sequence[Case], runs: Runs, show: Callable[[CaseOutcome], None], writer: _Writer) -> Verification:
+def _verify(cases: Sequence[Case], runs: Runs, show: Callable[[CaseOutcome], None], folder: Path) -> Verification:
     state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), run_summary.versions(), len(cases))
-    writer.write(state)
+    write(state, folder)
     try:
         for case in cases:
             state = state.with_case(judge_case(case, runs))
-            writer.write(state)
+            write(state, folder)
             show(state.cases[-1])
     except (InterruptedRunError, KeyboardInterrupt):
-        writer.write(replace(state, status="interrupted"))
+        write(replace(state, status="interrupted"), folder)
         raise
     state = replace(state, status="complete")
-    writer.write(state)
+    write(state, folder)
     return state
 
 
-class _Writer:
-    """Writes page and JSON; each case's part of the page is made once."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._sections: list[str] = []
-
-    def write(self, state: Verification) -> None:
-        self._sections += [verification_page.section(c) for c in state.cases[len(self._sections) :]]
-        results_folder.write_json(self._folder / JSON, as_data(state))
-        results_folder.write_text(self._folder / PAGE, verification_page.page(state, self._sections))
+def write(state: Verification, folder: Path) -> None:
+    """Write what there is so far."""
+    results_folder.write_json(folder / JSON, as_data(state))
+    results_folder.write_text(folder / PAGE, page(state))

@@ -101,15 +101,15 @@ def test_histories_are_drawn_at_the_nearest_support_and_dropper(outcome):
 def test_wires_are_drawn_with_their_sum(outcome):
     made = study_charts.sharing_charts(outcome)
     assert [c.title for c in made] == [f"From wire to wire, 30 m, {p}" for p in ("leading", "trailing")]
-    assert [t["name"] for t in made[0].figure["data"]] == ["section 1", "section 2", "total"]
+    assert [part.name for part in made[0].parts] == ["section 1", "section 2", "total"]
 
 
 def test_statistics_are_drawn_by_place_in_the_train_with_the_single_one(outcome):
     made = study_charts.interval_charts(outcome, WHOLE, outcome.entries(WHOLE))
     assert [c.title for c in made[:2]] == ["Statistics, leading", "Statistics, trailing"]
-    assert [t["name"] for t in made[0].figure["data"]] == ["single", "30 m"]
+    assert [part.name for part in made[0].parts] == ["single", "30 m"]
     assert [c.title for c in made[2:]] == ["Contact force, 30 m", "Histogram, 30 m"]
-    shares = [np.sum(t["y"]) for t in made[3].figure["data"]]
+    shares = [np.sum(bars.y) for bars in made[3].parts]
     assert shares == pytest.approx([100.0, 100.0])
 
 

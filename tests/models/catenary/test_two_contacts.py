@@ -44,7 +44,7 @@ def _assembled(line, pantograph, dt, steps):
         sp.block_diag([getattr(catenary, name), getattr(lumped, name)], format="csr") for name in ("M", "C", "K")
     )
     base = (K + newmark.a0 * M + newmark.a1 * C).tocsc()
-    B = sp.hstack([catenary.dropper_law.B, sp.csr_matrix((catenary.dropper_law.B.shape[0], m))], format="csr")
+    B = sp.hstack([catenary.B, sp.csr_matrix((catenary.B.shape[0], m))], format="csr")
     d, v, a = (np.zeros(n + m) for _ in range(3))
     forces, elements = [], [-1] * len(model.wires)
     for step in range(1, steps + 1):

@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from master.batch.batch_session import Runner
 from master.errors import MasterError
+from master.report.progress import progress_shown
 from master.report.terminal_summary import Terminal
 from master.scenario.overrides import Overrides
 from master.ssp.run_settings import SCHEMES
@@ -96,6 +99,14 @@ def _add(verbs: Any, name: str, text: str, verb: Callable[..., int], scenario: b
 
 def _tell(text: str, console: Console | None = None) -> None:
     (console or Terminal(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
+
+
+def batch_runner(options: argparse.Namespace) -> Runner:
+    """Return how a batch makes its runs: with progress and messages on standard error, or quietly."""
+    if options.quiet:
+        return Runner(build=not options.no_build)
+    console = Terminal(stderr=True)
+    return Runner(partial(progress_shown, console), partial(_tell, console=console), not options.no_build)
 
 
 def _tell_warnings(system: System, tell: Callable[[str], None]) -> None:

@@ -28,7 +28,7 @@ WRITES = {"write_text", "write_bytes", "savefig", "savetxt", "write_table", "sav
 #: Functions that may: they write beside the file's place, into memory, or into a temporary folder of their own.
 WHOLE = {
     "master/safety/folder_lock.py": {"_sign"},
-    "master/results/run_results.py": {"write_forces"},
+    "master/results/results_folder.py": {"write_forces"},
     "master/safety/safe_files.py": {"write_atomically"},
     "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},

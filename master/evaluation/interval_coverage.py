@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ Interval = tuple[float | None, float | None]
 
 
 def shortfall(recording: Recording, contacts: Iterable[Contact], interval: Interval) -> str:
-    """Return what of the interval a record lacks, empty if every contact has passed all of it.
+    """Return what of the interval a recording lacks, empty if every contact has passed all of it.
 
     Parameters
     ----------
@@ -57,7 +57,15 @@ def _lacking(x: FloatArray, pantograph: str, interval: Interval) -> str:
     return ""
 
 
+def not_judgeable(recording: Recording, contacts: Sequence[Contact], interval: Interval) -> str:
+    """Return why a recording is not enough to judge the interval by, empty if it is."""
+    if reason := shortfall(recording, contacts, interval):
+        return reason
+    silent = never_touched(recording, contacts)
+    return f"'{silent}' never touches the wire" if silent else ""
+
+
 def never_touched(recording: Recording, contacts: Iterable[Contact]) -> str:
-    """Return the pantograph that no force was told in all of a record, empty if there is none."""
+    """Return the pantograph that never receives a contact force in a recording, empty if there is none."""
     silent = (c.pantograph for c in contacts if c.force in recording and not np.any(recording[c.force] > 0.0))
     return next(silent, "")

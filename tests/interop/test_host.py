@@ -16,7 +16,7 @@ import pytest
 
 from fmus.builder.fmu_build import build, recipe
 from fmus.loader.loader_build import INNER_SUFFIX
-from master.run import loaded
+from master.run import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 from tests.interop.support import STEP
@@ -105,7 +105,7 @@ def plan(system, unpacked):
 @pytest.fixture(scope="module")
 def in_python(system):
     """The numbers that the host is to find, from FMPy."""
-    with loaded(system) as network:
+    with connected_fmus(system) as network:
         for slave in network.slaves:
             slave.start(0.0, STEPS * STEP)
         for _ in range(EXCHANGES):

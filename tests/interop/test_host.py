@@ -14,7 +14,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from fmus.loader.loader_build import INNER_SUFFIX
 from master.run import connected_fmus
 from master.scenario.open_scenario import open_scenario

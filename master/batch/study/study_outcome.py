@@ -100,7 +100,9 @@ def filter_remarks(found: Sequence[StudyEntry]) -> list[str]:
     remarks = []
     for e in found:
         who = f"{e.variant}, {e.pantograph}"
-        told = "; ".join(f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.told)
+        told = "; ".join(
+            f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.filter_dependent
+        )
         remarks += [f"{who}: {told}"] if told else []
         remarks += [f"{who}: {c.name}: {c.remark}" for c in e.assessment.criteria if c.remark and not c.is_at_limit]
         remarks += [f"{who}: {warning}" for warning in e.assessment.warnings]

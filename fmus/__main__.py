@@ -8,18 +8,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fmus.builder.fmu_build import (
-    MAX_PORTS,
-    BuildError,
-    Recipe,
-    UnknownFmuError,
-    build,
-    fingerprint,
-    known_names,
-    recipe,
-    why_no_loader,
-)
-from fmus.builder.standalone import bundled_platform, runtime_of, write_runtime
+from fmus.builder.fmu_build import build, why_no_loader
+from fmus.builder.recipe import MAX_PORTS, BuildError, Recipe, UnknownFmuError, fingerprint, known_names, recipe
+from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
 from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
 from models.definition_files.toml_reader import printable

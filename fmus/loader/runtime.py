@@ -26,11 +26,11 @@ from typing import Final
 
 import pythonfmu
 
-from fmus.loader.elf import is_aligned
-from fmus.loader.installation import PACKAGES, Installation, InstallationError, own
-from fmus.loader.licences import COMPILED_HERE, licences
+from fmus.loader.elf_library import is_aligned
 from fmus.loader.loader_build import DESCRIPTION
-from fmus.loader.rehearsal import LoadedModules, RehearsalError, rehearse
+from fmus.loader.module_rehearsal import LoadedModules, RehearsalError, rehearse
+from fmus.loader.python_installation import PACKAGES, Installation, InstallationError, own
+from fmus.loader.runtime_licences import COMPILED_HERE, licences
 from fmus.loader.shared_libraries import BlasError, Libraries, collect_libraries
 
 #: Version of this layout, for the loader.

@@ -11,9 +11,9 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Final
 
-from fmus.loader.elf import needed, soname
-from fmus.loader.installation import PACKAGES, Installation, InstallationError
+from fmus.loader.elf_library import needed, soname
 from fmus.loader.loader_build import needed_versions
+from fmus.loader.python_installation import PACKAGES, Installation, InstallationError
 
 #: Libraries of glibc: these are the machine's, whoever brings others breaks it.
 _GLIBC: Final = frozenset(

@@ -10,7 +10,8 @@ from typing import ClassVar
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, load
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_reading import load
 from models.catenary.line_advice import slack_law_warning, slack_warning, speed_warning, step_warning
 from models.catenary.line_part import CatenaryPart
 
@@ -77,7 +78,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     def _advance(self, part: CatenaryPart, inputs: FloatArray, step: float) -> None:
         part.step(inputs.reshape(self.pantographs, 2, 2, 3), step)
 
-    def _doubts(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
+    def _start_warnings(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
         strips = inputs.reshape(self.pantographs, 2, 2, 3)
         along_track = strips[:, :, 1, 0]
         part.check_strips(strips)
@@ -86,7 +87,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 
-    def _step_doubt(self, part: CatenaryPart, step: float) -> str:
+    def _step_warning(self, part: CatenaryPart, step: float) -> str:
         return step_warning(part.definition, step)
 
 

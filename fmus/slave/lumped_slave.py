@@ -41,7 +41,7 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     def _make_ports(self, part: LumpedPantographPart) -> Ports:
         return pantograph_ports(part)
 
-    def _doubts(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
+    def _start_warnings(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
 
     def _initialise(self, part: LumpedPantographPart, time: float, inputs: FloatArray) -> None:

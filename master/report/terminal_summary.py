@@ -29,7 +29,7 @@ from master.report.result_tables import (
 )
 from master.results.run_results import Results
 
-_WIDTH: Final = 80
+WIDTH: Final = 80
 
 
 class Terminal(Console):
@@ -55,8 +55,9 @@ def printable_json(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text)
 
 
-def _show(done: Results) -> None:
-    console = Terminal(width=_WIDTH, highlight=False)
+def show_run(done: Results) -> None:
+    """Print figures, verdicts and what else there is to know of a run."""
+    console = Terminal(width=WIDTH, highlight=False)
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
@@ -103,7 +104,7 @@ def _closing_lines(done: Results) -> list[str]:
         for p in done.summary["interface_power"]
     ]
     lines += _energy_lines(done.summary["energy"])
-    if tolerance := _told_tolerance({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
+    if tolerance := tolerance_words({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
         lines.append(tolerance.removeprefix(", "))
     return [*lines, *_punctuality_lines(performance.get("real_time")), f"results in {done.folder}"]
 
@@ -130,7 +131,7 @@ def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
     ]
 
 
-def _told_tolerance(told: Mapping[str, float | None]) -> str:
+def tolerance_words(told: Mapping[str, float | None]) -> str:
     """Return in words which tolerance the FMUs are told, by their components' names; empty if none is."""
     values = set(told.values())
     if values <= {None}:

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
+import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from master.errors import MasterError, RequestError
+from master.evaluation.contact_signals import Signals, force_table
 from master.recording.checkpoint import NAME as CHECKPOINT
+from master.recording.continuation import Continuation
+from master.recording.recording import NUMBER_FORMAT
+from master.recording.static_geometry import Geometry
 from master.results import summary_schema
 from master.safety import folder_lock
-from master.safety.safe_files import PART, write_atomically
+from master.safety.safe_files import PART, safe_cell, write_atomically
 
 GENERATOR: Final = "openpanto master"
 #: Version of what a run leaves. 1, which says none: figures of a brick wall at 20 Hz; 2: as it stands here.
@@ -27,7 +37,80 @@ _OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
 #: What a run, a study or a verification that was killed may leave half written, and what is no result.
 _PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT)), f".*{PART}")
 _LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)
+#: Format of numbers that are to be read back to the last bit.
+_EXACT: Final = "%.17g"
 _NOT_OURS: Final = "exists and is {kind} of this tool; it is left alone, choose another with --out"
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The results folder of one run, claimed: its files, and which run it is.
+
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    run : str
+        Identity of the run.
+    """
+
+    path: Path
+    run: str
+
+    @property
+    def summary_file(self) -> Path:
+        """Path of ``summary.json``."""
+        return self.path / SUMMARY
+
+    @property
+    def checkpoint_file(self) -> Path:
+        """Path of the checkpoint."""
+        return self.path / CHECKPOINT
+
+    @property
+    def is_intact(self) -> bool:
+        """Whether the results that lie in the folder are still those of this run."""
+        with suppress(MasterError):
+            return identity(self.path) == self.run
+        return False
+
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
+        """Write ``summary.json``."""
+        write_json(self.summary_file, summary)
+
+    def write_geometry(self, geometry: Geometry) -> None:
+        """Write ``geometry.json``."""
+        write_json(self.path / GEOMETRY, geometry)
+
+
+@contextmanager
+def claimed_for_run(folder: Path, continuation: Continuation | None = None) -> Iterator[RunFolder]:
+    """Work alone in a results folder, emptied for a new run; or as it is, for the run that continues in it.
+
+    Parameters
+    ----------
+    folder : Path
+    continuation : Continuation, optional
+        Where the run continues from.
+
+    Raises
+    ------
+    FolderInUseError
+        If another process works in it.
+    RequestError
+        If another run's results lie in it than those of the run to be continued.
+    MasterError
+        If it exists and is something else, or cannot be written.
+    """
+    with claimed(folder):
+        if continuation is not None and continuation.is_same_run:
+            run = identity(folder)
+            if not run or run != continuation.checkpoint.run:
+                raise RequestError(f"{continuation.file} comes from another run than the results beside it")
+        else:
+            _empty(folder, None if continuation is None else Path(continuation.file))
+            run = uuid.uuid4().hex
+        yield RunFolder(folder, run)
 
 
 @contextmanager
@@ -88,14 +171,14 @@ def _alone_in(folder: Path, kind: str) -> Iterator[None]:
         raise
 
 
-def prepare(folder: Path, keep: Path | None = None) -> None:
+def _empty(folder: Path, keep: Path | None) -> None:
     """Empty a claimed folder of the results of an earlier run.
 
     Parameters
     ----------
     folder : Path
     keep : Path, optional
-        The checkpoint that a new run begins from, if it lies there.
+        The checkpoint that the new run begins from, if it lies there.
 
     Raises
     ------
@@ -159,6 +242,18 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one go."""
     write_atomically(path, text.encode())
+
+
+def write_forces(folder: Path, signals: Sequence[Signals]) -> None:
+    """Write the filtered contact forces, as the figures are made of them, to the last bit."""
+    if not signals:
+        return
+    titles, columns = force_table(signals)
+    formats = [_EXACT if title.endswith(".filtered_force [N]") else NUMBER_FORMAT for title in titles]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(map(safe_cell, titles))
+    np.savetxt(text, np.column_stack(columns), fmt=formats, delimiter=",")
+    write_text(folder / FORCES, text.getvalue())
 
 
 def _summary(folder: Path) -> dict[str, Any]:

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
-from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, force_table
+from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits
 from master.evaluation.energy_balance import EnergyBalance, drift_events, find_balances
 from master.evaluation.filters import BEFORE_CHOICE, ForceFilter
 from master.evaluation.following_pantograph import FollowerEffect, follower_effects
 from master.evaluation.line_geometry import Uplift, support_uplifts
 from master.evaluation.run_events import Event, find_events
-from master.recording.recording import NUMBER_FORMAT, TIMESERIES, Recording, load
+from master.recording.recording import TIMESERIES, Recording, load
 from master.recording.static_geometry import Geometry
 from master.results import summary_schema
-from master.results.results_folder import FORCES, GEOMETRY, _summary, write_text
+from master.results.results_folder import GEOMETRY, _summary
 from master.safety import folder_lock
-from master.safety.safe_files import safe_cell
 from master.system.contacts import Contact
 
 
@@ -171,21 +166,6 @@ def _read(folder: Path) -> Results:
 
 #: How runs end that are not complete.
 _ENDS: Final = {"running": "was not finished", "failed": "has failed", "interrupted": "was interrupted"}
-
-
-def write_forces(done: Results) -> None:
-    """Write the filtered contact forces, as the figures are made of them, to the last bit."""
-    if not done.signals:
-        return
-    titles, columns = force_table(done.signals)
-    formats = [_EXACT if title.endswith(".filtered_force [N]") else NUMBER_FORMAT for title in titles]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(map(safe_cell, titles))
-    np.savetxt(text, np.column_stack(columns), fmt=formats, delimiter=",")
-    write_text(done.folder / FORCES, text.getvalue())
-
-
-_EXACT: Final = "%.17g"
 
 
 def filter_of(told: Mapping[str, Any] | None) -> ForceFilter:

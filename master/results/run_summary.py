@@ -6,14 +6,93 @@ import platform
 import re
 import sys
 from dataclasses import asdict
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from master.coupling.macro_steps import RunOutcome
+from master.coupling.stopwatch import Timing
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.filters import ForceFilter
 from master.evaluation.run_events import MOST_EVENTS
+from master.recording.continuation import Continuation
+from master.results.results_folder import FORMAT, GENERATOR
 from master.results.run_results import Results
+from master.system.components import Component, System, Variable
+from master.system.contacts import find_contacts
+
+
+def describe(system: System, run: str) -> dict[str, Any]:
+    """Return what is known of a run when it begins: which it is, its settings, components and contacts."""
+    return {
+        "generator": GENERATOR,
+        "format": FORMAT,
+        "run": run,
+        "scenario": system.name,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "settings": {
+            "start": system.start,
+            "stop": system.stop,
+            "step": system.step,
+            **system.settings.model_dump(mode="json"),
+        },
+        "components": [_component(c) for c in system.components],
+        "contacts": [asdict(c) for c in find_contacts(system.connections)],
+    }
+
+
+def _component(component: Component) -> dict[str, Any]:
+    fmu = component.fmu
+    return {
+        "name": component.name,
+        "fmu": fmu.path.name,
+        "guid": fmu.guid,
+        "sha256": fmu.sha256,
+        "tool": fmu.tool,
+        "parameters": component.parameters,
+        "tolerance": component.tolerance,
+        "inputs": [_input(component, v) for v in fmu.variables.values() if v.causality == "parameter"],
+    }
+
+
+def _input(component: Component, variable: Variable) -> dict[str, Any]:
+    return {
+        "name": variable.name,
+        "value": component.parameters.get(variable.name, variable.start),
+        "unit": variable.unit,
+        "description": variable.description,
+        "changed": variable.name in component.parameters,
+    }
+
+
+def ending(outcome: RunOutcome) -> dict[str, Any]:
+    """Return how a run ended."""
+    return {
+        "status": outcome.status,
+        "reason": str(outcome.error) if outcome.error else "",
+        "steps": outcome.steps,
+        "time_reached": outcome.time,
+    }
+
+
+def origin(continuation: Continuation | None) -> dict[str, Any]:
+    """Return where a run continued from, if it did."""
+    if continuation is None:
+        return {}
+    c = continuation
+    return {"resumed": {"file": c.file, "time": c.checkpoint.time, "renewed": list(c.renewed)}}
+
+
+def performance(timing: Timing, simulated: float) -> dict[str, Any]:
+    """Return what a run took, for this much simulated time [s]."""
+    return {
+        "initialisation_time": timing.initialisation,
+        "wall_time": timing.stepping,
+        "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
+        "peak_memory": peak_memory(),
+    }
 
 
 def figures(done: Results) -> dict[str, Any]:
@@ -34,7 +113,7 @@ def figures(done: Results) -> dict[str, Any]:
 def _assessed(a: Assessment) -> dict[str, Any]:
     return {
         **asdict(a.quality),
-        "depends_on_filter": bool(a.quality.told),
+        "depends_on_filter": bool(a.quality.filter_dependent),
         "uplift": None if a.uplift is None else asdict(a.uplift),
         "supports": a.supports,
         "slack_droppers": a.slack,

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from master.fmu.extraction import ExtractedFmu
 from master.fmu.fmu_description import read_fmu
 from master.fmu.instance import Instance

@@ -12,7 +12,8 @@ from urllib.parse import quote
 
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from tests.effort import count
 from tests.fmus.support import short_line_recipe
 from tests.interop.test_host import linux, order, run_host, unpack

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from fmus.__main__ import main
-from fmus.builder.fmu_build import REPOSITORY, BuildError, archive, build, fingerprint
+from fmus.builder.fmu_build import archive, build
+from fmus.builder.recipe import REPOSITORY, BuildError, fingerprint
 from tests.fmus.support import Instance, toy_recipe, toy_variant
 
 _BUILD_ELSEWHERE = """

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from fmus.loader.installation import own
+from fmus.loader.python_installation import own
 from fmus.loader.shared_libraries import BlasError, collect_libraries
 
 pytestmark = pytest.mark.skipif(

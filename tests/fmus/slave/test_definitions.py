@@ -8,7 +8,8 @@ import zipfile
 import pytest
 
 from fmus.__main__ import main
-from fmus.builder.fmu_build import MARK, BuildError, build, content_hash, fingerprint, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import MARK, BuildError, content_hash, fingerprint, recipe
 from master.fmu import fmu_provision
 from models.library.catalogue import line_path, pantograph_path
 from tests.fmus.support import Instance

@@ -223,7 +223,7 @@ def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsy
 
     monkeypatch.setattr("master.recording.recorder.load", replaced)
     assert go(toy, folder, "--stop", "0.1") == 1
-    assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
+    assert "timeseries.csv is not what was written: it was changed while the run was in progress" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == "failed"
     assert "quality" not in summary

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from models.catenary.definition.line_definition import read
+from models.catenary.definition.line_reading import read
 from models.catenary.line_energy import LineBalance
 from models.catenary.line_model import CatenaryModel, StripMotion
 from models.catenary.line_part import CatenaryPart

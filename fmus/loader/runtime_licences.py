@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from fmus.loader.installation import PACKAGES, Installation, InstallationError
+from fmus.loader.python_installation import PACKAGES, Installation, InstallationError
 
 FOLDER: Final = "licences"
 #: Folder of libraries of our own.

@@ -9,9 +9,10 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from fmus.builder.fmu_build import RUNTIME, BuildError, archive, recipe
-from fmus.loader.installation import InstallationError, installed_at, own
+from fmus.builder.fmu_build import RUNTIME, archive
+from fmus.builder.recipe import BuildError, recipe
 from fmus.loader.loader_build import DESCRIPTION
+from fmus.loader.python_installation import InstallationError, installed_at, own
 from fmus.loader.runtime import Runtime, RuntimeBuildError, make_runtime, write_files
 
 #: An FMU of each kind: what their runs load is what a runtime holds, the same for all FMUs.

@@ -1,4 +1,4 @@
-"""Whether a record covers the interval of interest: figures of a part of it are not those of the interval."""
+"""Whether a recording covers the interval of interest: figures of a part are not those of the interval."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def shortfall(recording: Recording, contacts: Iterable[Contact], interval: Inter
     Parameters
     ----------
     recording : Recording
-        The one at every step.
+        The one of every step.
     contacts : iterable of Contact
     interval : tuple
-        Start and end [m]; None where it has none.
+        Start and end [m]; None where it is open.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def _place(recording: Recording, contact: Contact) -> FloatArray:
 
 def _lacking(x: FloatArray, pantograph: str, interval: Interval) -> str:
     start, end = interval
-    # A bound between two samples has been passed; one jump of a position is no stride.
+    # A bound between two samples has been passed; a single jump of the position is no stride.
     stride = float(np.median(np.abs(np.diff(x)))) if len(x) > 1 else 0.0
     first, last = float(x.min()), float(x.max())
     if end is not None and last + stride < end:

@@ -113,7 +113,7 @@ def figures(done: Results) -> dict[str, Any]:
 def _assessed(a: Assessment) -> dict[str, Any]:
     return {
         **asdict(a.quality),
-        "depends_on_filter": bool(a.quality.told),
+        "depends_on_filter": bool(a.quality.filter_dependent),
         "uplift": None if a.uplift is None else asdict(a.uplift),
         "supports": a.supports,
         "slack_droppers": a.slack,

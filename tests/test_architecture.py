@@ -86,12 +86,9 @@ OPEN: set[str] = {
     "init master.recording does not say its duty",
     "init master.scenario does not say its duty",
     "init master.system does not say its duty",
-    "init models.catenary.contact_and_slack does not say its duty",
     "init models.catenary.definition does not say its duty",
-    "init models.catenary.linear_motion does not say its duty",
     "init models.catenary.shape does not say its duty",
     "init models.catenary.statics does not say its duty",
-    "init models.catenary.step does not say its duty",
     "init models.definition_files does not say its duty",
 }
 

@@ -20,7 +20,14 @@ from typing import Any, Final
 
 from models.definition_files.si_units import SI
 from models.definition_files.toml_reader import DefinitionError, Table
-from models.library import line_names, line_path, load_line, load_pantograph, pantograph_names, pantograph_path
+from models.library.catalogue import (
+    line_names,
+    line_path,
+    load_line,
+    load_pantograph,
+    pantograph_names,
+    pantograph_path,
+)
 
 HERE: Final = Path(__file__).parent
 _FORMS: Final = {
@@ -218,13 +225,6 @@ def meaning(key: Key, reference: Reference, own: dict[str, str]) -> str:
     return own.get(key.path) or reference.meanings.get(key.path, "")
 
 
-def parameters_only(reference: Reference) -> dict[str, str]:
-    """Return name and meaning of declared parameters that no file sets."""
-    return {
-        p: reference.meanings[p] for p in sorted(reference.parameters & set(reference.meanings) - set(reference.keys))
-    }
-
-
 def is_required(key: Key, reference: Reference) -> bool:
     """Whether a file without the key is refused: it has no default, and whatever else is in the table, it is read."""
     if key.method in ("table", "tables") or key.defaults != [None]:
@@ -244,9 +244,6 @@ def page(title: str, intro: str, parts: list[tuple[str, str, Reference]]) -> str
             keys = [k for k in reference.keys.values() if k.table == table]
             level = "###" if heading else "##"
             lines += [f"{level} {_title(table, reference)}", "", *_rows(keys, reference, own[sort]), ""]
-        if only := parameters_only(reference):
-            lines += [f"{level} Parameters of the FMU alone", "", "No key of the file sets these; a scenario may.", ""]
-            lines += ["| parameter | meaning |", "|---|---|", *(f"| `{n}` | {text} |" for n, text in only.items()), ""]
     return "\n".join(lines)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import definition_keys
 
-from models.library import line_names, load_line, load_pantograph, pantograph_names
+from models.library.catalogue import line_names, load_line, load_pantograph, pantograph_names
 
 _QUANTITY = (
     'A value is written with its unit and its source, `[20, "kN", "Table 5.2"]`, a list of values as '

@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from master.batch.batch_session import Runner
 from master.errors import MasterError
+from master.report.progress import progress_shown
 from master.report.terminal_summary import Terminal
 from master.scenario.overrides import Overrides
 from master.ssp.run_settings import SCHEMES
@@ -106,6 +109,14 @@ def add_verb(
 def say(text: str, console: Console | None = None) -> None:
     """Print a note or a warning to standard error."""
     (console or Terminal(stderr=True)).print(text, style="dim", markup=False, highlight=False, emoji=False)
+
+
+def batch_runner(options: argparse.Namespace) -> Runner:
+    """Return how a batch makes its runs: with progress and messages on standard error, or quietly."""
+    if options.quiet:
+        return Runner(build=not options.no_build)
+    console = Terminal(stderr=True)
+    return Runner(partial(progress_shown, console), partial(say, console=console), not options.no_build)
 
 
 def say_warnings(system: System, note: Callable[[str], None] = say) -> None:

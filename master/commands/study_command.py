@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from master.batch.batch_session import Runner
 from master.batch.calibration import unchanged
 from master.batch.study.family import Family, Variant, family_names, load_family, store_values
-from master.batch.study.study_outcome import Done
+from master.batch.study.study_outcome import VariantResult
 from master.batch.study.study_session import CSV, JSON, PAGE, study
 from master.batch.study.study_table import list_table, show
-from master.batch.study.variants import ObserverFactory, Runner, calibrate_variant, unwatched
-from master.commands.command_options import add_verb
-from master.coupling.macro_steps import Observer
+from master.batch.study.variants import calibrate_variant
+from master.commands.command_options import add_verb, batch_runner
 from master.errors import UsageError
-from master.report.progress import ProgressObserver
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
-from master.system.components import System
 
 
 def add_study(verbs: Any) -> None:
@@ -58,8 +55,7 @@ def _study(options: argparse.Namespace) -> int:
         raise UsageError(f"which study? known: {', '.join(family_names()) or 'none'}")
     family = load_family(options.name)
     chosen = family.chosen(options.only)
-    error = Terminal(stderr=True)
-    runner = _runner(options, error)
+    runner = batch_runner(options)
     if options.calibrate:
         family, chosen = _calibrated(family, chosen, options, runner)
     folder = options.out or Path("results") / "study" / family.name
@@ -90,28 +86,5 @@ def _calibrated(
     return renewed, renewed.chosen(options.only)
 
 
-def _runner(options: argparse.Namespace, console: Console) -> Runner:
-    if options.quiet:
-        return Runner(build=not options.no_build)
-    tell = _teller(console)
-    return Runner(_progress(console), tell, not options.no_build)
-
-
-def _teller(console: Console) -> Callable[[str], None]:
-    return lambda text: console.print(text, style="dim", markup=False, highlight=False)
-
-
-def _announcer(runner: Runner) -> Callable[[Done], None]:
+def _announcer(runner: Runner) -> Callable[[VariantResult], None]:
     return lambda done: runner.tell(f"{done.name}: results in {done.results.folder}")
-
-
-def _progress(console: Console) -> ObserverFactory:
-    @contextmanager
-    def watching(system: System) -> Iterator[Sequence[Observer]]:
-        progress = ProgressObserver(console, system.start, system.stop)
-        try:
-            yield [progress]
-        finally:
-            progress.finish()
-
-    return watching if console.is_terminal else unwatched

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
-
-from rich.console import Console
 
 from master.batch.verification.case import find_cases, load_cases
 from master.batch.verification.case_runs import RUNS, Runs
 from master.batch.verification.verification_outcome import CaseOutcome
 from master.batch.verification.verification_session import JSON, PAGE, verify
 from master.batch.verification.verification_table import list_table, show_case
-from master.commands.command_options import add_verb
-from master.coupling.macro_steps import Observer
-from master.report.progress import ProgressObserver
+from master.commands.command_options import add_verb, batch_runner
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
-from master.system.components import System
 
 _DEFAULT_FOLDER: Final = Path("results") / "verify"
 
@@ -42,14 +37,10 @@ def _verify(options: argparse.Namespace) -> int:
         Terminal(width=_width()).print(list_table(cases))
         return 0
     is_shown = not (options.quiet or options.json)
-    out, error = Terminal(width=_width(), highlight=False), Terminal(stderr=True)
-    runs = Runs(
-        options.out / RUNS,
-        _nobody if options.quiet else _progress(error),
-        _silent if options.quiet else _teller(error),
-        not options.no_build,
-    )
-    done = verify(cases, options.out, runs, _shower(out) if is_shown else _silent)
+    out = Terminal(width=_width(), highlight=False)
+    runs = Runs(options.out / RUNS, batch_runner(options))
+    show = partial(show_case, out) if is_shown else lambda _: None
+    done = verify(cases, options.out, runs, show)
     if options.json:
         print(printable_json((options.out / JSON).read_text(encoding="utf-8")), end="")
     elif is_shown:
@@ -69,33 +60,3 @@ def _failing(cases: Sequence[CaseOutcome]) -> Iterator[str]:
     for outcome in cases:
         for row in outcome.failing:
             yield f"FAILS: {outcome.case.name}, {row.title}: {row.shown}, wanted {row.reference}"
-
-
-def _silent(_: object) -> None:
-    pass
-
-
-def _teller(console: Console) -> Callable[[str], None]:
-    return lambda text: console.print(text, style="dim", markup=False, highlight=False)
-
-
-def _shower(console: Console) -> Callable[[CaseOutcome], None]:
-    return lambda outcome: show_case(console, outcome)
-
-
-@contextmanager
-def _nobody(_: System) -> Iterator[Sequence[Observer]]:
-    yield ()
-
-
-def _progress(console: Console) -> Callable[[System], AbstractContextManager[Sequence[Observer]]]:
-    @contextmanager
-    def watching(system: System) -> Iterator[Sequence[Observer]]:
-        console.print(f"running {system.name}", style="dim", markup=False, highlight=False)
-        progress = ProgressObserver(console, system.start, system.stop)
-        try:
-            yield [progress]
-        finally:
-            progress.finish()
-
-    return watching

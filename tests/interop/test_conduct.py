@@ -41,7 +41,7 @@ def _load(part, location=None):
 
 
 def _ask(program, *orders, **environment):
-    """Return what the host told, line by line; every order was obeyed, and the host ended by itself."""
+    """Return what the host printed, line by line; every order was obeyed, and the host ended by itself."""
     done = run_host(program, "\n".join(orders) + "\n", **{"OPENPANTO_PYTHON": sys.executable, **environment})
     assert done.returncode == 0, done.stderr[-2000:]
     lines = done.stdout.splitlines()
@@ -126,7 +126,7 @@ def test_links_to_the_libraries_are_followed(obedient, part, tmp_path, where):
 
 
 def test_several_fmus_start_python_once_in_threads_at_the_same_time(tmp_path):
-    """Each brings a loader of its own: what locks out the others has to be one for the process."""
+    """Each brings its own loader: what locks out the others has to be one for the process."""
     host = _compiled("together", tmp_path)
     parts = [unpack(build(toy_recipe(name=f"Toy{n}"), tmp_path), tmp_path / "unpacked") for n in range(4)]
     words = [str(word) for p in parts for word in (p.library, p.guid, p.folder / "resources")]

@@ -10,8 +10,8 @@ import numpy as np
 
 from master.arrays import BoolArray, FloatArray
 from master.batch.study.family import Interval
-from master.batch.study.study_evaluation import Entry, section_forces
-from master.batch.study.study_outcome import Done, Outcome
+from master.batch.study.study_evaluation import StudyEntry, section_forces
+from master.batch.study.study_outcome import StudyOutcome, VariantResult
 from master.evaluation.contact_positions import track_position
 from master.evaluation.contact_signals import contact_signals
 from master.evaluation.filters import settled
@@ -27,7 +27,7 @@ _FORCE: Final = Axis("contact force, low-passed", "N")
 _STATISTICS: Final = ("maximum", "minimum", "amplitude", "mean", "sigma", "statistical_minimum")
 
 
-def interval_charts(outcome: Outcome, interval: Interval, found: Sequence[Entry]) -> list[Chart]:
+def interval_charts(outcome: StudyOutcome, interval: Interval, found: Sequence[StudyEntry]) -> list[Chart]:
     """Return statistics by role, then forces and histograms of every variant of several pantographs."""
     number = outcome.family.settings.interval.index(interval) + 1
     made = [_statistics(number, role, own) for role, own in _roles(found).items()]
@@ -38,7 +38,7 @@ def interval_charts(outcome: Outcome, interval: Interval, found: Sequence[Entry]
     return made
 
 
-def _roles(found: Sequence[Entry]) -> dict[str, list[Entry]]:
+def _roles(found: Sequence[StudyEntry]) -> dict[str, list[StudyEntry]]:
     """Return, for every place in the train, its entries with those of single pantographs before them."""
     several = [e for e in found if sum(o.variant == e.variant for o in found) > 1]
     singles = [e for e in found if e not in several]
@@ -46,7 +46,7 @@ def _roles(found: Sequence[Entry]) -> dict[str, list[Entry]]:
     return {role: [*singles, *(e for e in several if e.pantograph == role)] for role in roles}
 
 
-def _statistics(number: int, role: str, found: Sequence[Entry]) -> Chart:
+def _statistics(number: int, role: str, found: Sequence[StudyEntry]) -> Chart:
     names = tuple(s.replace("_", " ") for s in _STATISTICS)
     bars = tuple(
         Bars(e.variant, names, np.array([getattr(e.assessment.quality, s) for s in _STATISTICS]), i)
@@ -55,14 +55,14 @@ def _statistics(number: int, role: str, found: Sequence[Entry]) -> Chart:
     return Chart(f"statistics_{number}_{role}", f"Statistics, {role}", Axis("figure"), _FORCE, bars)
 
 
-def _filtered(done: Results, e: Entry) -> tuple[FloatArray, FloatArray, BoolArray]:
+def _filtered(done: Results, e: StudyEntry) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Return track position, low-passed force and what of it lies in the entry's interval."""
     settings = replace(done.evaluation, interval=(e.interval.start, e.interval.end))
     s = contact_signals(done.recordings[0], e.assessment.contact, settings)
     return s.position, s.filtered, s.inside & settled(s.raw, s.step)
 
 
-def _forces(key: str, done: Results, own: Sequence[Entry]) -> Chart:
+def _forces(key: str, done: Results, own: Sequence[StudyEntry]) -> Chart:
     curves = []
     for i, e in enumerate(own):
         position, force, inside = _filtered(done, e)
@@ -72,7 +72,7 @@ def _forces(key: str, done: Results, own: Sequence[Entry]) -> Chart:
     return Chart(f"force_{key}", f"Contact force, {own[0].variant}", TRACK, _FORCE, (*curves, *marks), height=340)
 
 
-def _histogram(key: str, done: Results, own: Sequence[Entry]) -> Chart:
+def _histogram(key: str, done: Results, own: Sequence[StudyEntry]) -> Chart:
     cuts = []
     for e in own:
         _, force, inside = _filtered(done, e)
@@ -81,7 +81,7 @@ def _histogram(key: str, done: Results, own: Sequence[Entry]) -> Chart:
     return Chart(f"histogram_{key}", title, _FORCE, SHARE, force_bars(cuts), height=300)
 
 
-def sharing_charts(outcome: Outcome) -> list[Chart]:
+def sharing_charts(outcome: StudyOutcome) -> list[Chart]:
     """Return the contact force wire by wire of strips between two wires, for the variants that the family names."""
     wanted = outcome.family.settings.sharing
     made: dict[str, Chart] = {}
@@ -95,7 +95,7 @@ def sharing_charts(outcome: Outcome) -> list[Chart]:
     return list(made.values())
 
 
-def _sharing(key: str, done: Results, e: Entry) -> Chart:
+def _sharing(key: str, done: Results, e: StudyEntry) -> Chart:
     recording, contact = done.recordings[0], e.assessment.contact
     forces, position = section_forces(recording, contact), track_position(recording, contact)
     assert forces is not None
@@ -108,7 +108,7 @@ def _sharing(key: str, done: Results, e: Entry) -> Chart:
     return Chart(key, title, TRACK, Axis("contact force, as computed", "N"), tuple(curves), height=340)
 
 
-def history_charts(outcome: Outcome) -> list[Chart]:
+def history_charts(outcome: StudyOutcome) -> list[Chart]:
     """Return uplift and dropper force at one place over time, for the variants that the family names."""
     wanted = outcome.family.settings.histories
     if wanted is None:
@@ -133,7 +133,7 @@ class _Kind:
     scale: float = 1.0
 
 
-def _history(chosen: Sequence[Done], position: float, kind: _Kind) -> Chart | None:
+def _history(chosen: Sequence[VariantResult], position: float, kind: _Kind) -> Chart | None:
     curves = []
     where = None
     for i, done in enumerate(chosen):

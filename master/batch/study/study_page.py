@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from master.batch.study import study_charts
-from master.batch.study.study_evaluation import Entry
+from master.batch.study.study_evaluation import StudyEntry
 from master.batch.study.study_outcome import (
     FIGURES,
-    Outcome,
+    StudyOutcome,
     differences,
     filter_remarks,
     filters,
@@ -26,7 +26,7 @@ _STATUS = {
 }
 
 
-def page(outcome: Outcome) -> str:
+def page(outcome: StudyOutcome) -> str:
     """Return the whole page."""
     settings = outcome.family.settings
     drawn: list[Chart] = []
@@ -53,7 +53,7 @@ def page(outcome: Outcome) -> str:
     return html_markup.document(outcome.family.name, body, drawn)
 
 
-def _tables(found: Sequence[Entry], title: str) -> list[str]:
+def _tables(found: Sequence[StudyEntry], title: str) -> list[str]:
     heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), title]
     rows = [
         [f"{e.variant}, {e.pantograph}", *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found
@@ -68,7 +68,7 @@ def _tables(found: Sequence[Entry], title: str) -> list[str]:
     return parts
 
 
-def _sharing(outcome: Outcome) -> list[str]:
+def _sharing(outcome: StudyOutcome) -> list[str]:
     found = [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing is not None]
     if not found:
         return []

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from master.batch.batch_session import BatchFiles, work_off
 from master.batch.verification.case import Case
 from master.batch.verification.case_runs import Runs
-from master.batch.verification.verification_outcome import GENERATOR, CaseOutcome, Verification, as_data, judge_case
+from master.batch.verification.verification_outcome import CaseOutcome, Verification, as_data, judge_case
 from master.batch.verification.verification_page import page
-from master.errors import InterruptedRunError
-from master.results import results_folder, run_summary
-from master.safety.supervision import unfinished
 
 JSON: Final = "verify.json"
 PAGE: Final = "verify.html"
+FILES: Final = BatchFiles("verification", "openpanto verify", JSON, as_data, {PAGE: page})
 
 
 def verify(
@@ -26,7 +23,7 @@ def verify(
     runs: Runs,
     show: Callable[[CaseOutcome], None] = lambda _: None,
 ) -> Verification:
-    """Run and judge cases; page and JSON in ``folder`` are written anew after each.
+    """Run and judge cases; page and JSON in ``folder`` are written again after each.
 
     Parameters
     ----------
@@ -37,7 +34,7 @@ def verify(
     runs : Runs
         Makes the runs.
     show : callable
-        Is given every finished case.
+        Called with every finished case.
 
     Raises
     ------
@@ -46,27 +43,10 @@ def verify(
     MasterError
         If the folder holds something else.
     """
-    with results_folder.taken_over(folder, JSON, GENERATOR, "verification"), unfinished(folder / JSON):
-        return _verify(cases, runs, show, folder)
 
+    def finish(state: Verification, case: Case) -> Verification:
+        judged = judge_case(case, runs)
+        show(judged)
+        return state.with_case(judged)
 
-def _verify(cases: Sequence[Case], runs: Runs, show: Callable[[CaseOutcome], None], folder: Path) -> Verification:
-    state = Verification(datetime.now(UTC).isoformat(timespec="seconds"), run_summary.versions(), len(cases))
-    write(state, folder)
-    try:
-        for case in cases:
-            state = state.with_case(judge_case(case, runs))
-            write(state, folder)
-            show(state.cases[-1])
-    except (InterruptedRunError, KeyboardInterrupt):
-        write(replace(state, status="interrupted"), folder)
-        raise
-    state = replace(state, status="complete")
-    write(state, folder)
-    return state
-
-
-def write(state: Verification, folder: Path) -> None:
-    """Write what there is so far."""
-    results_folder.write_json(folder / JSON, as_data(state))
-    results_folder.write_text(folder / PAGE, page(state))
+    return work_off(Verification(len(cases)), cases, finish, FILES, folder)

@@ -8,7 +8,7 @@ import pytest
 from master.batch.study import study_charts
 from master.batch.study.family import Family, Interval, Settings, Variant
 from master.batch.study.study_evaluation import entries
-from master.batch.study.study_outcome import Done, Outcome, as_csv, differences
+from master.batch.study.study_outcome import StudyOutcome, VariantResult, as_csv, differences
 from master.batch.study.study_page import page
 from master.batch.verification.quantities import QUANTITIES, Choice
 from master.evaluation.contact_assessment import slack_share
@@ -57,10 +57,14 @@ def outcome(pair, tmp_path):
     settings = Settings(title="A <pair>", interval=(WHOLE,), histories={"variants": ("30 m",), "position": 71.0},
                         sharing={"variants": ("30 m",)})  # fmt: skip
     variants = (Variant(name="30 m", values={}), Variant(name="single", values={}))
-    return Outcome(
-        Family(name="pair", folder=tmp_path, settings=settings, variants=variants), "today", {}, "complete",
-        (Done("30 m", pair), Done("single", _without(pair, "trailing"))), {"60 m": "the wire <broke>"},
-    )  # fmt: skip
+    return StudyOutcome(
+        Family(name="pair", folder=tmp_path, settings=settings, variants=variants),
+        (VariantResult("30 m", pair), VariantResult("single", _without(pair, "trailing"))),
+        {"60 m": "the wire <broke>"},
+        date="today",
+        versions={},
+        status="complete",
+    )
 
 
 def _without(pair, pantograph):

@@ -3,10 +3,10 @@
 import json
 import re
 import shutil
-from contextlib import contextmanager
 
 import pytest
 
+from master.batch.batch_session import Runner
 from master.batch.verification import verification_session
 from master.batch.verification.case import load_cases
 from master.batch.verification.case_runs import Runs
@@ -201,17 +201,13 @@ def test_an_interruption_leaves_the_finished_cases(case, in_folder):
     cases = load_cases([in_folder / "toy.toml" for _ in [case()]]) * 2
     shown = []
 
-    @contextmanager
-    def nobody(_):
-        yield ()
-
     class Interrupted(Runs):
         def get(self, case, name):
             if shown:
                 raise InterruptedRunError("interrupted")
             return super().get(case, name)
 
-    runs = Interrupted(in_folder / "v" / "runs", nobody, build=False)
+    runs = Interrupted(in_folder / "v" / "runs", Runner(build=False))
     with pytest.raises(InterruptedRunError):
         verification_session.verify(cases, in_folder / "v", runs, shown.append)
     data = _data(in_folder)

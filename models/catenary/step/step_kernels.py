@@ -376,12 +376,12 @@ def meet(record, strip, element, a1, table, solution, attached, result):
     if not 0.0 <= share <= 1.0:
         return NOWHERE
     xi = min(max(xi, 0.0), 1.0)
-    result[0], result[1] = xi, share
-    result[2] = lift(interval, element, xi, row)
-    result[3], result[4] = 0.0, 0.0
+    height = lift(interval, element, xi, row)
+    rise = rate = 0.0
     for m in range(row.size):
-        result[3] += row[m] * local[0, m]
-        result[4] += row[m] * local[1, m]
+        rise += row[m] * local[0, m]
+        rate += row[m] * local[1, m]
+    result[0], result[1], result[2], result[3], result[4] = xi, share, height, rise, rate
     result[5] = give(interval, table, row, load)
     return element
 

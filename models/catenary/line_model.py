@@ -21,8 +21,9 @@ from models.catenary.contact_and_slack.local_problem import (
 from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.linear_motion.compliance import Compliance
-from models.catenary.linear_motion.interval_modes import IntervalModes, interval_modes, slower_than
+from models.catenary.linear_motion.interval_modes import IntervalModes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
+from models.catenary.linear_motion.mode_finding import interval_modes
 from models.catenary.linear_motion.sparse_products import Product, inner
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS

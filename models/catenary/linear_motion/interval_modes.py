@@ -1,7 +1,7 @@
 """The line's motion as modes of its intervals and displacements of its attachments.
 
-Between two attachments the nodes of a wire move as they would were the attachments displaced slowly (constraint
-modes) plus as a sum of all modes of the interval with its ends clamped (fixed-interface modes) [1]_. With as many
+Between two attachments the nodes of a wire move as they would if the attachments were displaced slowly (constraint
+modes), plus as a sum of all modes of the interval with its ends clamped (fixed-interface modes) [1]_. With as many
 modes as there are inner degrees of freedom nothing is left out: it is a change of coordinates, d = T s with
 s = (q, x), modal amplitudes q and displacements x of the attachments. In these coordinates
 
@@ -11,7 +11,7 @@ intervals are diagonal, and feel their attachments through the mass coupling G a
 then needs two products with G and one band solution over the attachments, an order of magnitude smaller than the line.
 
 A reduced line leaves out the modes above a natural frequency (`slower_than`). Its constraint modes stay, so that at
-rest it carries what it did.
+rest it is the full line.
 
 References
 ----------
@@ -105,7 +105,7 @@ class IntervalModes:
     followers: tuple[IntervalBlocks, ...] = ()
 
     def nodal(self, modal: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Return T s: what modal amplitudes and attachments' displacements move the nodes by, in nodal axes.
+        """Return T s: how modal amplitudes and displacements of attachments move the nodes, in nodal axes.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class IntervalModes:
     def coordinates(self, nodal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return q and x of nodal displacements, the inverse of `nodal`.
 
-        Of what modes that are left out would do nothing remains: modes are orthogonal in the mass.
+        Nothing remains of what omitted modes would do: modes are orthogonal with respect to the mass.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class IntervalModes:
 
 
 class IntervalMotion:
-    """What single intervals' nodes are moved by: by their own modes and by their two attachments.
+    """How the nodes of single intervals move: with their own modes and with their two attachments.
 
     Parameters
     ----------

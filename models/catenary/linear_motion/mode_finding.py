@@ -17,7 +17,7 @@ from models.catenary.shape.wire_intervals import Interval, turns, without_roundi
 _PLANES = ((0, 2, 4), (1, 3, 5))
 #: Both ends of an interval.
 _ENDS = 2 * NODE_DOFS
-#: Columns below this share of the largest are what turning leaves of zeros.
+#: Columns below this share of the largest are zeros but for the rounding of a turn.
 _ROUNDING = 1e-12
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
 from master.errors import MasterError
-from master.report.charts.run_charts import COLOURS, GREY, MARK
+from master.report.charts.chart import COLOURS, GREY, MARK
 from master.report.moving_picture import Movie, Rider
 from master.safety.safe_files import atomic_file
 

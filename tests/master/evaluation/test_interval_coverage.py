@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from master.batch.batch_session import Runner
 from master.batch.study.family import load_family
 from master.batch.study.study_session import study
-from master.batch.study.variants import Runner
 from master.commands.main import main
 from master.errors import RequestError
 from master.evaluation.en50367_limits import LimitChoice

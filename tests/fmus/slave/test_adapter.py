@@ -377,9 +377,9 @@ def test_damaged_definition_makes_no_instance(toy_fmu, tmp_path, capfd):
     path.write_text(path.read_text().replace("mass =", "mess =").replace('"kg"', '"5%"'))
     with pytest.raises(Exception, match="instantiate"):
         Instance(toy_fmu, unzipped=folder)
-    told = capfd.readouterr().err
-    assert "mass: is missing" in told
-    assert "mess: unknown key" in told
+    said = capfd.readouterr().err
+    assert "mass: is missing" in said
+    assert "mess: unknown key" in said
 
 
 def test_reading_does_not_change_what_is_computed(instantiate):

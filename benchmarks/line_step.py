@@ -51,11 +51,11 @@ def main(name: str) -> None:
 
 def parts(model: CatenaryModel) -> Parts:
     """Return part of a step -> class and methods that it is done in; what they call in another part counts there."""
-    stepper = type(model._step(STEP).stepper)
+    engine = type(model._step(STEP).engine)
     return {
-        f"products ({stepper.__name__})": (stepper, ("begin", "finish")),
-        f"band solution ({stepper.__name__})": (stepper, ("solve",)),
-        "finding the contact": (CatenaryModel, ("_open_contacts",)),
+        f"products ({engine.__name__})": (engine, ("begin", "finish")),
+        f"band solution ({engine.__name__})": (engine, ("solve",)),
+        "finding the contact": (CatenaryModel, ("_candidates",)),
         "contact force and slack droppers": (local_problem.LocalProblem, ("solve",)),
         "pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of")),
         "rest of the line": (CatenaryModel, ("step",)),

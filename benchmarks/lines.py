@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import tomllib
 
-from models.catenary.definition.line_definition import CatenaryDefinition, read
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_reading import read
 from models.definition_files.toml_reader import Table
 from models.library.catalogue import line_path
 

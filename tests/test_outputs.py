@@ -13,11 +13,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from fmus.builder import fmu_build as building
-from fmus.builder.fmu_build import BuildError
+from fmus.builder import recipe
+from fmus.builder.recipe import BuildError
 from master.batch.calibration import store_value
 from master.errors import MasterError
 from master.safety import safe_files
-from master.safety.safe_files import PART, whole_file, write_whole
+from master.safety.safe_files import PART, atomic_file, write_atomically
 from master.ssp.pack import pack
 from models.commands import physics_files
 from models.definition_files.parameter import ParameterError
@@ -28,20 +29,26 @@ WRITES = {"write_text", "write_bytes", "savefig", "savetxt", "write_table", "sav
 #: Functions that may: they write beside the file's place, into memory, or into a temporary folder of their own.
 WHOLE = {
     "master/safety/folder_lock.py": {"_sign"},
-    "master/results/run_results.py": {"write_forces"},
-    "master/safety/safe_files.py": {"write_whole"},
+    "master/results/results_folder.py": {"write_forces"},
+    "master/safety/safe_files.py": {"write_atomically"},
     "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},
-    "master/batch/verification/verification_page.py": {"_picture"},
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_whole", "write_csv", "write_figure"},
     "models/numerics/kernel_cache.py": None,
-    "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_whole"},
+    "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_atomically"},
     "fmus/loader/runtime.py": {"_archive", "_replace"},
 }
 #: Functions that are called ``write_text`` and ``save`` and are no writing by a file's name.
-HARMLESS = {"results_folder.write_text", "slave.save", "self.save", "self._instance.save"}
+HARMLESS = {
+    "results_folder.write_text",
+    "algorithm.save",
+    "observer.save",
+    "slave.save",
+    "self.save",
+    "self._instance.save",
+}
 
 
 def writing_calls(path: Path):
@@ -73,11 +80,11 @@ def full(*_):
 @pytest.mark.parametrize(
     ("write", "raised"),
     [
-        (lambda p: write_whole(p, b"new"), MasterError),
+        (lambda p: write_atomically(p, b"new"), MasterError),
         (lambda p: physics_files.write_text(p, "new"), OSError),
         (lambda p: physics_files.write_csv(p, ["a"], [np.zeros(3)]), OSError),
         (lambda p: physics_files.write_figure(p, Figure(), 50), OSError),
-        (lambda p: building._write_whole(p, b"new"), OSError),
+        (lambda p: building._write_atomically(p, b"new"), OSError),
     ],
 )
 def test_a_full_disk_leaves_the_old_file_and_names_it(tmp_path, monkeypatch, write, raised):
@@ -97,7 +104,7 @@ def test_an_fmu_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(building, "archive", lambda *_: b"new")
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(BuildError, match=r"Pantograph_CX\.fmu cannot be written \(No space left on device\)"):
-        building.build(building.recipe("Pantograph_CX"), tmp_path)
+        building.build(recipe.recipe("Pantograph_CX"), tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -126,9 +133,9 @@ def test_a_calibrated_value_that_does_not_fit_leaves_the_scenario(tmp_path, monk
 def test_an_interruption_leaves_the_old_file(tmp_path):
     path = tmp_path / "x"
     path.write_text("old")
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text("new")
-    with pytest.raises(KeyboardInterrupt), whole_file(path) as temporary:
+    with pytest.raises(KeyboardInterrupt), atomic_file(path) as temporary:
         _interrupted(temporary)
     assert [p.read_text() for p in tmp_path.iterdir()] == ["new"]
 
@@ -157,7 +164,7 @@ def test_a_full_standard_output_is_named(monkeypatch, capsys):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
 @pytest.mark.parametrize(
-    ("write", "raised"), [(safe_files.write_whole, MasterError), (physics_files.write_whole, OSError)]
+    ("write", "raised"), [(safe_files.write_atomically, MasterError), (physics_files.write_whole, OSError)]
 )
 def test_what_is_no_file_is_not_replaced(tmp_path, write, raised):
     """Such as /dev/null, for everybody, when it is root who writes."""

@@ -10,7 +10,8 @@ from typing import ClassVar
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, load
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_reading import load
 from models.catenary.line_advice import slack_law_warning, slack_warning, speed_warning, step_warning
 from models.catenary.line_part import CatenaryPart
 
@@ -27,8 +28,8 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "An overhead contact line of several spans in three dimensions: contact wire and messenger wire (and stitch "
         "wires, where the definition has them) as tensioned Euler-Bernoulli beams, droppers that carry tension only, "
         "steady arms, stagger, clamps as lumped masses, proportional damping. The static shape is found first (given "
-        "contact-wire height and pre-sag, the dropper lengths follow); the dynamics are linear about it, but for the "
-        "slackening droppers and the contact, and are integrated with constant steps. The pantograph tells the ends "
+        "contact-wire height and pre-sag, the dropper lengths follow); the dynamics are linear about it, except for "
+        "slackening droppers and the contact, and are integrated with constant steps. The pantograph gives the ends "
         "of its collector strip; the line finds where the wire crosses the strip, the contact force from the "
         "interpenetration, and its point of application. Between communication points the strip is continued from "
         "its last positions and velocities, so hosts that hold inputs lose no accuracy."
@@ -47,7 +48,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "definition.",
         "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: a strip meets the "
         "same wire again after every lap, with what its last passage has left of the wire's motion.",
-        "All that the definition marks as a choice is not taken from the source.",
+        "Whatever the definition marks as a choice is not taken from the source.",
     )
 
     def _read_definition(self, path: Path) -> CatenaryDefinition:
@@ -77,7 +78,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     def _advance(self, part: CatenaryPart, inputs: FloatArray, step: float) -> None:
         part.step(inputs.reshape(self.pantographs, 2, 2, 3), step)
 
-    def _doubts(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
+    def _start_warnings(self, part: CatenaryPart, inputs: FloatArray) -> Iterable[str]:
         strips = inputs.reshape(self.pantographs, 2, 2, 3)
         along_track = strips[:, :, 1, 0]
         part.check_strips(strips)
@@ -86,7 +87,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 
-    def _step_doubt(self, part: CatenaryPart, step: float) -> str:
+    def _step_warning(self, part: CatenaryPart, step: float) -> str:
         return step_warning(part.definition, step)
 
 
@@ -132,7 +133,7 @@ def _uplift_port(part: CatenaryPart) -> Port:
 
 
 def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:
-    told = (("force", "N", "tension of"), ("slack", "1", "1 while it is slack, else 0:"))
+    observed = (("force", "N", "tension of"), ("slack", "1", "1 while it is slack, else 0:"))
     return tuple(
         Port(
             tuple(
@@ -141,7 +142,7 @@ def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:
             ),
             attrgetter(f"dropper_{name}"),
         )
-        for name, unit, text in told
+        for name, unit, text in observed
     )
 
 

@@ -39,7 +39,7 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
     def _make_ports(self, part: MultibodyPantographPart) -> Ports:
         return pantograph_ports(part)
 
-    def _doubts(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
+    def _start_warnings(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
 
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:

@@ -13,7 +13,7 @@ from master.system.contacts import Contact
 LONGEST_LOSS: Final = 1.0
 
 
-class ContactWatch:
+class ContactLossStop:
     """Observer that ends the run when a contact, once made, stays lost.
 
     Parameters
@@ -26,7 +26,7 @@ class ContactWatch:
         Loss after which the run is stopped [s].
     """
 
-    name = "contact watch"
+    name = "contact loss"
 
     def __init__(self, contacts: Sequence[Contact], network: Network, longest: float = LONGEST_LOSS) -> None:
         self._contacts = tuple(contacts)
@@ -49,11 +49,11 @@ class ContactWatch:
     def finish(self) -> None:
         """Nothing to close."""
 
-    def memory(self) -> list[float | None]:
+    def save(self) -> list[float | None]:
         """Return when each contact was last seen."""
         return list(self._last)
 
-    def recall(self, memory: Sequence[float | None]) -> None:
+    def restore(self, memory: Sequence[float | None]) -> None:
         """Go on from what another watch of the same contacts has seen."""
         self._last = list(memory)
 

@@ -69,7 +69,7 @@ class _Port:
     told: tuple[int, int, int]
 
 
-class PowerObserver:
+class CouplingPowerObserver:
     """Observer that sums up what is given and told at each contact.
 
     Parameters
@@ -80,7 +80,7 @@ class PowerObserver:
         The network that will be run.
     """
 
-    name = "interface power"
+    name = "coupling power"
 
     def __init__(self, contacts: Sequence[Contact], network: Network) -> None:
         outputs = {n: i for i, n in enumerate(network.output_names)}
@@ -109,11 +109,11 @@ class PowerObserver:
     def finish(self) -> None:
         """Nothing to close."""
 
-    def memory(self) -> list[float | None]:
+    def save(self) -> list[float | None]:
         """Return the sums, from which another observer of the same contacts goes on."""
         return [float(self._count), *(value for sums in self._sums for value in sums)]
 
-    def recall(self, memory: Sequence[float | None]) -> None:
+    def restore(self, memory: Sequence[float | None]) -> None:
         """Go on from the sums of another observer."""
         count, *values = (value or 0.0 for value in memory)
         self._count = round(count)

@@ -35,25 +35,25 @@ class Algorithm(Protocol):
         ``network.inputs`` holds what the slaves were told for this step.
         """
 
-    def memory(self) -> FloatArray:
+    def save(self) -> FloatArray:
         """Return what it remembers from step to step, as a flat array."""
 
-    def recall(self, memory: FloatArray) -> None:
+    def restore(self, memory: FloatArray) -> None:
         """Take such a memory back."""
 
 
-class _Forgetful:
+class _Stateless:
     """A scheme that remembers nothing from step to step."""
 
-    def memory(self) -> FloatArray:
-        """See `Algorithm.memory`."""
+    def save(self) -> FloatArray:
+        """See `Algorithm.save`."""
         return np.zeros(0)
 
-    def recall(self, memory: FloatArray) -> None:
-        """See `Algorithm.recall`."""
+    def restore(self, memory: FloatArray) -> None:
+        """See `Algorithm.restore`."""
 
 
-class Jacobi(_Forgetful):
+class Jacobi(_Stateless):
     """All slaves step with the outputs of the beginning of the step; order does not matter."""
 
     name = "jacobi"
@@ -67,7 +67,7 @@ class Jacobi(_Forgetful):
         network.read()
 
 
-class GaussSeidel(_Forgetful):
+class GaussSeidel(_Stateless):
     """Slaves step one after the other, each told the latest outputs, also those of the step's end.
 
     Parameters
@@ -132,12 +132,12 @@ class Iterative:
             for slave, state in zip(network.slaves, states, strict=True):
                 slave.release(state)
 
-    def memory(self) -> FloatArray:
-        """See `Algorithm.memory`."""
+    def save(self) -> FloatArray:
+        """See `Algorithm.save`."""
         return np.zeros(0) if self._scale is None else self._scale.copy()
 
-    def recall(self, memory: FloatArray) -> None:
-        """See `Algorithm.recall`."""
+    def restore(self, memory: FloatArray) -> None:
+        """See `Algorithm.restore`."""
         self._scale = memory.copy() if len(memory) else None
 
     def _iterate(self, network: Network, states: Sequence[object], time: float, step: float) -> None:

@@ -20,7 +20,7 @@ LARGEST: Final = 1e15
 
 
 @dataclass(frozen=True)
-class Caution:
+class FmuWarning:
     """What an FMU has warned of.
 
     Attributes
@@ -42,14 +42,14 @@ class Caution:
         return f"warning: component '{self.component}' says: {self.text}"
 
 
-class Excess(Caution):
+class Excess(FmuWarning):
     """What was seen in an FMU's values, which has not warned of it itself; the text begins with the variable."""
 
     def __str__(self) -> str:
         return f"warning: component '{self.component}': {self.text}"
 
 
-class CautionObserver:
+class FmuWarningObserver:
     """Observer that asks the FMUs after initialization, after the first step and at the end, and looks at all values.
 
     Parameters
@@ -59,16 +59,16 @@ class CautionObserver:
 
     Attributes
     ----------
-    warnings : list of Caution
+    warnings : list of FmuWarning
         So far.
     """
 
-    def __init__(self, tell: Callable[[Caution], None] = lambda _: None) -> None:
+    def __init__(self, tell: Callable[[FmuWarning], None] = lambda _: None) -> None:
         self._tell = tell
         self._has_stepped = False
         self._network: Network | None = None
         self._seen: set[str] = set()
-        self.warnings: list[Caution] = []
+        self.warnings: list[FmuWarning] = []
 
     def begin(self, start: float, network: Network) -> None:
         """Initialization is over."""
@@ -90,7 +90,7 @@ class CautionObserver:
             with suppress(MasterError):
                 self._look(self._network)
 
-    def add(self, found: Caution) -> None:
+    def add(self, found: FmuWarning) -> None:
         """Take a warning that comes from elsewhere."""
         if found not in self.warnings:
             self.warnings.append(found)
@@ -98,8 +98,8 @@ class CautionObserver:
 
     def _look(self, network: Network) -> None:
         for slave in network.slaves:
-            for text in slave.warnings() if isinstance(slave, Cautious) else ():
-                self.add(Caution(slave.name, text))
+            for text in slave.warnings() if isinstance(slave, WarningSource) else ():
+                self.add(FmuWarning(slave.name, text))
 
     def _weigh(self, time: float, network: Network) -> None:
         """Tell once of every output that has become larger than anything can be."""
@@ -113,7 +113,7 @@ class CautionObserver:
 
 
 @runtime_checkable
-class Cautious(Protocol):
+class WarningSource(Protocol):
     """A slave that may warn."""
 
     name: str

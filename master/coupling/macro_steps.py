@@ -57,7 +57,7 @@ class TimeGrid:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """How a run ended.
 
     Attributes
@@ -89,7 +89,7 @@ def simulate(
     observers: Sequence[Observer] = (),
     stop_wanted: Callable[[], bool] = lambda: False,
     prepare: Callable[[Network, Algorithm, TimeGrid], None] = _initialise,
-) -> Outcome:
+) -> RunOutcome:
     """Initialise (or otherwise prepare) and step the network over the grid.
 
     A failure does not raise: it ends the run, and the outcome carries it, so that what was computed is kept.
@@ -99,7 +99,7 @@ def simulate(
     finally:
         failure = _finish(observers)
     if failure is not None and outcome.error is None:
-        return Outcome("failed", outcome.steps, outcome.time, failure)
+        return RunOutcome("failed", outcome.steps, outcome.time, failure)
     return outcome
 
 
@@ -110,7 +110,7 @@ def _run(
     observers: Sequence[Observer],
     stop_wanted: Callable[[], bool],
     prepare: Callable[[Network, Algorithm, TimeGrid], None],
-) -> Outcome:
+) -> RunOutcome:
     index = grid.first
     try:
         with phase("loading"), heeded_at_once():
@@ -123,16 +123,16 @@ def _run(
         with phase("stepping"):
             for index in range(grid.first, grid.count):
                 if stop_wanted():
-                    return Outcome("interrupted", index, grid.time(index))
+                    return RunOutcome("interrupted", index, grid.time(index))
                 _advance(network, algorithm, grid, index, observers, previous)
     except KeyboardInterrupt:
-        return Outcome("interrupted", index, grid.time(index))
+        return RunOutcome("interrupted", index, grid.time(index))
     except MasterError as error:
         # An FMU in Python takes the interruption for a failure of its own.
         if stop_wanted():
-            return Outcome("interrupted", index, grid.time(index))
-        return Outcome("failed", index, grid.time(index), error)
-    return Outcome("complete", grid.count, grid.stop)
+            return RunOutcome("interrupted", index, grid.time(index))
+        return RunOutcome("failed", index, grid.time(index), error)
+    return RunOutcome("complete", grid.count, grid.stop)
 
 
 def _finish(observers: Sequence[Observer]) -> MasterError | None:

@@ -69,7 +69,7 @@ class Punctuality:
     mean_step: float
 
 
-class Pacer:
+class WallClockPacer:
     """Observer that holds a run back to the wall clock; it has to be the last one, so that all others' work counts.
 
     Python's garbage collector rests while the run is paced: nothing in the loop makes reference cycles.

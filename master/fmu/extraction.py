@@ -1,4 +1,4 @@
-"""Unpacked FMUs: a folder serves one instance at a time, and the next one again where that saves memory.
+"""Extracted FMUs: a folder serves one instance at a time, and the next one again where that saves memory.
 
 Some libraries stay in the process for ever, whatever frees them: C++ with unique symbols, and so every FMU made with
 pythonfmu. From one place such a library is loaded once; unpacked to a new place for every instance, a thousand
@@ -25,7 +25,7 @@ _Key = tuple[str, int, int, int]
 _idle: Final[defaultdict[_Key, list[str]]] = defaultdict(list)
 
 
-class Unpacked:
+class ExtractedFmu:
     """An unpacked FMU, for one instance.
 
     Parameters

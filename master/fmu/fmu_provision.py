@@ -39,7 +39,7 @@ _UNREADABLE: Final = (
 )
 
 
-def ensure(path: Path, tell: Callable[[str], None], scratch: Path | None = None) -> Path:
+def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = None) -> Path:
     """Build the FMU at ``path`` if it is missing, or ours and older than the sources it is built from.
 
     What does not carry our mark, or was changed since it was built, is kept, and that is said.

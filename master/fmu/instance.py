@@ -18,7 +18,7 @@ from fmpy.fmi2 import FMU2Slave
 from master.arrays import FloatArray
 from master.errors import SlaveError, one_line
 from master.fmu import fmi_log
-from master.fmu.extraction import Unpacked
+from master.fmu.extraction import ExtractedFmu
 from master.fmu.typed_values import TypedValues
 from master.ssp.ssv import Value
 from master.system.components import Component, Variable
@@ -287,7 +287,7 @@ class Instance:
     def _load(self) -> Any:
         fmu = self.component.fmu
         try:
-            self._unpacked = unpacked = Unpacked(fmu)
+            self._unpacked = unpacked = ExtractedFmu(fmu)
         except Exception as error:
             raise self._unloadable(error) from error
         try:

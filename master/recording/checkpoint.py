@@ -15,7 +15,7 @@ import numpy as np
 from master.arrays import FloatArray
 from master.errors import MasterError, RunError, one_line
 from master.safety import array_container
-from master.safety.safe_files import write_whole
+from master.safety.safe_files import write_atomically
 from master.system.components import System
 
 NAME: Final = "checkpoint.state"
@@ -93,7 +93,7 @@ def scheme_options(system: System) -> dict[str, Any]:
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint; readers see the old file or the new one, never half of it."""
-    write_whole(path, pack(checkpoint))
+    write_atomically(path, pack(checkpoint))
 
 
 def read(path: Path) -> Checkpoint:

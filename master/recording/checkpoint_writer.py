@@ -15,20 +15,20 @@ from master.system.components import Component, System
 from master.system.step_rounding import ROUNDING, steps_in
 
 
-class Remembering(Protocol):
+class StatefulObserver(Protocol):
     """An observer whose work has to go on where it was."""
 
     name: str
 
-    def memory(self) -> list[float | None]:
+    def save(self) -> list[float | None]:
         """Return what it remembers from step to step."""
 
-    def recall(self, memory: Sequence[float | None]) -> None:
+    def restore(self, memory: Sequence[float | None]) -> None:
         """Take such a memory back."""
 
 
 @dataclass(frozen=True)
-class Occasions:
+class CheckpointSchedule:
     """After how many macro steps checkpoints are written.
 
     Attributes
@@ -59,20 +59,20 @@ class CheckpointObserver:
         index -> Checkpoint.
     path : Path
         The file.
-    occasions : Occasions
+    schedule : CheckpointSchedule
         When.
     """
 
     take: Callable[[Network, int], Checkpoint]
     path: Path
-    occasions: Occasions
+    schedule: CheckpointSchedule
 
     def begin(self, time: float, network: Network) -> None:
         """Nothing to save yet."""
 
     def observe(self, index: int, time: float, network: Network) -> None:
         """Write one if it is time."""
-        if index in self.occasions:
+        if index in self.schedule:
             write(self.path, self.take(network, index))
 
     def finish(self) -> None:
@@ -124,7 +124,7 @@ def take(
     network: Network,
     algorithm: Algorithm,
     index: int,
-    observers: Sequence[Remembering] = (),
+    observers: Sequence[StatefulObserver] = (),
     run: str = "",
 ) -> Checkpoint:
     """Return the state of a system after ``index`` macro steps."""
@@ -136,10 +136,10 @@ def take(
         {s.name: storable(s).serialise() for s in network.slaves},
         dict(zip(network.input_names, network.inputs.tolist(), strict=True)),
         dict(zip(network.output_names, network.outputs.tolist(), strict=True)),
-        algorithm.memory(),
+        algorithm.save(),
         algorithm.name,
         run,
-        {observer.name: observer.memory() for observer in observers},
+        {observer.name: observer.save() for observer in observers},
         scheme_options(system),
     )
 

@@ -96,7 +96,7 @@ class Continuation:
         self._check_outputs(network, kept_outputs)
         _fill(network.inputs, network.input_names, self.checkpoint.inputs)
         if algorithm.name == self.checkpoint.scheme and not self.renewed:
-            algorithm.recall(self.checkpoint.memory)
+            algorithm.restore(self.checkpoint.memory)
 
     def _check_outputs(self, network: Network, kept: set[str]) -> None:
         for name, value in zip(network.output_names, network.outputs.tolist(), strict=True):

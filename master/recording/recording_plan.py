@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 
 from master.arrays import FloatArray
 from master.coupling.network import Network
-from master.recording.recorder import Recorder, Source
+from master.recording.recorder import RecordedValues, Recorder
 from master.recording.recording import TIMESERIES
 from master.system.components import Component, System, Variable
 from master.system.step_rounding import is_recordable, record_of, steps_in
@@ -36,7 +36,7 @@ class Recordable(Protocol):
 
 
 @dataclass(frozen=True)
-class Plan:
+class RecordingPlan:
     """Which variables are recorded how often.
 
     Attributes
@@ -51,7 +51,7 @@ class Plan:
     names: dict[str, list[str]]
 
 
-def recording_plans(system: System) -> tuple[Plan, ...]:
+def recording_plans(system: System) -> tuple[RecordingPlan, ...]:
     """Return what is recorded how often besides the exchanged outputs; the plan for every step comes first.
 
     Exchanged outputs are always recorded at every step, all other outputs too unless an entry of the settings says
@@ -63,7 +63,7 @@ def recording_plans(system: System) -> tuple[Plan, ...]:
             every = _steps_between_rows(component, variable, system)
             if every:
                 by_rate.setdefault(every, {}).setdefault(component.name, []).append(variable.name)
-    return tuple(Plan(rate, by_rate[rate]) for rate in sorted(by_rate))
+    return tuple(RecordingPlan(rate, by_rate[rate]) for rate in sorted(by_rate))
 
 
 def _steps_between_rows(component: Component, variable: Variable, system: System) -> int:
@@ -76,13 +76,13 @@ def _steps_between_rows(component: Component, variable: Variable, system: System
     return steps_in(record.every, system.step)
 
 
-def recording_name(plan: Plan, step: float) -> str:
+def recording_name(plan: RecordingPlan, step: float) -> str:
     """Return the name of a plan's file."""
     return TIMESERIES if plan.every == 1 else f"timeseries_{1e3 * plan.every * step:g}ms.csv"
 
 
 def make_recorder(
-    system: System, network: Network, plan: Plan, folder: Path, made: int | None, is_steady: bool
+    system: System, network: Network, plan: RecordingPlan, folder: Path, made: int | None, is_steady: bool
 ) -> Recorder:
     """Return the recorder of a plan; ``made`` are the steps whose rows are in its file already."""
     sources = [_exchanged(system, network)] if plan.every == 1 else []
@@ -92,20 +92,20 @@ def make_recorder(
         names = plan.names.get(component.name, [])
         if names and isinstance(slave, Recordable):
             group = slave.group(names)
-            sources.append(Source([f"{component.name}.{n}" for n in names], group.values, group.read))
+            sources.append(RecordedValues([f"{component.name}.{n}" for n in names], group.values, group.read))
     keep = 0 if made is None else made // plan.every + 1
     return Recorder(folder / recording_name(plan, system.step), sources, units, plan.every, keep, is_steady)
 
 
-def _exchanged(system: System, network: Network) -> Source:
+def _exchanged(system: System, network: Network) -> RecordedValues:
     """Return the exchanged outputs as a source; of texts there is no column."""
     texts = {f"{c.name}.{n}" for c in system.components for n in c.texts}
     places = [i for i, name in enumerate(network.output_names) if name not in texts]
     if len(places) == len(network.output_names):
-        return Source(network.output_names, network.outputs)
+        return RecordedValues(network.output_names, network.outputs)
     values = network.outputs[places]
 
     def read() -> None:
         values[:] = network.outputs[places]
 
-    return Source([network.output_names[i] for i in places], values, read)
+    return RecordedValues([network.output_names[i] for i in places], values, read)

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
 from master.errors import MasterError
-from master.report.charts.run_charts import COLOURS, GREY, MARK
+from master.report.charts.chart import COLOURS, GREY, MARK
 from master.report.moving_picture import Movie, Rider
-from master.safety.safe_files import whole_file
+from master.safety.safe_files import atomic_file
 
 _ELSEWHERE: Final = "another file with --film"
 _RATE: Final = 20
@@ -56,7 +56,7 @@ def write_film(movie: Movie, path: Path, options: FilmOptions) -> Path:
     line_axes, force_axes = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     # The writers tell the format by the ending, so what is written beside the film keeps it.
     with (
-        whole_file(path, _ELSEWHERE) as whole,
+        atomic_file(path, _ELSEWHERE) as whole,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}.") as folder,
     ):
         temporary = Path(folder) / path.name

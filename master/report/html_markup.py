@@ -10,7 +10,8 @@ from typing import Any, Final
 
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.en50367_limits import ORIGINS, Criterion, LimitChoice
-from master.report.charts.run_charts import Chart
+from master.report.charts.chart import Chart
+from master.report.charts.interactive_figure import interactive_figure
 from master.report.moving_picture import Movie, as_json
 from master.report.result_tables import headlines
 
@@ -31,7 +32,7 @@ def document(title: str, body: Iterable[str], charts: Sequence[Chart], movie: Mo
         f"{_ICON}<title>{text(title)}</title><style>{asset('style.css')}</style></head><body><main>",
         *body,
         "</main>",
-        _data("charts", {c.key: {**c.figure, "height": c.height} for c in charts}),
+        _data("charts", {c.key: {**interactive_figure(c), "height": c.height} for c in charts}),
     ]
     if charts:
         parts += [_script("plotly-basic.min.js"), _script("charts.js")]
@@ -88,6 +89,12 @@ def chart(found: Chart) -> str:
     style = f"style='height:{found.height}px'"
     place = f"<div class='chart' id='chart-{text(found.key)}' {style}></div>"
     return f"<figure><figcaption><h3>{text(found.title)}</h3>{note}</figcaption>{place}</figure>"
+
+
+def placed(made: Sequence[Chart], drawn: list[Chart]) -> list[str]:
+    """Return the places of charts, and add the charts to those that the page draws."""
+    drawn += made
+    return [chart(c) for c in made]
 
 
 def no_badge(title: str) -> str:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Final
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from master.arrays import FloatArray
+from master.coupling.macro_steps import Observer
 from master.coupling.network import Network
+from master.system.components import System
 
 #: Steps between looks at the clock, and seconds between updates.
 _STEPS: Final = 16
@@ -75,3 +79,13 @@ def force_text(forces: FloatArray) -> str:
         return ""
     more = " .." if len(forces) > _MOST_FORCES else ""
     return " ".join(f"{f:.0f}" for f in forces[:_MOST_FORCES]) + f"{more} N"
+
+
+@contextmanager
+def progress_shown(console: Console, system: System) -> Iterator[Sequence[Observer]]:
+    """Yield the observer that shows the progress of a run, and take the bar away afterwards."""
+    progress = ProgressObserver(console, system.start, system.stop)
+    try:
+        yield [progress]
+    finally:
+        progress.finish()

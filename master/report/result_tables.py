@@ -85,10 +85,12 @@ def figure_rows(assessments: Sequence[Assessment]) -> list[tuple[str, ...]]:
 
 def filter_rows(quality: Quality, chosen: ForceFilter) -> list[tuple[str, ...]]:
     """Return sigma, maximum and minimum under every filter [N] if an extreme depends on it, else nothing."""
-    if not quality.told:
+    if not quality.filter_dependent:
         return []
     own = Filtered(chosen.short, quality.mean, quality.sigma, quality.minimum, quality.maximum)
-    return [(f.filter, f"{f.sigma:.1f}", f"{f.maximum:.1f}", f"{f.minimum:.1f}") for f in (own, *quality.told)]
+    return [
+        (f.filter, f"{f.sigma:.1f}", f"{f.maximum:.1f}", f"{f.minimum:.1f}") for f in (own, *quality.filter_dependent)
+    ]
 
 
 FILTER_HEADS: Final = ("filter", "sigma [N]", "maximum [N]", "minimum [N]")

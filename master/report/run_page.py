@@ -11,9 +11,10 @@ from master.evaluation.contact_signals import Signals
 from master.evaluation.filters import SETTLING, ForceFilter
 from master.evaluation.measured_force import MeasuredComparison
 from master.report import html_markup
+from master.report.charts.chart import Chart
 from master.report.charts.measured_charts import comparison_chart, comparison_rows
 from master.report.charts.output_charts import HEADS, has_contacts, output_charts, output_rows
-from master.report.charts.run_charts import Chart, run_charts
+from master.report.charts.run_charts import run_charts
 from master.report.moving_picture import Movie, make_movie
 from master.report.result_tables import FILTER_HEADS, calibration_line, figure_rows, filter_rows, uplift_line
 from master.report.run_inputs import Input, inputs_of, provenance_rows, quality_rows

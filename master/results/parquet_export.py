@@ -7,13 +7,13 @@ from pathlib import Path
 from master.errors import MasterError
 from master.recording.recording import TIMESERIES, Recording, header, load
 from master.results.results_folder import FORCES
-from master.safety.safe_files import whole_file
+from master.safety.safe_files import atomic_file
 
 
 def write_parquet(folder: Path) -> tuple[Path, ...]:
-    """Write a ``.parquet`` file beside every time series of a run and its ``contact_force.csv``; returns their paths.
+    """Write a ``.parquet`` file beside every time series of a run and its ``contact_force.csv``; return their paths.
 
-    Titles are those of the CSV files, units in brackets; no index column.
+    The titles are those of the CSV files, with units in brackets; there is no index column.
 
     Raises
     ------
@@ -33,6 +33,6 @@ def _write(recording: Recording, path: Path) -> Path:
         raise MasterError("Parquet needs pyarrow: pip install 'openpanto[parquet]'") from error
     titles = header(recording.names, recording.units)
     columns = [recording.time, *recording.values.T]
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         parquet.write_table(pyarrow.table(dict(zip(titles, columns, strict=True))), temporary)
     return path

@@ -24,7 +24,7 @@ _PIECE: Final = 1 << 20
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-def write_whole(path: Path, data: bytes, elsewhere: str = _ELSEWHERE) -> None:
+def write_atomically(path: Path, data: bytes, elsewhere: str = _ELSEWHERE) -> None:
     """Write a file in one go: readers see the old one or the new one, never half of it, whatever happens.
 
     Raises
@@ -32,16 +32,16 @@ def write_whole(path: Path, data: bytes, elsewhere: str = _ELSEWHERE) -> None:
     MasterError
         If it cannot be written; the old one is still there then.
     """
-    with whole_file(path, elsewhere) as temporary, temporary.open("wb") as file:
+    with atomic_file(path, elsewhere) as temporary, temporary.open("wb") as file:
         file.write(data)
 
 
 @contextmanager
-def whole_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
+def atomic_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
     """Give a file to write beside ``path``, which takes its place once it is complete and on the disk.
 
-    For those who write by name; what is at hand as bytes goes to `write_whole`. Where it cannot be written, the user
-    is told to choose ``elsewhere``.
+    For those who write by name; what is at hand as bytes goes to `write_atomically`. The message of a failure names
+    ``elsewhere`` as what to choose instead.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def plain_cell(cell: str) -> str:
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
-class LineFile:
+class AppendOnlyFile:
     """A text file that grows by whole lines, handed to the system in one call each time.
 
     Nothing waits in the process after a call has returned, so a process that is killed leaves what it has written;

@@ -252,7 +252,7 @@ def _mark(path: Path, key: str, status: str, reason: str) -> bool:
     """Mark a JSON file of a run that has ended; returns whether it was its own and still open."""
     from master.errors import MasterError
     from master.safety.folder_lock import claimed
-    from master.safety.safe_files import write_whole
+    from master.safety.safe_files import write_atomically
 
     try:
         with claimed(path.parent):
@@ -260,7 +260,7 @@ def _mark(path: Path, key: str, status: str, reason: str) -> bool:
             if data.get("status") != "running" or data.get("run", "") != key:
                 return False
             text = json.dumps({**data, "status": status, "reason": reason}, indent=1, ensure_ascii=False)
-            write_whole(path, (text + "\n").encode())
+            write_atomically(path, (text + "\n").encode())
     except (OSError, ValueError, AttributeError, MasterError):
         return False
     return True

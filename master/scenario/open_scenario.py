@@ -12,9 +12,9 @@ from pathlib import Path
 from master.errors import Problem, RequestError, ScenarioError
 from master.fmu import fmu_provision
 from master.fmu.fmu_description import lacking_binary, read_fmu
-from master.scenario import scenario_checks
+from master.scenario import value_checks
 from master.scenario.overrides import Overrides, effective_settings, with_energy, with_values
-from master.scenario.system_checks import Checker
+from master.scenario.scenario_checks import ScenarioChecks
 from master.ssp.archive import SSD_NAME, Package, Sources, open_package
 from master.ssp.run_settings import RunSettings
 from master.ssp.ssd import EMPTY, Structure, read_structure
@@ -90,7 +90,7 @@ def load_system(
         raise ScenarioError(reader.problems)
     provision = _Provision(build and package.writable, tell, scratch)
     fmus = _fmus(sources, structure.components, reader.problems, provision)
-    checker = Checker(structure, fmus, reader.problems, reader.warnings)
+    checker = ScenarioChecks(structure, fmus, reader.problems, reader.warnings)
     connections = checker.connections()
     components = checker.components(connections)
     times = _times(structure, overrides, reader.problems)
@@ -106,13 +106,13 @@ def load_system(
         components, settings = with_energy(components, settings)
     warnings = tuple(str(w) for w in _sorted(reader.warnings))
     system = System(package.name, components, connections, *times, settings, warnings, overrides.may_stop_early)
-    text = scenario_checks.empty_cells(system, overrides.empty)
-    if text := text or scenario_checks.half_empty_rows(system, overrides.empty, overrides.absent):
+    text = value_checks.empty_cells(system, overrides.empty)
+    if text := text or value_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)
     system = without(system, overrides.absent)
     if overrides.stop is None and _goes_on_until_end(structure):
         system = _until_end(system)
-    found = list(scenario_checks.problems(system, system.may_stop_early))
+    found = list(value_checks.problems(system, system.may_stop_early))
     if found:
         raise ScenarioError([Problem(SSD_NAME, 0, "interval", text) for text in found])
     return system
@@ -127,7 +127,7 @@ def _goes_on_until_end(structure: Structure) -> bool:
 
 
 def _until_end(system: System) -> System:
-    stop = scenario_checks.stop_after_interval(system)
+    stop = value_checks.stop_after_interval(system)
     text = stop if isinstance(stop, str) else _step_problem(system.start, stop, system.step)
     if text or isinstance(stop, str):
         raise ScenarioError([Problem(SSD_NAME, 0, "stop", text)])
@@ -178,7 +178,7 @@ class _Provision:
 
 def _provide(path: Path, provision: _Provision) -> Fmu | str:
     try:
-        place = fmu_provision.ensure(path, provision.tell, provision.scratch) if provision.build else path
+        place = fmu_provision.provide_fmu(path, provision.tell, provision.scratch) if provision.build else path
         if not place.is_file():
             return "is a folder, not an FMU" if place.is_dir() else "does not exist"
         fmu = read_fmu(place)

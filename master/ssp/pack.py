@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from master.errors import MasterError
-from master.safety.safe_files import cannot_write, whole_file
+from master.safety.safe_files import atomic_file, cannot_write
 from master.ssp.archive import SSD_NAME, Sources
 from master.ssp.ssp_xml import XmlError, safe_root
 
@@ -45,7 +45,7 @@ def pack(root: Path, archive: Path, added: Mapping[str, Path] = _NOTHING) -> Pat
     except OSError as error:
         raise cannot_write(archive, error) from error
     with (
-        whole_file(archive) as temporary,
+        atomic_file(archive) as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as file,
     ):
         for name, path in sorted(members.items()):

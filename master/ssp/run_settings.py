@@ -74,7 +74,7 @@ class Coupling(_Settings):
         return {name: getattr(self, name) for name in OPTIONS[self.scheme]}
 
 
-class Interval(_Settings):
+class EvaluationInterval(_Settings):
     """Interval of interest along the track [m]; from where the contact has settled and to the end, if not told.
 
     ``until="end"`` lets the run go on until the last pantograph has left the interval, whatever stop time the scenario
@@ -86,7 +86,7 @@ class Interval(_Settings):
     until: Literal["stop", "end"] | None = None
 
     @model_validator(mode="after")
-    def _ordered(self) -> Interval:
+    def _ordered(self) -> EvaluationInterval:
         if self.start is not None and self.end is not None and self.start >= self.end:
             raise ValueError(f"start {self.start:g} m must lie before end {self.end:g} m")
         return self
@@ -174,7 +174,7 @@ class RunSettings(_Settings):
     """Everything that our annotation can say."""
 
     coupling: Coupling = Field(default_factory=lambda: Coupling.model_validate({}))
-    interval: Interval = Field(default_factory=Interval)
+    interval: EvaluationInterval = Field(default_factory=EvaluationInterval)
     filter: Filter = Field(default_factory=lambda: Filter.model_validate({}))
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
     calibration: Calibration | None = None
@@ -183,7 +183,7 @@ class RunSettings(_Settings):
 
 _SECTIONS: Final[dict[str, type[_Settings]]] = {
     "Coupling": Coupling,
-    "Interval": Interval,
+    "Interval": EvaluationInterval,
     "Filter": Filter,
     "Limits": Limits,
     "Calibration": Calibration,

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, fields
-from functools import partial
+from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import BoolArray, FloatArray, IntArray, Snapshot
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
-from models.catenary.contact_and_slack.local_problem import LocalForces, LocalProblem, LocalSolutionError, OpenContact
-from models.catenary.contact_and_slack.wire_response import Meeting, Reaction
+from models.catenary.contact_and_slack.dropper_law import DropperLaw
+from models.catenary.contact_and_slack.local_problem import (
+    ContactCandidate,
+    LocalForces,
+    LocalProblem,
+    LocalSolutionError,
+)
+from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.linear_motion.compliance import Compliance
-from models.catenary.linear_motion.interval_modes import IntervalModes, interval_modes, slower_than
+from models.catenary.linear_motion.interval_modes import IntervalModes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
+from models.catenary.linear_motion.mode_finding import interval_modes
 from models.catenary.linear_motion.sparse_products import Product, inner
+from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_form
 from models.catenary.shape.line_matrices import (
@@ -37,17 +44,13 @@ from models.catenary.shape.wire_intervals import (
     plan_rotation,
     without_rounding,
 )
-from models.catenary.step.engine_choice import make_stepper
-from models.catenary.step.meeting import FreeMotion
-from models.catenary.step.numpy_engine import Stepper, local_motion
-from models.catenary.step.step_engine import Known
+from models.catenary.step.engine_choice import make_engine
+from models.catenary.step.step_engine import AppliedForce, StepEngine
 from models.contact_law import CONTACT_LAWS
 from models.numerics.newmark import Newmark
 
 #: Step sizes whose factorisation is kept.
 _KEPT_STEPS = 3
-#: Intervals of the contact wires whose response is kept.
-_KEPT_INTERVALS = 12
 #: No forces on the contact wires.
 _NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
 
@@ -129,13 +132,12 @@ class StripMotion:
 
 @dataclass(frozen=True)
 class _Step:
-    """What belongs to one step size; ``pull`` finds what a change of the attachments in it adds to droppers' pulls."""
+    """What belongs to one step size; ``pull`` gives what a change of the attachments adds to the droppers' pulls."""
 
-    stepper: Stepper
+    engine: StepEngine
     pull: Product
-    compliance: Compliance
     local: LocalProblem
-    reactions: dict[tuple[int, int], Reaction] = field(default_factory=dict)
+    responses: ResponseCache
 
 
 class CatenaryModel:
@@ -157,47 +159,26 @@ class CatenaryModel:
         self.definition = definition
         self.mesh: CatenaryMesh = build_mesh(definition)
         self.static: StaticState = find_form(definition, self.mesh)
-        self.dropper_stiffness = dropper_stiffness(definition, self.mesh, self.static.positions)
-        #: What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
-        self.rest_compensation = self.static.dropper_force - self.static.elastic_force
-        self.unilateral = 1.0 - compression_ratio(definition, self.mesh)
-        self.slack_delay = slack_delay(definition, self.mesh)
         attached = attachments(self.mesh)
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
         self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.points)
         #: Coordinates of the line.
         with self._solvable("move in modes of its intervals"):
             self.modes = self._modes([part for parts in by_wire for part in parts])
-        self.B = self._dropper_rows()
-        self._rest_load = self.B.T @ self.rest_compensation
-        #: Elastic forces of the droppers from the attachments' displacements; those of their dampers from velocities.
-        self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
-        alpha = definition.damping.of("dropper").alpha
-        self._damp = Product(alpha * sp.diags(self.dropper_stiffness) @ self.B)
-        #: Their pulls at the end of a step from the attachments' motion at its beginning; `_Step.pull` finds the rest.
-        self._pull = self._pulls()
-        #: What each of them pulls at.
-        self._stretch = [(row.indices, row.data) for row in self.B]
+        self.dropper_law = self._dropper_law()
         self.wires = tuple(self._wires(by_wire))
         self.uplift_places = self.modes.place[self.mesh.support_nodes * NODE_DOFS + 2]
         self._law = CONTACT_LAWS[definition.contact.law]
         self._radii = definition.contact.wire_radius + definition.contact.strip_radius
         self._steps: dict[float, _Step] = {}
 
-    def _pulls(self) -> Product:
-        """Return k (x - w v), w the delay of the slack: v turns to a1 dx - v in a step."""
-        k = self.dropper_stiffness
-        by_velocity = sp.csr_matrix(sp.diags(-k * self.slack_delay) @ self.B)
-        by_velocity.eliminate_zeros()
-        return Product(sp.hstack([sp.diags(k) @ self.B, by_velocity]))
-
     def initial_state(self, pantographs: int = 1) -> CatenaryState:
         """Return the line at rest in its static shape."""
-        shape = pantographs, len(self.wires)
+        shape, lacking = (pantographs, len(self.wires)), self.dropper_law.rest_compensation
         return CatenaryState(
             motion=LineMotion.at_rest(self.modes),
-            slack=np.flatnonzero(self.rest_compensation),
-            compensation=self.rest_compensation[self.rest_compensation > 0.0],
+            slack=np.flatnonzero(lacking),
+            compensation=lacking[lacking > 0.0],
             element=np.full(shape, -1),
             impact_velocity=np.zeros(shape),
             loaded=_NOWHERE,
@@ -205,9 +186,9 @@ class CatenaryModel:
         )
 
     def rehearse(self, step: float, strips: FloatArray) -> None:
-        """Take a step with a line at rest that is thrown away, so that the first real one need not lay anything out.
+        """Take a trial step of a line at rest, so that the first real one finds everything laid out.
 
-        Factorisation, compiled code and the responses about the strips are there afterwards: a paced run must not wait.
+        Factorisation, compiled code and responses near the strips exist afterwards: a paced run must not wait for them.
 
         Parameters
         ----------
@@ -215,7 +196,7 @@ class CatenaryModel:
             Time step [s].
         strips : ndarray, shape (n_pantographs, 2, 2, 3)
         """
-        with suppress(LocalSolutionError):  # the real step will tell, if it finds the same
+        with suppress(LocalSolutionError):  # the real step will raise it, if it recurs
             self.step(self.initial_state(len(strips)), step, StripMotion(strips, np.zeros(len(strips))))
 
     def step(self, state: CatenaryState, step: float, motion: StripMotion) -> ContactResult:
@@ -243,13 +224,15 @@ class CatenaryModel:
         """
         now = self._step(step)
         free_force = self._begin(now, state)
-        contacts, crossings = self._open_contacts(now, state, motion)
+        candidates = self._candidates(now, state, motion)
+        # One that was closed stays among the contacts: other forces of the step may keep it so.
+        contacts = [c for c in candidates if c.penetration > 0.0 or c.impact_velocity > 0.0]
         compliance = self._strip_compliance(contacts, motion)
         forces = now.local.solve(free_force, contacts, compliance, state.slack)
         self._apply(now, contacts, forces)
-        now.stepper.finish(state.motion)
+        now.engine.finish(state.motion)
         self._note(state, contacts, forces)
-        return self._in_lap(self._result(now, state, contacts, crossings, forces), motion.strip)
+        return self._in_lap(self._result(now, state, candidates, contacts, forces), motion.strip)
 
     def push(self, state: CatenaryState, step: float, forces: Sequence[tuple[int, float, float]]) -> None:
         """Advance the line by one time step under given vertical forces on its contact wires.
@@ -273,13 +256,13 @@ class CatenaryModel:
         placed = [(s, *self.wires[s].locate(x), force) for s, x, force in forces]
         for s, element, xi, force in placed:
             interval = self.wires[s].interval(element)
-            point = self._reaction(now, s, interval).point(element - interval.first, xi)
-            now.stepper.apply(point, force)
-            columns = point.reaction.columns
+            point = now.responses.of(interval).point(element, xi)
+            now.engine.apply(point, force)
+            columns = point.response.columns
             pull[columns.dropper_index] += columns.dropper_force @ (force * point.load)
         found = now.local.solve(pull, (), np.zeros((0, 0)), state.slack)
         self._apply(now, (), found)
-        now.stepper.finish(state.motion)
+        now.engine.finish(state.motion)
         state.slack, state.compensation = found.slack, found.compensation
         state.loaded = np.array([(s, element) for s, element, _, _ in placed], dtype=np.int64).reshape(-1, 2)
         state.load = np.array([(xi, force) for _, _, xi, force in placed]).reshape(-1, 2)
@@ -292,10 +275,9 @@ class CatenaryModel:
         strips : ndarray, shape (n_pantographs, 2, 2, 3)
         """
         result = self._empty_result(len(strips))
-        motion = partial(local_motion, motion=state.motion)
 
         def positions(interval: WireInterval) -> list[float]:
-            return interval.positions(motion(interval)[0])
+            return interval.positions(interval.local(state.motion)[0])
 
         for p, strip in enumerate(strips):
             for s, wire in enumerate(self.wires):
@@ -303,39 +285,28 @@ class CatenaryModel:
                 if found is None:
                     continue
                 state.element[p, s] = found.element
-                local, touch = motion(wire.interval(found.element)), wire.touch(found.element, found.xi)
-                rise, speed = local.dot(touch.row).tolist()
-                delta, rate = self._penetration(found.share, touch.height + rise, speed, strip)
+                interval = wire.interval(found.element)
+                local, (row, height) = interval.local(state.motion), interval.lift(found.element, found.xi)
+                rise, speed = local.dot(row).tolist()
+                delta, rate = self._penetration(found.share, height + rise, speed, strip)
                 law = self._law(delta, rate, max(rate, 0.0), self.definition.contact)
                 result.force[p, s] = law.scaled(found.engagement).force
-                result.point[p, s] = *touch.interval.at(found, local[0]), touch.height + rise
+                result.point[p, s] = *interval.at(found, local[0]), height + rise
         return self._in_lap(result, strips)
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
-        """Return what every dropper carries under its law [N], shape (n_droppers,), its damper's part included.
-
-        By the law "tension" that is nothing where it is slack; by "elastic_only" what the damper, which knows no slack
-        there, pulls or pushes. `dropper_slack` says which ones are slack.
-        """
-        released, damper = self.spring_force(state), np.zeros(len(self.dropper_stiffness))
-        self._damp.add(state.motion.attached[1], damper)
-        together = self.slack_delay > 0.0  # spring and damper are released as one
-        released[together] += damper[together]
-        slack = state.slack
-        released[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, released[slack] + state.compensation)
-        return released + np.where(together, 0.0, damper)
+        """Return what every dropper carries under its law [N], shape (n_droppers,); see `DropperLaw.force`."""
+        return self.dropper_law.force(state.motion.attached, state.slack, state.compensation)
 
     def dropper_slack(self, state: CatenaryState) -> BoolArray:
         """Return which droppers are slack, shape (n_droppers,): by the law "elastic_only" those whose spring is."""
-        slack = np.zeros(len(self.dropper_stiffness), dtype=np.bool_)
+        slack = np.zeros(len(self.dropper_law.stiffness), dtype=np.bool_)
         slack[state.slack] = True
         return slack
 
     def spring_force(self, state: CatenaryState) -> FloatArray:
         """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""
-        force = self.static.elastic_force.copy()
-        self._tighten.add(state.motion.attached[0], force)
-        return force
+        return self.dropper_law.spring_force(state.motion.attached[0])
 
     def uplift(self, state: CatenaryState) -> FloatArray:
         """Return the rise of the contact wire at the supports [m], shape (n_supports,)."""
@@ -355,7 +326,7 @@ class CatenaryModel:
         return np.asarray(plan_rotation(self._angles) @ nodal).reshape(-1, NODE_DOFS)[self.mesh.owner]
 
     def set_velocity(self, state: CatenaryState, velocity: FloatArray) -> None:
-        """Give the nodes velocities.
+        """Set the velocities of the nodes.
 
         Parameters
         ----------
@@ -372,7 +343,7 @@ class CatenaryModel:
         """Return the line's coordinates and matrices, droppers included."""
         static, Q = self.static, plan_rotation(self._angles)
         stretch = dropper_rows(self.mesh, static.positions)
-        droppers = stretch.T @ sp.diags(self.dropper_stiffness) @ stretch
+        droppers = stretch.T @ sp.diags(dropper_stiffness(self.definition, self.mesh, static.positions)) @ stretch
         damping = self.definition.damping
         C = static.matrices.C + damping.of("dropper").alpha * droppers
         stiffness = static.matrices.K + droppers
@@ -393,7 +364,7 @@ class CatenaryModel:
 
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:
-        """Say in words that matrices are not positive definite: their parts are too different, or it buckles."""
+        """Explain matrices that are not positive definite: parts of the line differ too much, or it buckles."""
         try:
             yield
         except np.linalg.LinAlgError as error:
@@ -401,9 +372,18 @@ class CatenaryModel:
                 f"line '{self.definition.name}' cannot {doing}: {error}; check masses, tensions and stiffnesses"
             ) from error
 
-    def _dropper_rows(self) -> sp.csr_matrix:
-        """Return the rows of dropper elongation over the attachments' displacements, which are in global axes."""
-        return dropper_rows(self.mesh, self.static.positions)[:, self.modes.attached].tocsr()
+    def _dropper_law(self) -> DropperLaw:
+        definition, mesh, static = self.definition, self.mesh, self.static
+        # The attachments' displacements are in global axes.
+        return DropperLaw(
+            B=dropper_rows(mesh, static.positions)[:, self.modes.attached].tocsr(),
+            stiffness=dropper_stiffness(definition, mesh, static.positions),
+            alpha=definition.damping.of("dropper").alpha,
+            unilateral=1.0 - compression_ratio(definition, mesh),
+            slack_delay=slack_delay(definition, mesh),
+            elastic_force=static.elastic_force,
+            force=static.dropper_force,
+        )
 
     def _wires(self, by_wire: Sequence[Sequence[Interval]]) -> Iterator[ContactWire]:
         spans = iter(self.modes.spans)
@@ -425,91 +405,58 @@ class CatenaryModel:
     def _new_step(self, step: float) -> _Step:
         newmark = Newmark(step)
         with self._solvable(f"make steps of {step:g} s"):
-            stepper = make_stepper(self.modes, newmark)
-        by_change = self.dropper_stiffness * (1.0 + newmark.a1 * self.slack_delay)
-        compliance = Compliance(stepper.factor, self.B, by_change)
+            matrices = StepMatrices(self.modes, newmark)
+            engine = make_engine(matrices)
+        law = self.dropper_law
+        by_change = law.by_change(newmark)
+        compliance = Compliance(matrices.factor, law.B, by_change)
         local = LocalProblem(
-            unilateral=self.unilateral,
+            unilateral=law.unilateral,
             dropper_columns=compliance.dropper_columns,
             velocity_factor=newmark.a1,
             law=self._law,
             parameters=self.definition.contact,
         )
-        return _Step(stepper, Product(sp.diags(by_change) @ self.B), compliance, local)
+        responses = ResponseCache(engine.response, compliance, len(self.wires))
+        return _Step(engine, Product(sp.diags(by_change) @ law.B), local, responses)
 
     def _begin(self, now: _Step, state: CatenaryState) -> FloatArray:
-        """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N].
-
-        What a dropper that is slack at rest lacks is part of the static state, so it acts at both ends of the step.
-        """
-        pressed = 2.0 * self._rest_load
-        for j, force in zip(state.slack.tolist(), state.compensation.tolist(), strict=True):
-            places, stretch = self._stretch[j]
-            pressed[places] -= force * stretch
-        known = []
+        """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N]."""
+        applied = []
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
-            interval = self.wires[s].interval(element)
-            known.append(Known(self._reaction(now, s, interval), element - interval.first, xi, force))
-        now.stepper.begin(state.motion, pressed, known)
-        pull = self.static.elastic_force.copy()
-        self._pull.add(state.motion.attached.ravel(), pull)
-        now.pull.add(now.stepper.attached, pull)
+            response = now.responses.of(self.wires[s].interval(element))
+            applied.append(AppliedForce(response, element, xi, force))
+        pressed = self.dropper_law.known_load(state.slack, state.compensation)
+        now.engine.begin(state.motion, pressed, applied)
+        pull = self.dropper_law.pull(state.motion.attached)
+        now.pull.add(now.engine.attached, pull)
         return pull
 
-    def _open_contacts(
-        self, now: _Step, state: CatenaryState, motion: StripMotion
-    ) -> tuple[list[OpenContact], list[tuple[int, int, Meeting]]]:
-        contacts, crossings = [], []
+    def _candidates(self, now: _Step, state: CatenaryState, motion: StripMotion) -> list[ContactCandidate]:
+        """Return all strips that cross a wire at the end of the step, forces found inside it left out."""
+        candidates = []
         for s, wire in enumerate(self.wires):
-            free = FreeMotion(wire, partial(self._reaction, now, s), now.stepper, state.motion)
             for p, strip in enumerate(motion.strip):
-                met = free.meet(strip, int(state.element[p, s]))
+                if not wire.is_near(strip):
+                    continue
+                met = now.engine.meet(wire, now.responses.of, strip, int(state.element[p, s]), state.motion)
                 if met is None:
                     continue
-                crossings.append((p, s, met))
-                state.element[p, s] = met.crossing.element
-                height = met.point.touch.height + met.rise
-                delta, rate = self._penetration(met.crossing.share, height, met.rate, strip)
+                crossing, point, rise, speed = met
+                state.element[p, s] = crossing.element
+                delta, rate = self._penetration(crossing.share, point.height + rise, speed, strip)
                 impact = float(state.impact_velocity[p, s])
-                # One that was closed stays among the candidates: other forces of the step may keep it so.
-                if delta > 0.0 or impact > 0.0:
-                    contacts.append(OpenContact(p, s, met, delta, rate, impact))
-                self._prepare(now, s, wire.next_interval(met.crossing.element))
-        return contacts, crossings
+                candidates.append(ContactCandidate(p, s, crossing, point, delta, rate, impact))
+                now.responses.prepare(wire.next_interval(crossing.element))
+        return candidates
 
     def _penetration(self, share: float, height: float, rate: float, strip: FloatArray) -> tuple[float, float]:
         """Return penetration and its velocity of a strip, where a wire of some height crosses it."""
         (z_a, v_a), (z_b, v_b) = strip[:, :, 2].tolist()
         return z_a + share * (z_b - z_a) - (height - self._radii), v_a + share * (v_b - v_a) - rate
 
-    def _reaction(self, now: _Step, section: int, interval: WireInterval) -> Reaction:
-        """Return how a wire gives way about an interval; found once per interval that a strip visits."""
-        kept = now.reactions
-        found = kept.get((section, interval.first))
-        if found is None:
-            stepper, columns = now.stepper, now.compliance.units(interval.ends)
-            inverse = stepper.inverse[interval.modes]
-            found = Reaction(
-                interval=interval,
-                inverse=inverse,
-                yielding=inverse[:, None] * stepper.coupling(interval.modes, interval.ends),
-                columns=columns,
-                at_ends=columns.at(interval.ends),
-                slots=stepper.slots(interval.modes),
-                reached=np.arange(len(self.modes.attached))[columns.rows].astype(np.uint64),
-            )
-            while len(kept) >= _KEPT_INTERVALS * len(self.wires):
-                del kept[next(iter(kept))]
-            kept[(section, interval.first)] = found
-        return found
-
-    def _prepare(self, now: _Step, section: int, interval: WireInterval) -> None:
-        """Find a part of how a wire gives way about an interval before a strip gets there: no step shall take long."""
-        if (section, interval.first) not in now.reactions and now.compliance.prepare(interval.ends):
-            self._reaction(now, section, interval)
-
-    def _strip_compliance(self, contacts: Sequence[OpenContact], motion: StripMotion) -> FloatArray:
-        """Two contacts of one strip share its retreat."""
+    def _strip_compliance(self, contacts: Sequence[ContactCandidate], motion: StripMotion) -> FloatArray:
+        """Return how far strips give way to the contacts' forces [m/N]; two contacts of one strip share its retreat."""
         if len(contacts) == 1:
             return motion.compliance[contacts[0].pantograph].reshape(1, 1)
         owners = [c.pantograph for c in contacts]
@@ -517,18 +464,18 @@ class CatenaryModel:
             len(owners), len(owners)
         )
 
-    def _apply(self, now: _Step, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
+    def _apply(self, now: _Step, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
         """Add what contact and compensation forces change within the step."""
-        stepper = now.stepper
+        engine = now.engine
         for contact, force in zip(contacts, forces.contact, strict=True):
             if force != 0.0:
-                stepper.apply(contact.meeting.point, force)
+                engine.apply(contact.point, force)
         for j, compensation in zip(forces.slack.tolist(), forces.compensation.tolist(), strict=True):
             column = now.local.dropper_columns[j]
-            stepper.attached[column.rows] -= compensation * column.values[:, 0]
+            engine.attached[column.rows] -= compensation * column.values[:, 0]
 
-    def _note(self, state: CatenaryState, contacts: Sequence[OpenContact], forces: LocalForces) -> None:
-        """Note the forces at the end of the step; the next one begins with them."""
+    def _note(self, state: CatenaryState, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
+        """Record the forces at the end of the step; the next one begins with them."""
         state.slack, state.compensation = forces.slack, forces.compensation
         state.impact_velocity[...] = 0.0
         for contact, velocity, closed in zip(contacts, forces.velocity, forces.closed, strict=True):
@@ -537,7 +484,7 @@ class CatenaryModel:
                 state.impact_velocity[contact.pantograph, contact.section] = impact
         state.loaded, state.load = _NOWHERE, _NOTHING
         if contacts:
-            places = [c.meeting.crossing for c in contacts]
+            places = [c.crossing for c in contacts]
             state.loaded = np.array([(c.section, place.element) for c, place in zip(contacts, places, strict=True)])
             state.load = np.array([(place.xi, f) for place, f in zip(places, forces.contact, strict=True)])
 
@@ -545,15 +492,15 @@ class CatenaryModel:
         self,
         now: _Step,
         state: CatenaryState,
-        contacts: Sequence[OpenContact],
-        crossings: Sequence[tuple[int, int, Meeting]],
+        candidates: Sequence[ContactCandidate],
+        contacts: Sequence[ContactCandidate],
         forces: LocalForces,
     ) -> ContactResult:
         result = self._empty_result(len(state.element))
         for contact, force in zip(contacts, forces.contact, strict=True):
             result.force[contact.pantograph, contact.section] = force
-        for p, s, met in crossings:
-            now.stepper.place(met.crossing, met.point, state.motion, result.point[p, s])
+        for p, s, crossing, point, *_ in candidates:
+            now.engine.place(crossing, point, state.motion, result.point[p, s])
         return result
 
     def _in_lap(self, result: ContactResult, strips: FloatArray) -> ContactResult:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from models.catenary.definition.line_definition import CatenaryDefinition
-from models.catenary.definition.line_definition import load as load_line_file
+from models.catenary.definition.line_reading import load as load_line_file
 from models.definition_files.toml_reader import Table
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition

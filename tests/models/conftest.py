@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 import models
-from models.catenary.definition.line_definition import CatenaryDefinition, read
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_reading import read
 from models.definition_files.toml_reader import Table
 from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition

@@ -6,7 +6,6 @@ from scipy.integrate import solve_ivp
 
 from models.catenary.definition.line_definition import Contact
 from models.catenary.line_model import CatenaryModel, StripMotion
-from models.catenary.step.numpy_engine import local_motion
 from models.contact_law import continuous_contact
 
 
@@ -214,9 +213,10 @@ def test_a_contact_keeps_the_velocity_of_its_impact_until_it_opens(short_line):
 def _penetration(model, state, z, speed):
     """Depth and velocity of the only contact, from where the wire is and how it moves."""
     ((_, element),), ((xi, _),) = state.loaded.tolist(), state.load.tolist()
-    touch = model.wires[0].touch(element, xi)
-    rise, rate = (float(row @ touch.row) for row in local_motion(touch.interval, state.motion))
-    return z - (touch.height + rise), speed - rate
+    interval = model.wires[0].interval(element)
+    row, height = interval.lift(element, xi)
+    rise, rate = (float(moved @ row) for moved in interval.local(state.motion))
+    return z - (height + rise), speed - rate
 
 
 def test_uplift_and_point_of_contact_move_with_the_wire(model):

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.catenary.definition.line_definition import read
+from models.catenary.definition.line_reading import read
 from models.commands.physics_main import main
 from models.definition_files.toml_reader import DefinitionError, Table
 from models.library.catalogue import line_path, load_line, load_pantograph, pantograph_path

@@ -44,7 +44,7 @@ class Sharing:
 
 
 @dataclass(frozen=True)
-class Entry:
+class StudyEntry:
     """One pantograph of one variant in one interval.
 
     Attributes
@@ -83,11 +83,11 @@ class Entry:
         return self.assessment.slack
 
 
-def entries(variant: str, done: Results, interval: Interval) -> tuple[Entry, ...]:
+def entries(variant: str, done: Results, interval: Interval) -> tuple[StudyEntry, ...]:
     """Return the entries of a run's pantographs in an interval, the leading one first."""
     found = {a.contact: a for a in done.assessments_in((interval.start, interval.end))}
     ordered = leading_first(done.recordings[0], list(found))
-    return tuple(Entry(variant, interval, found[c], sharing(done.recordings[0], c, interval)) for c in ordered)
+    return tuple(StudyEntry(variant, interval, found[c], sharing(done.recordings[0], c, interval)) for c in ordered)
 
 
 def section_forces(recording: Recording, contact: Contact) -> FloatArray | None:

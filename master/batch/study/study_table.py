@@ -11,15 +11,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from master.batch.study.family import Family, Interval
-from master.batch.study.study_evaluation import Entry
-from master.batch.study.study_outcome import Outcome, differences, filter_remarks, filters, judged_by, shown
+from master.batch.study.study_evaluation import StudyEntry
+from master.batch.study.study_outcome import StudyOutcome, differences, filter_remarks, filters, judged_by, shown
 
 _WIDTH: Final = 80
 _SIGMA: Final = "\u03c3"
 _FIGURE_HEADS: Final = (*("variant", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),)
 
 
-def show(console: Console, outcome: Outcome) -> None:
+def show(console: Console, outcome: StudyOutcome) -> None:
     """Print a study: figures and differences for each interval, then the changes of wire, then what failed."""
     for interval in outcome.family.settings.interval:
         found = outcome.entries(interval)
@@ -37,7 +37,7 @@ def show(console: Console, outcome: Outcome) -> None:
         console.print(f"variant '{name}' failed: {text}", style="red", markup=False, soft_wrap=True)
 
 
-def figures_table(interval: Interval, found: Sequence[Entry], outcome: Outcome) -> Table:
+def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: StudyOutcome) -> Table:
     """Return the statistics of all pantographs; yellow where a limit is not kept."""
     where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
     table = _table(f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
@@ -53,15 +53,15 @@ def figures_table(interval: Interval, found: Sequence[Entry], outcome: Outcome) 
     return table
 
 
-def _name(e: Entry) -> str:
+def _name(e: StudyEntry) -> str:
     return escape(_name_of(e))
 
 
-def _name_of(e: Entry) -> str:
+def _name_of(e: StudyEntry) -> str:
     return f"{e.variant}, {e.pantograph}"
 
 
-def _failing(found: Sequence[Entry], title: str) -> str:
+def _failing(found: Sequence[StudyEntry], title: str) -> str:
     """Return which limits are not kept, and by whom."""
     failing: dict[str, list[str]] = {}
     for e in found:
@@ -85,7 +85,7 @@ def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, fl
     return table
 
 
-def sharing_table(found: Sequence[Entry]) -> Table:
+def sharing_table(found: Sequence[StudyEntry]) -> Table:
     """Return how the strips pass from wire to wire."""
     heads = ("variant", "from m", "to m", "s", "losses per wire", "least total N")
     table = _table("From wire to wire: both touched", heads)

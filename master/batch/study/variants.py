@@ -4,74 +4,35 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from master.batch.batch_session import Runner
 from master.batch.calibration import CalibrationResult, find_values
 from master.batch.study.family import Calibration, Family, Interval, Variant
-from master.coupling.fmu_warnings import CautionObserver
-from master.coupling.macro_steps import Observer
 from master.errors import MasterError, RequestError
 from master.results import results_folder, run_results
 from master.results.run_results import Results
-from master.run import run
-from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides, find_parameter
 from master.system.components import System
-from master.system.step_rounding import adjustments
-
-#: Makes the observers of one run, and takes them away after it.
-Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 @contextmanager
-def unwatched(_: System) -> Iterator[Sequence[Observer]]:
-    """Watch nothing."""
-    yield ()
+def opened_variant(family: Family, variant: Variant, runner: Runner) -> Iterator[System]:
+    """Yield the system of a variant; its FMUs may lie in a folder that is gone afterwards.
 
-
-@dataclass(frozen=True)
-class Runner:
-    """How runs are made.
-
-    Attributes
-    ----------
-    watching : callable
-        System -> context manager that gives its observers (progress).
-    tell : callable
-        Is told what takes time, and what FMUs warn of.
-    build : bool
-        Whether missing or stale FMUs are built.
+    Raises
+    ------
+    ScenarioError, RequestError
+        If scenario and table do not go together.
     """
-
-    watching: Watching = unwatched
-    tell: Callable[[str], None] = lambda _: None
-    build: bool = True
-
-    def run(self, system: System, folder: Path) -> Results:
-        """Run one system."""
-        for text in adjustments(system):
-            self.tell(f"{system.name}: warning: {text}")
-        cautions = CautionObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
-        with self.watching(system) as observers:
-            return run(system, folder, [cautions, *observers])
-
-    @contextmanager
-    def opened(self, family: Family, variant: Variant) -> Iterator[System]:
-        """Give the system of a variant; its FMUs may be in a folder that is gone afterwards.
-
-        Raises
-        ------
-        ScenarioError, RequestError
-            If scenario and table do not go together.
-        """
-        v = variant
-        overrides = Overrides(v.stop, v.step, parameters=v.values, absent=v.absent, empty=v.empty)
-        with open_scenario(family.folder, overrides, self.tell, self.build) as scenario:
-            yield replace(scenario.system, name=f"{family.name}: {variant.name}")
+    v = variant
+    overrides = Overrides(v.stop, v.step, parameters=v.values, absent=v.absent, empty=v.empty)
+    with runner.opened(family.folder, overrides) as system:
+        yield replace(system, name=f"{family.name}: {variant.name}")
 
 
 def finished(folder: Path, system: System) -> Results | None:
@@ -103,7 +64,7 @@ def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[
     if wanted is None:
         raise RequestError(f"study '{family.name}' has no [calibration]")
     interval = next(i for i in family.settings.interval if i.name == wanted.interval)
-    with runner.opened(family, variant) as system:
+    with opened_variant(family, variant, runner) as system:
         names = _calibrated(system, wanted)
         starts = [float(variant.values.get(name, _start_value(system, name))) for name in names]
 

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from master.batch.batch_session import Runner
 from master.batch.verification.case import Case
-from master.coupling.macro_steps import Observer
 from master.errors import InterruptedRunError, MasterError
 from master.results.run_results import Results
-from master.run import run
-from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.system.components import System
 
 #: Folder of the runs within the verification's folder.
 RUNS: Final = "runs"
-
-#: Makes the observers of one run, and takes them away after it.
-Watching = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 def content_key(system: System) -> str:
@@ -57,18 +50,12 @@ class Runs:
     ----------
     folder : Path
         Where the runs' folders are put.
-    watching : callable
-        System -> context manager that gives its observers (progress).
-    tell : callable
-        Is told what takes time.
-    build : bool
-        Whether missing or stale FMUs are built.
+    runner : Runner
+        Opens scenarios and makes the runs.
     """
 
     folder: Path
-    watching: Watching
-    tell: Callable[[str], None] = lambda _: None
-    build: bool = True
+    runner: Runner
     _done: dict[str, Results | MasterError] = field(default_factory=dict)
     _opened: dict[_Wanted, str] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
@@ -95,8 +82,8 @@ class Runs:
         """Make a run, unless there is one, and return the key under which it is kept."""
         try:
             overrides = Overrides(parameters={name: f"{value:.17g}" for name, value in wanted.values})
-            with open_scenario(wanted.path, overrides, self.tell, self.build) as scenario:
-                return self._run(scenario.system, wanted.start_only)
+            with self.runner.opened(wanted.path, overrides) as system:
+                return self._run(system, wanted.start_only)
         except InterruptedRunError:
             raise
         except MasterError as error:
@@ -111,8 +98,8 @@ class Runs:
                 return key
         key = content_key(system)
         folder = self._folder_of(f"{system.name}-start" if start_only else system.name, key)
-        with self.watching(system) as observers:
-            self._done[key] = run(system, folder, observers)
+        self.runner.tell(f"running {system.name}")
+        self._done[key] = self.runner.run(system, folder)
         return key
 
     def _folder_of(self, name: str, key: str) -> Path:

@@ -115,7 +115,7 @@ def _filtered(get: Callable[[Filtered | Quality], float]) -> Callable[[Results, 
     def measure(results: Results, choice: Choice) -> Measured:
         quality = assessment(results, choice).quality
         others = tuple((o.filter, get(o)) for o in quality.others)
-        return Measured((get(quality),), others=others, is_told=bool(quality.told))
+        return Measured((get(quality),), others=others, is_told=bool(quality.filter_dependent))
 
     return measure
 

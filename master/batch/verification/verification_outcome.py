@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final
 
+from master.batch.batch_session import BatchState
 from master.batch.verification.case import Case
 from master.batch.verification.case_runs import Runs
 from master.batch.verification.judgement import Judged, Verdict, judge_row
 from master.errors import InterruptedRunError, MasterError
 from master.results.run_results import Results
 
-GENERATOR: Final = "openpanto verify"
 #: Version of ``verify.json``; 1 says none.
 FORMAT: Final = 2
 #: Verdicts in the order in which they are counted up, with the words for several rows.
@@ -58,28 +58,19 @@ class CaseOutcome:
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(BatchState):
     """All cases so far.
 
     Attributes
     ----------
-    date : str
-        When it began.
-    versions : dict
-        Of what computed.
     wanted : int
         Number of cases asked for.
     cases : tuple of CaseOutcome
         The finished ones.
-    status : str
-        running, complete or interrupted.
     """
 
-    date: str
-    versions: Mapping[str, str]
     wanted: int
     cases: tuple[CaseOutcome, ...] = ()
-    status: Literal["running", "complete", "interrupted"] = "running"
 
     @property
     def passed(self) -> bool:
@@ -137,7 +128,6 @@ def count_verdicts(cases: tuple[CaseOutcome, ...]) -> str:
 def as_data(verification: Verification) -> dict[str, Any]:
     """Return a verification as plain data for JSON."""
     return {
-        "generator": GENERATOR,
         "format": FORMAT,
         "date": verification.date,
         "versions": dict(verification.versions),

@@ -10,13 +10,13 @@ import math
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from models.arrays import FloatArray, IntArray
 from models.catenary.contact_and_slack.crossing import Crossing, crossing, engagement
 from models.catenary.linear_motion.interval_modes import IntervalModes, IntervalMotion
+from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.line_matrices import element_dofs
@@ -24,7 +24,7 @@ from models.catenary.shape.line_mesh import Chain
 from models.catenary.shape.wire_intervals import Interval, turns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WireInterval:
     """A contact wire between two attachments: k + 1 elements, m local coordinates.
 
@@ -35,11 +35,11 @@ class WireInterval:
     modes : slice
         Its modes.
     count, size : int
-        How many these are; how many local coordinates, m.
+        Number of these; number of local coordinates, m.
     sides : (ndarray, ndarray)
         Places of its two attachments' displacements.
     ends : ndarray, shape (e,)
-        The same, one after the other.
+        The same in one array.
     plan : ndarray, shape (2 k + 4, m)
         Displacement in plan, x and y, of its k + 2 nodes.
     plan_static : ndarray, shape (2 k + 4,)
@@ -65,38 +65,24 @@ class WireInterval:
         """Return the positions of its nodes in plan, x and y in turn [m]."""
         return (self.plan_static + self.plan.dot(local)).tolist()
 
-    def touch(self, element: int, xi: float) -> Touch:
-        """Return a point of one of its elements, counted from 0."""
-        powers, count = np.array((1.0, xi, xi * xi, xi * xi * xi)), self.count
-        row = powers.dot(self.height[element])
-        return Touch(self, row, row[:count], row[count:], float(powers.dot(self.height_static[element])))
+    def lift(self, element: int, xi: float) -> tuple[FloatArray, float]:
+        """Return what unit local coordinates lift a point of an element of the wire by, and its static height [m]."""
+        powers, own = np.array((1.0, xi, xi * xi, xi * xi * xi)), element - self.first
+        return powers.dot(self.height[own]), float(powers.dot(self.height_static[own]))
+
+    def split(self, row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the parts of a row over local coordinates: over its modes, and over its attachments."""
+        return row[: self.count], row[self.count :]
+
+    def local(self, motion: LineMotion) -> FloatArray:
+        """Return its local coordinates and their rates, shape (2, m)."""
+        return np.concatenate((motion.modal[:, self.modes], motion.attached.take(self.ends, axis=1)), axis=1)
 
     def at(self, found: Crossing, local: FloatArray) -> tuple[float, float]:
         """Return a point of the interval in plan from its local coordinates [m]."""
         k = 2 * (found.element - self.first)
         x1, y1, x2, y2 = (self.plan_static[k : k + 4] + self.plan[k : k + 4].dot(local)).tolist()
         return x1 + found.xi * (x2 - x1), y1 + found.xi * (y2 - y1)
-
-
-class Touch(NamedTuple):
-    """A point of a contact wire.
-
-    Attributes
-    ----------
-    interval : WireInterval
-    row : ndarray, shape (m,)
-        What unit local coordinates lift it by; or what a unit vertical force on it does to them.
-    modal, ends : ndarray, shape (n_span,), (e,)
-        The parts of ``row``.
-    height : float
-        Static height [m].
-    """
-
-    interval: WireInterval
-    row: FloatArray
-    modal: FloatArray
-    ends: FloatArray
-    height: float
 
 
 #: A strip farther than this from the ends of a wire does not meet it, however the wire moves [m].
@@ -177,11 +163,6 @@ class ContactWire:
         """Return the interval after that of an element; the last one of a wire that ends follows itself."""
         after, count = self._of_element[element].first + len(self._of_element[element].height), self.elements
         return self._of_element[after % count if self.period else min(after, count - 1)]
-
-    def touch(self, element: int, xi: float) -> Touch:
-        """Return a point of an element."""
-        interval = self._of_element[element]
-        return interval.touch(element - interval.first, xi)
 
     def find(self, strip: FloatArray, positions: Positions, guess: int) -> Crossing | None:
         """Find where a strip crosses the wire, walking from the element ``guess``.

@@ -29,7 +29,8 @@ import numpy as np
 from scipy.linalg.lapack import dgesv
 
 from models.arrays import FloatArray, IntArray
-from models.catenary.contact_and_slack.wire_response import Meeting, Point
+from models.catenary.contact_and_slack.crossing import Crossing
+from models.catenary.contact_and_slack.wire_response import WirePoint
 from models.catenary.linear_motion.compliance import Columns
 from models.contact_law import ContactLaw, ContactParameters, NormalForce
 
@@ -42,14 +43,16 @@ class LocalSolutionError(RuntimeError):
     """Slack and contact forces of a step were not found."""
 
 
-class OpenContact(NamedTuple):
+class ContactCandidate(NamedTuple):
     """A strip over a wire before the contact force acts.
 
     Attributes
     ----------
     pantograph, section : int
-    meeting : Meeting
-        Where they cross.
+    crossing : Crossing
+        Where it lies in plan.
+    point : WirePoint
+        Of the wire, there.
     penetration, velocity : float
         At the end of the step without contact force [m, m/s].
     impact_velocity : float
@@ -58,7 +61,8 @@ class OpenContact(NamedTuple):
 
     pantograph: int
     section: int
-    meeting: Meeting
+    crossing: Crossing
+    point: WirePoint
     penetration: float
     velocity: float
     impact_velocity: float
@@ -115,7 +119,7 @@ class LocalProblem:
     def solve(
         self,
         free_force: FloatArray,
-        contacts: Sequence[OpenContact],
+        contacts: Sequence[ContactCandidate],
         strip_compliance: FloatArray,
         slack: IntArray,
     ) -> LocalForces:
@@ -125,7 +129,7 @@ class LocalProblem:
         ----------
         free_force : ndarray, shape (n_droppers,)
             Pulls T of the droppers in the free solution [N].
-        contacts : sequence of OpenContact
+        contacts : sequence of ContactCandidate
         strip_compliance : ndarray, shape (n_contacts, n_contacts)
             Retreat of the strips per contact force within the step [m/N]; zero for prescribed strips.
         slack : ndarray of int
@@ -170,16 +174,16 @@ class LocalProblem:
             f"({slack.size} slack droppers, {len(contacts)} contacts); use a smaller time step"
         )
 
-    def law_of(self, contact: OpenContact, penetration: float, velocity: float) -> NormalForce:
+    def law_of(self, contact: ContactCandidate, penetration: float, velocity: float) -> NormalForce:
         """Return the contact law of one contact; its first closed instant is its impact."""
         impact = contact.impact_velocity or max(velocity, 0.0)
-        return self.law(penetration, velocity, impact, self.parameters).scaled(contact.meeting.crossing.engagement)
+        return self.law(penetration, velocity, impact, self.parameters).scaled(contact.crossing.engagement)
 
     def _single_contact(
-        self, free_force: FloatArray, contact: OpenContact, strip_compliance: float
+        self, free_force: FloatArray, contact: ContactCandidate, strip_compliance: float
     ) -> LocalForces | None:
-        """Return the solution for one contact if it leaves no dropper slack, which is what most steps are."""
-        point, slope_of_velocity = contact.meeting.point, self.velocity_factor
+        """Return the solution for one contact if it leaves no dropper slack, as in most steps."""
+        point, slope_of_velocity = contact.point, self.velocity_factor
         compliance = strip_compliance + point.compliance
         force = 0.0
         for _ in range(_MAX_ITERATIONS):
@@ -196,9 +200,9 @@ class LocalProblem:
             return None
         return LocalForces([force], [velocity], [penetration > 0.0], _NONE, _NOTHING)
 
-    def _slackens(self, free_force: FloatArray, point: Point, force: float) -> bool:
+    def _slackens(self, free_force: FloatArray, point: WirePoint, force: float) -> bool:
         """Return whether any dropper is slack under a force on one point."""
-        columns = point.reaction.columns
+        columns = point.response.columns
         change = columns.dropper_force.dot(force * point.load)
         near = free_force.take(columns.dropper_index) + change
         if near.min(initial=0.0) < 0.0:
@@ -213,7 +217,9 @@ class LocalProblem:
 class _Coupling:
     """Compliances between the contacts and the droppers of one step."""
 
-    def __init__(self, problem: LocalProblem, contacts: Sequence[OpenContact], strip_compliance: FloatArray) -> None:
+    def __init__(
+        self, problem: LocalProblem, contacts: Sequence[ContactCandidate], strip_compliance: FloatArray
+    ) -> None:
         self.problem, self.contacts = problem, contacts
         self._penetration = np.array([c.penetration for c in contacts])
         self._velocity = np.array([c.velocity for c in contacts])
@@ -222,11 +228,11 @@ class _Coupling:
         self.contact_contact = strip_compliance.copy()
         self.dropper_contact = np.zeros((problem.unilateral.size, n))
         for j, source in enumerate(contacts):
-            point = source.meeting.point
-            columns = point.reaction.columns
+            point = source.point
+            columns = point.response.columns
             self.dropper_contact[columns.dropper_index, j] = columns.dropper_force @ point.load
             for i, target in enumerate(contacts):
-                self.contact_contact[i, j] += target.meeting.point.moved_by(point)
+                self.contact_contact[i, j] += target.point.moved_by(point)
 
     def by_slack(self, slack: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return what forces of slack droppers do to the pulls of all droppers and to the penetrations.
@@ -245,8 +251,8 @@ class _Coupling:
                 column = self.problem.dropper_columns[j]
                 on_droppers[column.dropper_index, k] = column.dropper_force[:, 0]
                 for i, contact in enumerate(self.contacts):
-                    point = contact.meeting.point
-                    on_contacts[i, k] = point.load.dot(column.at(point.reaction.interval.ends)[:, 0])
+                    point = contact.point
+                    on_contacts[i, k] = point.load.dot(column.at(point.response.interval.ends)[:, 0])
         return self._by_slack
 
     def penetration(
@@ -304,10 +310,10 @@ class _Coupling:
         return right[:n], right[n:]
 
 
-def _estimate(problem: LocalProblem, contact: OpenContact) -> float:
+def _estimate(problem: LocalProblem, contact: ContactCandidate) -> float:
     """Return a first guess of a contact force: the law's secant over the free penetration."""
     law = problem.law_of(contact, contact.penetration, contact.velocity)
-    return law.force / (1.0 + law.by_penetration * contact.meeting.point.compliance)
+    return law.force / (1.0 + law.by_penetration * contact.point.compliance)
 
 
 def _carried(now: IntArray, before: IntArray, compensation: FloatArray) -> FloatArray:

@@ -1,19 +1,23 @@
-"""Points of a contact wire, and how they give way to a force."""
+"""Points of a contact wire, and how the wire gives way to forces on them within a step."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from models.arrays import FloatArray, IntArray
-from models.catenary.contact_and_slack.contact_wire import Touch, WireInterval
+import numpy as np
+
+from models.arrays import FloatArray
+from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.crossing import Crossing
 from models.catenary.linear_motion.compliance import Columns
+from models.catenary.linear_motion.step_matrices import StepMatrices
 
 
-@dataclass(frozen=True)
-class Reaction:
-    """How a wire gives way about one of its intervals, within a step.
+@dataclass(frozen=True, eq=False)
+class IntervalResponse:
+    """How a wire gives way to a force on one of its intervals, within a step.
 
     Attributes
     ----------
@@ -26,10 +30,6 @@ class Reaction:
         Response to unit loads at its attachments.
     at_ends : ndarray, shape (e, e)
         The same at the attachments themselves.
-    slots : ndarray of unsigned int, shape (n_span,)
-        Where a compiled stepper keeps its modes.
-    reached : ndarray of unsigned int, shape (n_rows,)
-        Attachments' displacements that ``columns`` reach, one by one.
     """
 
     interval: WireInterval
@@ -37,66 +37,106 @@ class Reaction:
     yielding: FloatArray
     columns: Columns
     at_ends: FloatArray
-    slots: IntArray
-    reached: IntArray
 
-    def point(self, element: int, xi: float) -> Point:
-        """Return a point of the interval.
+    def point(self, element: int, xi: float) -> WirePoint:
+        """Return a point of an element of the wire; ``xi`` is the share of the way along the element."""
+        row, height = self.interval.lift(element, xi)
+        modal, ends = self.interval.split(row)
+        load = ends - modal.dot(self.yielding)
+        own = modal.dot(modal * self.inverse)
+        return WirePoint(self, row, height, load, float(load.dot(self.at_ends.dot(load)) + own))
+
+    def advance(self, local: FloatArray, change: FloatArray, a1: float) -> FloatArray:
+        """Let local coordinates follow their attachments to the end of a step; return them and their rates.
 
         Parameters
         ----------
-        element : int
-            Of the interval.
-        xi : float
-            Share of the way along the element.
+        local : ndarray, shape (2, m)
+            Coordinates and rates at the beginning, replaced.
+        change : ndarray, shape (m,)
+            In the step, of the modes as if the attachments were held; work space afterwards.
+        a1 : float
+            Of Newmark's method.
         """
-        touch = self.interval.touch(element, xi)
-        load = touch.ends - touch.modal.dot(self.yielding)
-        own = touch.modal.dot(touch.modal * self.inverse)
-        return Point(self, touch, load, float(load.dot(self.at_ends.dot(load)) + own))
+        count = self.interval.count
+        change[:count] -= self.yielding.dot(change[count:])
+        displacement, velocity = local
+        displacement += change
+        change *= a1
+        np.subtract(change, velocity, out=velocity)
+        return local
 
 
-class Point(NamedTuple):
+def interval_response(matrices: StepMatrices, interval: WireInterval, columns: Columns) -> IntervalResponse:
+    """Return how a wire gives way about an interval, from responses to unit loads at the interval's attachments."""
+    inverse = matrices.inverse[interval.modes]
+    yielding = inverse[:, None] * matrices.coupling_of(interval.modes, interval.ends)
+    return IntervalResponse(interval, inverse, yielding, columns, columns.at(interval.ends))
+
+
+class WirePoint(NamedTuple):
     """A point of a contact wire.
 
     Attributes
     ----------
-    reaction : Reaction
+    response : IntervalResponse
         Of its interval.
-    touch : Touch
+    row : ndarray, shape (m,)
+        What unit local coordinates lift it by; or what a unit vertical force on it does to them.
+    height : float
+        Static height [m].
     load : ndarray, shape (e,)
         What a unit vertical force on it does to the attachments, directly and through the modes.
     compliance : float
         How far it gives way to such a force within a step [m/N].
     """
 
-    reaction: Reaction
-    touch: Touch
+    response: IntervalResponse
+    row: FloatArray
+    height: float
     load: FloatArray
     compliance: float
 
-    def moved_by(self, other: Point) -> float:
+    @property
+    def modal(self) -> FloatArray:
+        """Return what a unit vertical force on it does to the modes of its interval, shape (n_span,)."""
+        return self.row[: self.response.interval.count]
+
+    def moved_by(self, other: WirePoint) -> float:
         """Return how far the wire is moved here by a unit force at another point [m/N]."""
-        here, there = self.reaction, other.reaction
+        here, there = self.response, other.response
         moved = float(self.load @ (there.columns.at(here.interval.ends) @ other.load))
         if here.interval.modes == there.interval.modes:
-            moved += float(self.touch.modal @ (other.touch.modal * here.inverse))
+            moved += float(self.modal @ (other.modal * here.inverse))
         return moved
 
 
-class Meeting(NamedTuple):
-    """A strip that crosses a contact wire.
+#: A crossing, the point of the wire there, and how far it stands above its static height and the rate of that [m, m/s].
+Met = tuple[Crossing, WirePoint, float, float]
+#: How a wire gives way to forces on an interval.
+ResponseOf = Callable[[WireInterval], IntervalResponse]
 
-    Attributes
+
+def walk(
+    wire: ContactWire,
+    response_of: ResponseOf,
+    motion_of: Callable[[WireInterval], FloatArray],
+    strip: FloatArray,
+    guess: int,
+) -> Met | None:
+    """Return where a strip crosses a wire, walking from the element ``guess``; None if it does not.
+
+    Parameters
     ----------
-    crossing : Crossing
-    point : Point
-        Of the wire.
-    rise, rate : float
-        Its height above the static one and the velocity of that [m, m/s].
+    motion_of : callable
+        Interval -> its local coordinates and their rates, shape (2, m).
+    strip : ndarray, shape (2, 2, 3)
+        Ends A and B; position and velocity.
     """
-
-    crossing: Crossing
-    point: Point
-    rise: float
-    rate: float
+    found = wire.find(strip, lambda interval: interval.positions(motion_of(interval)[0]), guess)
+    if found is None:
+        return None
+    interval = wire.interval(found.element)
+    point = response_of(interval).point(found.element, found.xi)
+    rise, rate = motion_of(interval).dot(point.row).tolist()
+    return found, point, rise, rate

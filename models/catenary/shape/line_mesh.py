@@ -203,7 +203,7 @@ def _span_at(section: Section, x: float) -> Span:
 def _pre_sag(definition: CatenaryDefinition, span: Span, x: float) -> float:
     depth = definition.profile.pre_sag * span.length
     start, end = span.start, span.end
-    if definition.pre_sag_between == "droppers" and len(span.droppers) > 1:
+    if definition.profile.pre_sag_between == "droppers" and len(span.droppers) > 1:
         start, end = span.droppers[0], span.droppers[-1]
     share = (x - start) / (end - start)
     return depth * max(0.0, 4.0 * share * (1.0 - share))

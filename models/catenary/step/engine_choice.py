@@ -11,11 +11,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from models.catenary.linear_motion.interval_modes import IntervalModes
-from models.catenary.step.numba_engine import CompiledStepper, UnsuitedError
-from models.catenary.step.numpy_engine import Stepper
+from models.catenary.linear_motion.step_matrices import StepMatrices
+from models.catenary.step.numba_engine import NumbaEngine, UnsuitedError
+from models.catenary.step.numpy_engine import NumpyEngine
+from models.catenary.step.step_engine import StepEngine
 from models.numerics.kernel_cache import SWITCH, KernelError, load_kernels
-from models.numerics.newmark import Newmark
 
 if TYPE_CHECKING:  # an FMU carries what is imported, and this is never imported by its name
     from models.catenary.step import step_kernels as _  # noqa: F401
@@ -24,8 +24,8 @@ if TYPE_CHECKING:  # an FMU carries what is imported, and this is never imported
 _SOURCE = Path(__file__).with_name("step_kernels.py").read_bytes()
 
 
-def make_stepper(modes: IntervalModes, newmark: Newmark) -> Stepper:
-    """Return the fastest stepper that this machine has for a line.
+def make_engine(matrices: StepMatrices) -> StepEngine:
+    """Return the fastest step engine that this machine has for a line.
 
     Raises
     ------
@@ -36,13 +36,13 @@ def make_stepper(modes: IntervalModes, newmark: Newmark) -> Stepper:
     if wanted not in ("auto", "numpy", "numba"):
         raise KernelError(f"{SWITCH} is '{wanted}'; use auto, numpy or numba")
     if wanted == "numpy":
-        return Stepper(modes, newmark)
+        return NumpyEngine(matrices)
     try:
-        return CompiledStepper(modes, newmark, kernels())
+        return NumbaEngine(matrices, kernels())
     except (ImportError, UnsuitedError) as error:
         if wanted == "numba":
             raise KernelError(f"{SWITCH} is 'numba', but {error}") from error
-        return Stepper(modes, newmark)
+        return NumpyEngine(matrices)
 
 
 def kernels() -> ModuleType:

@@ -1,12 +1,15 @@
 """The two halves of a line's step in one pass each, for numba.
 
-The same arithmetic as `numpy_engine.Stepper`, but nothing is read twice and no intermediate array is
-written: how much is read and written sets the pace.
-Indices are unsigned, which spares the compiler the question whether they count from the end.
+The same arithmetic as `numpy_engine.NumpyEngine`, but nothing is read twice and no intermediate array
+is written: how much is read and written sets the pace.
+Indices are unsigned, which spares the compiler the check whether they count from the end.
+What belongs together is handed over together, as a tuple or as one array (`unpacked`).
 
-This module imports nothing of the project: it is compiled from a copy in the user's cache
-(`models.catenary.step.numba_engine`).
+This module imports nothing of the project and is not divided: it is compiled from a copy in the user's cache
+(`models.catenary.step.engine_choice`), which cannot see other files.
 """
+
+from collections import namedtuple
 
 import numpy as np
 from numba import njit
@@ -17,6 +20,14 @@ LANES, ENDS = 8, 6
 INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
 #: What `meet` returns where there is no crossing.
 NOWHERE, BEFORE, BEYOND = -1, -2, -3
+#: An interval of a contact wire, as `unpacked` returns it: ``slots``, where the amplitudes of its modes are in the
+#: table, ``ends``, the places of its attachments' displacements, and ``reached``, the displacements that loads at these
+#: reach, all unsigned; ``plan`` to ``height_static`` of the `WireInterval`; ``yielding``, ``at_ends`` and the values of
+#: ``columns`` of the `IntervalResponse`.
+Interval = namedtuple(
+    "Interval",
+    ("slots", "ends", "reached", "plan", "plan_static", "height", "height_static", "yielding", "at_ends", "columns"),
+)
 #: Sums may be reordered, not more: infinities and NaN stay what they are.
 _compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
 _0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
@@ -29,16 +40,17 @@ _TO_RATE, _TO_HELD, _FROM_INVERSE = _RATE - _AMPLITUDE, _HELD - _AMPLITUDE, _AMP
 
 
 @_compiled
-def prepare(where, rates, more, more_coupling, table, pull):
+def prepare(units, table, pull):
     """Find what modes do in the next step, were the attachments held, and what they do to the ends of their intervals.
 
     Parameters
     ----------
-    where, rates, more, more_coupling, table
+    units, table
         See `finish`.
     pull : ndarray, shape (n_ends,)
         Result: forces on the ends.
     """
+    where, rates, more, more_coupling = units
     pull[:] = 0.0
     for u in range(where.size):
         end, begin = where[u], np.uint64(u) * _UNIT
@@ -54,15 +66,15 @@ def prepare(where, rates, more, more_coupling, table, pull):
 
 
 @_compiled
-def load(back_rows, back_columns, back, own_rows, own_columns, own, attached, pressed, pull, right):
+def load(back, own, attached, pressed, pull, right):
     """Find the forces on the attachments that their change in this step balances.
 
     Parameters
     ----------
-    back_rows, back_columns, back : ndarray
-        Turn of the ends back to the attachments' axes, compressed by rows.
-    own_rows, own_columns, own : ndarray
-        -2 K and a2 M of the attachments, an entry (k, 2) for both: upper triangles compressed by rows, each of
+    back : (ndarray, ndarray, ndarray)
+        Turn of the ends back to the attachments' axes: rows, columns and values, compressed by rows.
+    own : (ndarray, ndarray, ndarray)
+        -2 K and a2 M of the attachments, values (k, 2) for both: upper triangles compressed by rows, each of
         which begins with its diagonal.
     attached : ndarray, shape (2, n_attached)
     pressed : ndarray, shape (n_attached,)
@@ -70,40 +82,40 @@ def load(back_rows, back_columns, back, own_rows, own_columns, own, attached, pr
     right : ndarray, shape (n_attached,)
         Result.
     """
+    rows, columns, values = own
     for i in range(right.size):
         right[i] = pressed[i]
     for i in range(right.size):
         x, v = attached[0, i], attached[1, i]
-        at = own_rows[i]
-        total = own[at, _0] * x + own[at, _1] * v
-        for k in range(at + _1, own_rows[i + _1]):
-            j = own_columns[k]
-            total += own[k, _0] * attached[0, j] + own[k, _1] * attached[1, j]
-            right[j] += own[k, _0] * x + own[k, _1] * v
+        at = rows[i]
+        total = values[at, _0] * x + values[at, _1] * v
+        for k in range(at + _1, rows[i + _1]):
+            j = columns[k]
+            total += values[k, _0] * attached[0, j] + values[k, _1] * attached[1, j]
+            right[j] += values[k, _0] * x + values[k, _1] * v
         right[i] += total
-    add_product(back_rows, back_columns, back, pull, right)
+    add_product(back, pull, right)
 
 
 @_compiled
-def finish(
-    turn_rows, turn_columns, turn, where, rates, more, more_coupling, a1,
-    solution, ends, attached, table, pull,
-):  # fmt: skip
+def finish(turn, units, a1, solution, ends, attached, table, pull):
     """Let the intervals follow their attachments, replace the motion, and `prepare` the next step in the same pass.
 
     Parameters
     ----------
-    turn_rows, turn_columns, turn : ndarray
-        Turn of the attachments' displacements to the axes of the intervals, compressed by rows.
-    where : ndarray of unsigned int, shape (N,)
-        First of the six ends that the modes of a unit move with.
-    rates : ndarray, shape (N, 5)
-        a1 / mu, a2 and a2 / mu of the modes, then c and d with -2 lambda / K_hat = c + d / K_hat: less to read than
-        these themselves.
-    more : ndarray of unsigned int, shape (M, 2)
-        Units that move with further ends: the unit, and the first of six such ends.
-    more_coupling : ndarray, shape (M, 6, 8)
-        mu G with these.
+    turn : (ndarray, ndarray, ndarray)
+        Turn of the attachments' displacements to the axes of the intervals: rows, columns and values, compressed by
+        rows.
+    units : (where, rates, more, more_coupling)
+        where : ndarray of unsigned int, shape (N,)
+            First of the six ends that the modes of a unit move with.
+        rates : ndarray, shape (N, 5)
+            a1 / mu, a2 and a2 / mu of the modes, then c and d with -2 lambda / K_hat = c + d / K_hat: less to read
+            than these themselves.
+        more : ndarray of unsigned int, shape (M, 2)
+            Units that move with further ends: the unit, and the first of six such ends.
+        more_coupling : ndarray, shape (M, 6, 8)
+            mu G with these.
     a1 : float
     solution : ndarray, shape (n_attached,)
         Change of the attachments' displacements.
@@ -118,9 +130,10 @@ def finish(
     pull : ndarray, shape (n_ends,)
         Result: forces on the ends in the next step, the attachments held.
     """
+    where, rates, more, more_coupling = units
     ends[:] = 0.0
     pull[:] = 0.0
-    add_product(turn_rows, turn_columns, turn, solution, ends)
+    add_product(turn, solution, ends)
     for i in range(solution.size):
         attached[0, i] += solution[i]
         attached[1, i] = a1 * solution[i] - attached[1, i]
@@ -197,8 +210,9 @@ def draw_more(rates, more, coupling, table, pull):
 
 
 @_compiled
-def add_product(rows, columns, values, vector, result):
-    """Add a matrix, compressed by rows, times a vector to ``result``."""
+def add_product(matrix, vector, result):
+    """Add a matrix, its rows, columns and values, times a vector to ``result``."""
+    rows, columns, values = matrix
     for i in range(result.size):
         total = 0.0
         for k in range(rows[i], rows[i + _1]):
@@ -207,23 +221,25 @@ def add_product(rows, columns, values, vector, result):
 
 
 @_compiled
-def solve(top, bottom, middle, size, load, work, solution):
+def solve(band, load, work, solution):
     """Solve a band from both of its ends towards the middle, which are two chains that do not wait for each other.
 
     Parameters
     ----------
-    top, bottom : ndarray, shape (p (width + 1),), (q (width + 1),)
-        Cholesky factors of the first p rows, and of the last q rows from the end backwards: row j holds 1 / L_jj and
-        L_j+k,j for k = 1 ... width.
-    middle : ndarray, shape (width, width)
-        Inverse of what is left for the rows between.
-    size : ndarray of unsigned int, shape (4,)
-        p, q, width, width + 1; q <= p <= q + 1.
+    band : (top, bottom, middle, size)
+        top, bottom : ndarray, shape (p (width + 1),), (q (width + 1),)
+            Cholesky factors of the first p rows, and of the last q rows from the end backwards: row j holds 1 / L_jj
+            and L_j+k,j for k = 1 ... width.
+        middle : ndarray, shape (width, width)
+            Inverse of what is left for the rows between.
+        size : ndarray of unsigned int, shape (4,)
+            p, q, width, width + 1; q <= p <= q + 1.
     load : ndarray, shape (n,)
         n = p + width + q.
     work : ndarray, shape (2, p + width)
     solution : ndarray, shape (n,)
     """
+    top, bottom, middle, size = band
     p, q, width, stride = size[_0], size[_1], size[_2], size[_3]
     n = p + width + q
     for j in range(p + width):
@@ -274,38 +290,50 @@ def solve(top, bottom, middle, size, load, work, solution):
 
 
 @_compiled
-def meet(
-    strip, element, plan, plan_static, height, height_static, slots, ends, yielding, at_ends, a1,
-    table, solution, attached, local, row, load, out,
-):  # fmt: skip
+def unpacked(record):
+    """Return the parts of an interval's record, see `Interval`.
+
+    A record is one array, because a call costs more for every array that is handed over: four whole numbers (modes n,
+    displacements of attachments e, elements k, displacements r that are reached), then the parts one after the other.
+    """
+    n, e, k, r = record[:4].view(np.int64)
+    m, nodes, at = n + e, 2 * (k + 1), 4
+    slots, at = record[at : at + n].view(np.uint64), at + n
+    ends, at = record[at : at + e].view(np.uint64), at + e
+    reached, at = record[at : at + r].view(np.uint64), at + r
+    plan, at = record[at : at + nodes * m].reshape((nodes, m)), at + nodes * m
+    plan_static, at = record[at : at + nodes], at + nodes
+    height, at = record[at : at + 4 * k * m].reshape((k, 4, m)), at + 4 * k * m
+    height_static, at = record[at : at + 4 * k].reshape((k, 4)), at + 4 * k
+    yielding, at = record[at : at + n * e].reshape((n, e)), at + n * e
+    at_ends, at = record[at : at + e * e].reshape((e, e)), at + e * e
+    columns = record[at : at + r * e].reshape((r, e))
+    return Interval(slots, ends, reached, plan, plan_static, height, height_static, yielding, at_ends, columns)
+
+
+@_compiled
+def meet(record, strip, element, a1, table, solution, attached, result):
     """Find where a strip crosses an interval of a wire at the end of a step, forces found inside the step left out.
 
-    The same as `models.catenary.step.meeting.FreeMotion` does.
+    The same as `models.catenary.contact_and_slack.wire_response.walk` does.
 
     Parameters
     ----------
+    record : ndarray
+        Of the interval, see `unpacked`.
     strip : ndarray, shape (2, 2, 3)
         Ends A and B; position and velocity.
     element : int
         Of the interval, to begin with.
-    plan, plan_static, height, height_static, ends : ndarray
-        Of the `WireInterval`.
-    slots : ndarray of unsigned int, shape (n_span,)
-        Where the amplitudes of its modes are in ``table``.
-    yielding, at_ends : ndarray
-        Of its `Reaction`.
     a1 : float
     table : ndarray
         See `finish`.
     solution, attached : ndarray, shape (n_attached,), (2, n_attached)
         Change of the attachments in this step, and their motion at its beginning.
-    local : ndarray, shape (2, m)
-        Work space.
-    row, load : ndarray, shape (m,), (e,)
-        Results: what a unit force on the point does to the local coordinates; and to the attachments, directly and
-        through the modes.
-    out : ndarray, shape (6,)
-        Results: share of the way along the element and along the strip, static height, rise and its rate, compliance.
+    result : ndarray, shape (6 + m + e,)
+        Share of the way along the element and along the strip, static height, rise and its rate, compliance; what a
+        unit force on the point does to the m local coordinates, and to the e displacements of the attachments directly
+        and through the modes.
 
     Returns
     -------
@@ -313,7 +341,12 @@ def meet(
         Element of the interval; NOWHERE where the strip and the wire are parallel or pass beside each other, BEFORE or
         BEYOND where they may cross in another interval on that side.
     """
-    follow_ends(slots, ends, yielding, a1, table, solution, attached, local)
+    interval = unpacked(record)
+    plan, plan_static = interval.plan, interval.plan_static
+    size = plan.shape[1]
+    row, load = result[6 : 6 + size], result[6 + size :]
+    local = np.empty((2, size))
+    follow_ends(interval, a1, table, solution, attached, local)
     ax, ay = strip[0, 0, 0], strip[0, 0, 1]
     strip_x, strip_y = strip[1, 0, 0] - ax, strip[1, 0, 1] - ay
     direction = 0
@@ -338,24 +371,25 @@ def meet(
         element += step
         if element < 0:
             return BEFORE
-        if element >= height.shape[0]:
+        if element >= interval.height.shape[0]:
             return BEYOND
     if not 0.0 <= share <= 1.0:
         return NOWHERE
     xi = min(max(xi, 0.0), 1.0)
-    out[0], out[1] = xi, share
-    out[2] = touch(height, height_static, element, xi, row)
-    out[3], out[4] = 0.0, 0.0
+    height = lift(interval, element, xi, row)
+    rise = rate = 0.0
     for m in range(row.size):
-        out[3] += row[m] * local[0, m]
-        out[4] += row[m] * local[1, m]
-    out[5] = give(slots, yielding, at_ends, table, row, load)
+        rise += row[m] * local[0, m]
+        rate += row[m] * local[1, m]
+    result[0], result[1], result[2], result[3], result[4] = xi, share, height, rise, rate
+    result[5] = give(interval, table, row, load)
     return element
 
 
 @_compiled
-def follow_ends(slots, ends, yielding, a1, table, solution, attached, local):
+def follow_ends(interval, a1, table, solution, attached, local):
     """Put the local coordinates of an interval at the end of a step and their rates into ``local``; see `meet`."""
+    slots, ends, yielding = interval.slots, interval.ends, interval.yielding
     count, size = yielding.shape
     for j in range(size):
         change = solution[ends[j]]
@@ -374,8 +408,9 @@ def follow_ends(slots, ends, yielding, a1, table, solution, attached, local):
 
 
 @_compiled
-def touch(height, height_static, element, xi, row):
+def lift(interval, element, xi, row):
     """Put what a unit force on a point does to the local coordinates into ``row``; return the static height."""
+    height, height_static = interval.height, interval.height_static
     power, static = 1.0, 0.0
     row[:] = 0.0
     for n in range(4):
@@ -387,8 +422,9 @@ def touch(height, height_static, element, xi, row):
 
 
 @_compiled
-def give(slots, yielding, at_ends, table, row, load):
+def give(interval, table, row, load):
     """Put what a unit force on a point does to the attachments into ``load``; return the compliance of the point."""
+    slots, yielding, at_ends = interval.slots, interval.yielding, interval.at_ends
     count, size = yielding.shape
     compliance = 0.0
     for j in range(size):
@@ -404,13 +440,16 @@ def give(slots, yielding, at_ends, table, row, load):
 
 
 @_compiled
-def push(height, height_static, slots, ends, yielding, at_ends, element, xi, force, row, load, table, pressed):
+def push(record, element, xi, force, table, pressed):
     """Add a known force on a point of an interval to ``pressed``, the forces on the attachments, and to its modes."""
-    touch(height, height_static, element, xi, row)
-    give(slots, yielding, at_ends, table, row, load)
+    interval = unpacked(record)
+    ends = interval.ends
+    row, load = np.empty(interval.plan.shape[1]), np.empty(ends.size)
+    lift(interval, element, xi, row)
+    give(interval, table, row, load)
     for j in range(ends.size):
         pressed[ends[j]] += force * load[j]
-    press(slots, force, row, table)
+    press(interval.slots, force, row, table)
 
 
 @_compiled
@@ -421,19 +460,23 @@ def press(slots, force, row, table):
 
 
 @_compiled
-def apply(slots, row, load, force, rows, columns, table, solution):
-    """Add what a force on a point changes in a step; ``columns`` are responses of the attachments ``rows``."""
-    press(slots, force, row, table)
-    for i in range(rows.size):
+def apply(record, row, load, force, table, solution):
+    """Add what a force on a point changes in a step; ``row`` and ``load`` are those of the point, see `meet`."""
+    interval = unpacked(record)
+    reached, columns = interval.reached, interval.columns
+    press(interval.slots, force, row, table)
+    for i in range(reached.size):
         total = 0.0
         for j in range(load.size):
             total += columns[i, j] * load[j]
-        solution[rows[i]] += force * total
+        solution[reached[i]] += force * total
 
 
 @_compiled
-def place(plan, plan_static, row, height, slots, ends, table, attached, element, xi, out):
+def place(record, row, height, table, attached, element, xi, out):
     """Put a point of a wire into ``out``, shape (3,); ``row`` and ``height`` are those of the point, see `meet`."""
+    interval = unpacked(record)
+    slots, ends, plan, plan_static = interval.slots, interval.ends, interval.plan, interval.plan_static
     count = slots.size
     x, y = plan_static[2 * element], plan_static[2 * element + 1]
     x2, y2, z = plan_static[2 * element + 2], plan_static[2 * element + 3], height

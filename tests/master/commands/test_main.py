@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from master.commands import main as cli
+from master.commands import scenario_commands
 from master.commands.main import main
 from master.results import run_results
 
@@ -118,7 +118,7 @@ def test_a_standalone_archive_holds_one_python_beside_the_fmus(toy, in_folder, m
         (folder / "runtime.txt").write_text("format=1\n")
         (folder / "lib" / "libpython.so").write_bytes(b"library")
 
-    monkeypatch.setattr(cli, "write_runtime", write)
+    monkeypatch.setattr(scenario_commands, "write_runtime", write)
     assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 0
     with zipfile.ZipFile("packed.ssp") as file:
         assert file.read("resources/runtime/lib/libpython.so") == b"library"
@@ -130,7 +130,7 @@ def test_why_an_archive_cannot_be_standalone_is_said(toy, in_folder, monkeypatch
     def write(folder):
         raise ValueError("the Python in /usr has no shared library")
 
-    monkeypatch.setattr(cli, "write_runtime", write)
+    monkeypatch.setattr(scenario_commands, "write_runtime", write)
     assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 1
     assert "cannot be standalone: the Python in /usr has no shared library" in capsys.readouterr().err
     assert not (in_folder / "packed.ssp").exists()

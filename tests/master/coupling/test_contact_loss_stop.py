@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from master.coupling.contact_loss_stop import ContactWatch
+from master.coupling.contact_loss_stop import ContactLossStop
 from master.coupling.network import Network
 from master.errors import RunError
 from master.system.contacts import Contact
@@ -16,11 +16,11 @@ def watched(fake_slave, forces, pause=None):
     pan = fake_slave("pan", (), ("A.y",), np.array([0.9]), lambda s, u, t, h: s)
     network = Network([line, pan], [])
     network.outputs[1] = 0.9
-    watch = ContactWatch([CONTACT], network, 0.25)
+    watch = ContactLossStop([CONTACT], network, 0.25)
     for n, force in enumerate(forces):
         if n == pause:  # the run is ended and goes on
-            again = ContactWatch([CONTACT], network, 0.25)
-            again.recall(watch.memory())
+            again = ContactLossStop([CONTACT], network, 0.25)
+            again.restore(watch.save())
             watch = again
         network.outputs[0] = force
         watch.observe(n, 0.1 * n, network)

@@ -146,14 +146,14 @@ def test_an_iterative_scheme_that_recalls_its_memory_repeats_as_often_as_one_tha
     """What counts as settled is relative to the largest values so far, so it has to come along."""
     (network, scheme), (other, before) = _settling(fake_slave), _settling(fake_slave)
     resumed, forgetful = Iterative(1e-3), Iterative(1e-3)
-    resumed.recall(before.memory())
+    resumed.restore(before.save())
     started = scheme.iterations
     for each, net in ((scheme, network), (resumed, other)):
         for n in range(5, 10):
             each.step(net, 0.02 * n, 0.02)
     assert resumed.iterations == scheme.iterations - started
     assert other.outputs.tolist() == network.outputs.tolist()
-    assert resumed.memory().tolist() == scheme.memory().tolist()
+    assert resumed.save().tolist() == scheme.save().tolist()
     third, _ = _settling(fake_slave)
     for n in range(5, 10):
         forgetful.step(third, 0.02 * n, 0.02)
@@ -162,13 +162,13 @@ def test_an_iterative_scheme_that_recalls_its_memory_repeats_as_often_as_one_tha
 
 def test_memory_that_is_handed_out_is_not_changed_by_further_steps(fake_slave):
     network, scheme = _settling(fake_slave)
-    taken = scheme.memory()
+    taken = scheme.save()
     kept = taken.copy()
     for slave in network.slaves:
         slave.state = 1e6 * slave.state
     scheme.step(network, 0.1, 0.02)
     assert taken.tolist() == kept.tolist()
-    assert scheme.memory().max() > 10.0 * kept.max()
+    assert scheme.save().max() > 10.0 * kept.max()
 
 
 def test_wires_convert(fake_slave):

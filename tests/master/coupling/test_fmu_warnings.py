@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from master.commands.main import main
-from master.coupling.fmu_warnings import Caution, CautionObserver
+from master.coupling.fmu_warnings import FmuWarning, FmuWarningObserver
 from master.coupling.network import Network
 from master.fmu import fmi_log
 from master.report.run_page import _head
@@ -32,15 +32,15 @@ def talker(fake_slave):
 def test_every_warning_is_told_once_and_none_after_the_first_step(talker, fake_slave):
     loud, silent = talker, fake_slave("train", (), (), np.zeros(0), lambda state, *_: state)
     network, told = Network([loud, silent], []), []
-    observer = CautionObserver(told.append)
+    observer = FmuWarningObserver(told.append)
     loud.words = ("slack",)
     observer.begin(0.0, network)
-    assert told == [Caution("line", "slack")]
+    assert told == [FmuWarning("line", "slack")]
     loud.words = ("slack", "too long")
     observer.observe(1, 0.1, network)
     loud.words = ("slack", "too long", "later")
     observer.observe(2, 0.2, network)
-    assert told == observer.warnings == [Caution("line", "slack"), Caution("line", "too long")]
+    assert told == observer.warnings == [FmuWarning("line", "slack"), FmuWarning("line", "too long")]
     assert str(told[0]) == "warning: component 'line' says: slack"
 
 

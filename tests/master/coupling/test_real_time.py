@@ -12,7 +12,7 @@ from master.commands.main import main
 from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.coupling.network import Network
-from master.coupling.real_time import Pacer
+from master.coupling.real_time import WallClockPacer
 from master.system.connections import Connection
 
 
@@ -46,7 +46,7 @@ def paced(fake_slave, durations, factor=1.0, step=0.01, first=0):
     slave = fake_slave("slow", ("u",), ("y",), np.zeros(1), flow)
     network = Network([slave], [Connection("slow", "y", "slow", "u")])
     grid = TimeGrid(0.0, step, first + len(durations), first)
-    pacer = Pacer(grid, factor, clock, clock.sleep)
+    pacer = WallClockPacer(grid, factor, clock, clock.sleep)
     outcome = simulate(network, Jacobi(), grid, [pacer])
     assert outcome.status == "complete"
     return began, pacer.punctuality, clock
@@ -108,7 +108,7 @@ def test_garbage_is_not_collected_while_paced(fake_slave):
     slave = fake_slave("a", ("u",), ("y",), np.zeros(1), lambda s, u, t, h: (seen.append(gc.isenabled()), s)[1])
     network = Network([slave], [Connection("a", "y", "a", "u")])
     grid, clock = TimeGrid(0.0, 0.01, 3), Clock()
-    pacer = Pacer(grid, 1.0, clock, clock.sleep)
+    pacer = WallClockPacer(grid, 1.0, clock, clock.sleep)
     assert gc.isenabled()
     simulate(network, Jacobi(), grid, [pacer])
     assert seen == [False] * 3
@@ -117,7 +117,7 @@ def test_garbage_is_not_collected_while_paced(fake_slave):
 
 
 def test_nothing_is_said_of_a_run_without_steps():
-    assert Pacer(TimeGrid(0.0, 0.01, 3)).punctuality is None
+    assert WallClockPacer(TimeGrid(0.0, 0.01, 3)).punctuality is None
 
 
 def test_figures_are_those_of_a_run_that_is_not_paced(toy, tmp_path, capsys):

@@ -49,12 +49,12 @@ def builder(monkeypatch):
 
 def test_missing_then_fresh_then_stale(builder, tmp_path):
     path, told = tmp_path / "X.fmu", []
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert builder.asked == ["fingerprint", "build"]
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert builder.asked[-2:] == ["fingerprint", "build"]
     assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
     assert fmu_provision.stored_guid(path) == "{cd-34}"
@@ -63,7 +63,7 @@ def test_missing_then_fresh_then_stale(builder, tmp_path):
 def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
     builder.fingerprint = ""  # what it says of a name that it does not know
     (tmp_path / "X.fmu").write_text("foreign")
-    fmu_provision.ensure(tmp_path / "X.fmu", print)
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", print)
     assert builder.asked == ["fingerprint"]
     assert (tmp_path / "X.fmu").read_text() == "foreign"
 
@@ -79,7 +79,7 @@ def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
 )
 def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, change, why):
     path, told = tmp_path / "X.fmu", []
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     with zipfile.ZipFile(path) as file:
         members = {name: file.read(name) for name in file.namelist()} | change
     with zipfile.ZipFile(path, "w") as file:
@@ -88,7 +88,7 @@ def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, 
                 file.writestr(name, data)
     before = path.read_bytes()
     builder.fingerprint = "CD-34"
-    assert fmu_provision.ensure(path, told.append) == path
+    assert fmu_provision.provide_fmu(path, told.append) == path
     assert path.read_bytes() == before
     assert told[1:] == [f"X.fmu is used as it is: {why}; to have it built anew, remove it"]
 
@@ -101,7 +101,7 @@ def test_older_builds_are_known_by_the_name_of_their_script(builder, tmp_path, s
         file.writestr("resources/slavemodule.txt", script)
         file.writestr(f"resources/{script}.py", "")
     builder.fingerprint = "CD-34"
-    fmu_provision.ensure(path, lambda _: None)
+    fmu_provision.provide_fmu(path, lambda _: None)
     assert builder.asked == (["fingerprint", "build"] if is_ours else ["fingerprint"])
 
 
@@ -111,16 +111,16 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     path, told = tmp_path / "Mine.fmu", []
     write_fmu(path, "ab-12", definition="lines/Mine.toml", pantographs="2")
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert told == []
     ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
     assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert told == ["building Mine.fmu again: its sources have changed"]
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
-    fmu_provision.ensure(path, told.append)
+    fmu_provision.provide_fmu(path, told.append)
     assert "which it was built from, is not there" in told[-1]
     assert len(builder.asked) == 3
 
@@ -128,7 +128,7 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
 def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    assert fmu_provision.ensure(tmp_path / "X.fmu", lambda _: None, scratch) == scratch / "X.fmu"
+    assert fmu_provision.provide_fmu(tmp_path / "X.fmu", lambda _: None, scratch) == scratch / "X.fmu"
     assert not (tmp_path / "X.fmu").exists()
 
 
@@ -144,17 +144,17 @@ def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypa
 def test_the_builders_words_are_passed_on(builder, tmp_path):
     builder.code, builder.said = 1, "warning\nerror: X: tension is negative"
     with pytest.raises(ValueError, match="cannot be built: X: tension is negative"):
-        fmu_provision.ensure(tmp_path / "X.fmu", print)
+        fmu_provision.provide_fmu(tmp_path / "X.fmu", print)
     builder.code = 0
     with pytest.raises(ValueError, match="could not be built: X: tension is negative"):
-        fmu_provision.ensure(tmp_path / "X.fmu", lambda _: None)
+        fmu_provision.provide_fmu(tmp_path / "X.fmu", lambda _: None)
 
 
 def test_without_fmus_nothing_is_asked(monkeypatch, tmp_path):
     monkeypatch.setattr(fmu_provision.importlib.util, "find_spec", lambda name: None)
     assert not fmu_provision.has_builder()
     monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: pytest.fail("asked"))
-    fmu_provision.ensure(tmp_path / "X.fmu", print)
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", print)
 
 
 def test_a_name_that_looks_like_an_option_is_a_name():

@@ -20,12 +20,12 @@ import pytest
 from master.commands.main import main
 from master.errors import MasterError
 from master.recording import checkpoint
-from master.recording.checkpoint_writer import Occasions
-from master.recording.recorder import LONGEST_UNWRITTEN, Recorder, Source
+from master.recording.checkpoint_writer import CheckpointSchedule
+from master.recording.recorder import LONGEST_UNWRITTEN, RecordedValues, Recorder
 from master.recording.recording import load
-from master.results import run_results
+from master.results import results_folder, run_results
 from master.safety import safe_files
-from master.safety.safe_files import LineFile, write_whole
+from master.safety.safe_files import AppendOnlyFile, write_atomically
 
 ROOT = Path(__file__).parents[3]
 SERIES = ("timeseries.csv", "timeseries_5ms.csv")
@@ -156,7 +156,7 @@ def test_a_run_goes_on_only_as_it_began(toy, killed, capsys, options, text):
 @pytest.mark.parametrize(
     ("spoil", "text"),
     [
-        (lambda f: (f / checkpoint.NAME).unlink(), "holds no checkpoint.state to go on from"),
+        (lambda f: (f / checkpoint.NAME).unlink(), "holds no checkpoint.state to continue from"),
         (lambda f: (f / SERIES[1]).write_text("time [s],other\n0,1\n"), "holds other variables than this run records"),
         (lambda f: (f / SERIES[0]).write_bytes((f / SERIES[0]).read_bytes()[:9000]), "some are lost"),
         (lambda f: (f / "summary.json").write_text('{"generator": "openpanto master", "run": "x"}'), "another run"),
@@ -230,22 +230,22 @@ def test_a_folder_of_a_run_killed_at_once_is_taken_over(toy, tmp_path):
 
 
 def test_no_room_for_the_summary_leaves_the_rows(toy, tmp_path, monkeypatch, capsys):
-    folder, write = tmp_path / "out", run_results.write_whole
+    folder, write = tmp_path / "out", results_folder.write_atomically
 
     def full(path, data):
         if b'"quality"' in data:
             raise safe_files.cannot_write(path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
         write(path, data)
 
-    monkeypatch.setattr(run_results, "write_whole", full)
+    monkeypatch.setattr(results_folder, "write_atomically", full)
     assert go(toy, folder, "--stop", "0.2") == 1
     assert "What was written before is in" in " ".join(capsys.readouterr().err.split())
     assert len(load(folder / SERIES[0]).time) == 201
 
 
-class TestLineFile:
+class TestAppendOnlyFile:
     def test_lines_that_still_fit_are_kept_and_no_piece_of_one(self, tmp_path, monkeypatch):
-        file = LineFile(tmp_path / "a")
+        file = AppendOnlyFile(tmp_path / "a")
         file.write(b"first\n")
         room, write = [14], os.write
 
@@ -268,7 +268,7 @@ class TestLineFile:
 
     def test_what_is_kept_is_gone_on_with(self, tmp_path):
         (tmp_path / "a").write_text("first\nsecond\nthi")
-        file = LineFile(tmp_path / "a", keep=6)
+        file = AppendOnlyFile(tmp_path / "a", keep=6)
         file.write(b"2\n")
         file.close()
         assert (tmp_path / "a").read_text() == "first\n2\n"
@@ -276,14 +276,14 @@ class TestLineFile:
 
 def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
     path = tmp_path / "a"
-    write_whole(path, b"old")
+    write_atomically(path, b"old")
 
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(safe_files.os, "fsync", full)
     with pytest.raises(MasterError, match="a cannot be written"):
-        write_whole(path, b"new")
+        write_atomically(path, b"new")
     assert path.read_bytes() == b"old"
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
 
@@ -292,7 +292,7 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
 def test_no_more_than_a_second_waits_to_be_written(tmp_path, step, every):
     """Whenever the run is ended, every row more than a second old is in the file."""
     path = tmp_path / "a.csv"
-    recorder = Recorder(path, [Source(["t"], np.zeros(1))], {}, every)
+    recorder = Recorder(path, [RecordedValues(["t"], np.zeros(1))], {}, every)
     recorder.begin(0.0, None)
     recorded = [0.0]
     for n in range(1, round(6.0 / step)):
@@ -313,7 +313,7 @@ def test_every_write_is_of_whole_lines(tmp_path, monkeypatch):
         return write(descriptor, data)
 
     monkeypatch.setattr(safe_files.os, "write", note)
-    recorder = Recorder(tmp_path / "a.csv", [Source(["t"], np.zeros(1))], {})
+    recorder = Recorder(tmp_path / "a.csv", [RecordedValues(["t"], np.zeros(1))], {})
     recorder.begin(0.0, None)
     for n in range(1, 2000):
         recorder.observe(n, n * 1e-3, None)
@@ -324,7 +324,7 @@ def test_every_write_is_of_whole_lines(tmp_path, monkeypatch):
 
 
 def test_occasions():
-    due = [n for n in range(1, 10) if n in Occasions(5, 3)]
+    due = [n for n in range(1, 10) if n in CheckpointSchedule(5, 3)]
     assert due == [3, 5, 6, 9]
-    assert not Occasions()
-    assert not any(n in Occasions() for n in range(10))
+    assert not CheckpointSchedule()
+    assert not any(n in CheckpointSchedule() for n in range(10))

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from master.commands.main import main
-from master.coupling.fmu_warnings import LARGEST, CautionObserver
+from master.coupling.fmu_warnings import LARGEST, FmuWarningObserver
 from master.coupling.network import Network
 from master.errors import MasterError, SlaveError
 from master.fmu import fmi_log
 from master.fmu.fmu_description import read_fmu
 from master.fmu.instance import LONGEST_STATE, Instance
-from master.recording.recorder import Recorder, Source
+from master.recording.recorder import RecordedValues, Recorder
 from master.recording.recording import load
 from master.report.result_tables import figures_table, plain_table
 from master.report.terminal_summary import Terminal, printable_json
@@ -94,7 +94,7 @@ def test_other_cells_stay(text):
 def test_titles_of_a_recording_are_no_formulas(tmp_path, fake_slave):
     slave = fake_slave("a", (), (), np.zeros(0), lambda state, *_: state)
     names = [f"{formula}.x" for formula in FORMULAS if "\t" not in formula]
-    recorder = Recorder(tmp_path / "timeseries.csv", [Source(names, np.zeros(len(names)))], {}, 1)
+    recorder = Recorder(tmp_path / "timeseries.csv", [RecordedValues(names, np.zeros(len(names)))], {}, 1)
     recorder.begin(0.0, Network([slave], []))
     recorder.finish()
     head = next(csv.reader((tmp_path / "timeseries.csv").read_text().splitlines()))
@@ -151,7 +151,7 @@ def test_the_claim_is_looked_at_before_there_is_room_for_it(instance, monkeypatc
 def test_values_that_cannot_be_are_warned_of_once(fake_slave):
     slave = fake_slave("line", (), ("a", "b"), np.zeros(2), lambda state, *_: state)
     network, told = Network([slave], []), []
-    observer = CautionObserver(told.append)
+    observer = FmuWarningObserver(told.append)
     observer.begin(0.0, network)
     for step, value in enumerate((LARGEST, -1e300, 1e300), 1):
         network.outputs[:] = (1.0, value)

@@ -1,165 +1,272 @@
-"""What the numbers of a scenario rule out before anything is run: told by hand-made components, without FMUs."""
+"""Checks across structure and FMUs: connections, units, parameters, ranges."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
 
-from master.scenario.scenario_checks import empty_cells, half_empty_rows, problems, stop_after_interval
-from master.ssp.run_settings import Interval, RunSettings
-from master.system.components import Component, Fmu, System, Variable
-from master.system.connections import Connection
-from master.system.pantograph_motion import final_position, parameter_value
+from master.scenario.scenario_checks import ScenarioChecks
+from master.ssp.run_settings import Annotations, RunSettings
+from master.ssp.ssd import Component, Connection, Structure
+from master.ssp.ssd_elements import Binding, Connector
+from master.ssp.ssp_units import COMMON, Conversion
+from master.ssp.ssv import Parameter, ParameterSet
+from master.system.components import Fmu, Variable
 
 
-def parameter(name, start, unit="m", causality="parameter", kind="Real"):
-    return Variable(name, 0, kind, causality, "fixed", unit, start, None, None)
+def variable(name, causality, unit="", kind="Real", minimum=None, maximum=None, variability="tunable"):
+    return Variable(name, 0, kind, causality, variability, unit, None, minimum, maximum)
 
 
-def pantograph(name="train", values=None, **starts):
-    starts = {"start_position": "30", "speed": "80", "static_force": "160"} | starts
-    units = {"static_force": "N", "static_moment": "N.m", "speed": "m/s"}
-    variables = {n: parameter(n, s, units.get(n, "m")) for n, s in starts.items() if s != "none"}
-    fmu = Fmu(Path("train.fmu"), "", "", variables, can_restore=True, sha256="", tool="")
-    return Component(name, fmu, dict(values or {}), ("contact.force",), ("A.x",))
+def fmu(*variables):
+    found = {v.name: dataclasses.replace(v, reference=i) for i, v in enumerate(variables)}
+    return Fmu(Path("x.fmu"), "", "", found, True, "", "")
 
 
-LINE = Component("line", Fmu(Path("line.fmu"), "", "", {}, can_restore=True, sha256="", tool=""), {}, (), ())
+def component(name, connectors, parameters=(), prefix=""):
+    bindings = (Binding(prefix, ParameterSet("p", tuple(parameters), {}), 9),) if parameters else ()
+    return Component(name, "resources/x.fmu", tuple(connectors), bindings, 1)
 
 
-def system(*trains, stop=5.0, start=0.0, step=0.001, first=100.0, last=390.0):
-    trains = trains or (pantograph(),)
-    told = [(t.name, f"pantograph[{i}].contact.force") for i, t in enumerate(trains, 1)]
-    connections = tuple(Connection("line", output, name, "contact.force") for name, output in told)
-    settings = RunSettings(interval=Interval(start=first, end=last))
-    return System("one", (LINE, *trains), connections, start, stop, step, settings)
+NONE = Conversion()
 
 
-def test_values_come_from_the_scenario_first_then_from_the_fmu():
-    assert parameter_value(pantograph(), "speed") == 80.0
-    assert parameter_value(pantograph(values={"speed": 70.0}), "speed") == 70.0
+def wire(suppress=False, transformation=NONE, start=("a", "y"), end=("b", "u")):
+    return Connection(*start, *end, transformation, suppress, 7)
 
 
-@pytest.mark.parametrize(
-    "variable",
-    [
-        parameter("speed", "80", causality="calculatedParameter"),
-        parameter("speed", "80", kind="Integer"),
-        parameter("speed", None),
-        parameter("speed", "inf"),
-        parameter("speed", "quick"),
-    ],
-)
-def test_what_is_no_real_parameter_with_a_value_has_none(variable):
-    fmu = Fmu(Path("train.fmu"), "", "", {"speed": variable}, can_restore=True, sha256="", tool="")
-    assert parameter_value(Component("train", fmu, {}, (), ()), "speed") is None
-    assert parameter_value(Component("train", fmu, {}, (), ()), "height") is None
+def structure(components, connections, bindings=()):
+    return Structure(
+        "s",
+        tuple(components),
+        tuple(connections),
+        tuple(bindings),
+        {},
+        0.0,
+        1.0,
+        Annotations(RunSettings(), None),
+    )
 
 
-def test_the_way_begins_at_the_start_time():
-    assert final_position(system(start=2.0, stop=5.0), pantograph()) == pytest.approx(30.0 + 80.0 * 3.0)
-    assert final_position(system(), pantograph(speed="none")) is None
-    assert final_position(system(), pantograph(start_position="none")) is None
+def check(written, fmus):
+    problems = []
+    checker = ScenarioChecks(written, fmus, problems)
+    connections = checker.connections()
+    return connections, checker.components(connections), problems
 
 
-@pytest.mark.parametrize(
-    ("stop", "ends"),
-    [
-        (4.5, False),  # 30 + 80 * 4.5 = 390 m, where the interval ends
-        (4.4995, False),  # within a step of it
-        (4.49, True),
-        (4.0, True),
-    ],
-)
-def test_a_stop_time_must_cover_the_interval(stop, ends):
-    found = list(problems(system(stop=stop)))
-    assert bool(found) == ends
-    if found:
-        assert f"ends at {stop:g} s with 'train' at {30 + 80 * stop:.6g} m, before the end of the interval" in found[0]
-        assert 'stop at 4.5 s or later, or write until="end" into Interval, or run a part of it with --stop' in found[0]
-
-
-def test_the_cure_counts_from_the_start_time_and_rounds_up():
-    (found,) = problems(system(start=2.0, stop=5.0, last=391.0))
-    assert "stop at 6.6 s or later" in found  # 2 + 361 / 80 = 6.5125
-
-
-def test_one_that_stands_is_told_its_speed():
-    (found,) = problems(system(pantograph(speed="0")))
-    assert "its speed is 0 m/s" in found
-
-
-@pytest.mark.parametrize(("position", "begins"), [("100", False), ("100.05", False), ("100.2", True), ("500", True)])
-def test_the_interval_begins_no_earlier_than_the_pantograph(position, begins):
-    found = list(problems(system(pantograph(start_position=position))))
-    assert bool(found) == begins
-    if found:
-        assert f"'train' starts at {position} m, beyond the start of the interval of interest, 100 m" in found[0]
-
-
-def test_a_part_that_was_asked_for_may_end_early_but_not_be_idle():
-    assert list(problems(system(stop=1.0), may_stop_early=True)) == []
-    (found,) = problems(system(pantograph(static_force="0"), stop=1.0), may_stop_early=True)
-    assert "train.static_force = 0 N never lifts the strip" in found
-
-
-@pytest.mark.parametrize(("name", "unit"), [("static_force", "N"), ("static_moment", "N.m")])
-@pytest.mark.parametrize("value", [0.0, -5.0])
-def test_nothing_that_lifts_is_told(name, unit, value):
-    starts = {"static_force": "none", name: "100"}
-    assert list(problems(system(pantograph(**starts)))) == []
-    (found,) = problems(system(pantograph(values={name: value}, **starts)))
-    assert found == f"train.{name} = {value:g} {unit} never lifts the strip to the wire: give it more than 0"
-
-
-def test_of_several_each_is_looked_at():
-    second = pantograph("second", start_position="-70")
-    (found,) = problems(system(pantograph("first"), second, stop=5.0))
-    assert "with 'second' at 330 m" in found
-
-
-def test_a_foreign_pantograph_is_not_judged_beforehand():
-    assert list(problems(system(pantograph(speed="none", static_force="none"), stop=0.1))) == []
-
-
-def test_the_run_goes_on_until_the_last_one_has_left_and_half_a_second_more():
-    assert stop_after_interval(system()) == pytest.approx(4.5 + 0.5)
-    second = pantograph("second", start_position="-70")
-    for trains in ((pantograph("first"), second), (second, pantograph("first"))):
-        assert stop_after_interval(system(*trains, start=2.0)) == pytest.approx(2.0 + 5.75 + 0.5)
-
-
-def test_that_is_a_whole_number_of_steps_and_not_one_too_many():
-    stop = stop_after_interval(system(step=0.3))
-    assert stop == pytest.approx(5.1)  # 5.0 s are 16.67 steps
-    assert stop_after_interval(system(step=0.5)) == pytest.approx(5.0)
+def pair(source_unit="", target_unit="", written=("", ""), **options):
+    a = component("a", [Connector("y", "output", "Real", written[0], 2)])
+    b = component("b", [Connector("u", "input", "Real", written[1], 3)])
+    fmus = {"a": fmu(variable("y", "output", source_unit)), "b": fmu(variable("u", "input", target_unit))}
+    return check(structure([a, b], [wire(**options)]), fmus)
 
 
 @pytest.mark.parametrize(
-    ("train", "last", "said"),
+    ("source", "target", "value", "expected"),
     [
-        (pantograph(), None, "has no end that the run could go on until; give it one, or a stop time"),
-        (pantograph(speed="none"), 390.0, "the FMU of 'train' tells no start_position and speed: give a stop time"),
-        (pantograph(speed="0"), 390.0, "train.speed = 0 m/s never leads to the end of the interval, 390 m"),
+        ("mm", "m", 1500.0, 1.5),
+        ("km/h", "m/s", 300.0, 83.3333333333),
+        ("kN", "N", 2.0, 2000.0),
+        ("degC", "K", 20.0, 293.15),
     ],
 )
-def test_why_there_is_no_such_time(train, last, said):
-    assert said in stop_after_interval(system(train, last=last))
+def test_units_of_connected_variables_are_converted(source, target, value, expected):
+    connections, _, problems = pair(source, target)
+    assert problems == []
+    assert connections[0].conversion(value) == pytest.approx(expected)
 
 
-def test_without_a_pantograph_there_is_none():
-    alone = System("one", (LINE,), (), 0.0, 1.0, 0.001, RunSettings(interval=Interval(start=1.0, end=2.0)))
-    assert "no pantograph is told a contact force" in stop_after_interval(alone)
+def test_connectors_that_restate_the_units_change_nothing():
+    connections, _, problems = pair("mm", "m", ("mm", "m"))
+    assert problems == []
+    assert connections[0].conversion(1500.0) == pytest.approx(1.5)
 
 
-def test_an_empty_cell_of_the_line_is_told_and_one_of_a_pantograph_is_not():
-    assert empty_cells(system(), ["train.static_force"]) == ""
-    found = empty_cells(system(), ["train.static_force", "line.tension", "liner.x"])
-    assert found == "the table has no value for line.tension: write one into every row"
+def test_a_connector_in_another_unit_than_its_variable_is_converted_too():
+    """The FMU gives mm, the SSD calls it m, the other FMU wants m: once converted, not twice or never."""
+    connections, _, problems = pair("mm", "m", ("m", "m"))
+    assert problems == []
+    assert connections[0].conversion(1500.0) == pytest.approx(1.5)
 
 
-def test_a_row_that_fills_some_cells_of_a_pantograph_or_none_of_any_is_told():
-    assert half_empty_rows(system(), [], []) == ""
-    found = half_empty_rows(system(), ["train.static_force"], [])
-    assert found.startswith("the table has no value for train.static_force: write one, or leave all cells")
-    found = half_empty_rows(system(), ["train.static_force", "train.start_position"], ["train"])
-    assert found == "the table leaves out every pantograph (train): write the values of one of them"
+def test_suppressed_conversion_leaves_only_the_transformation():
+    connections, _, _ = pair("mm", "m", suppress=True, transformation=Conversion(0.5, 1.0))
+    assert connections[0].conversion(10.0) == pytest.approx(6.0)
+
+
+def test_transformation_comes_after_the_unit_conversion():
+    """SSP 1.0: the linear transformation applies to the value in the target's unit."""
+    connections, _, _ = pair("mm", "m", transformation=Conversion(2.0, 1.0))
+    assert connections[0].conversion(1500.0) == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("units", "text"),
+    [(("N", "m"), "do not measure the same thing"), (("furlong", "m"), "'furlong' is not declared")],
+)
+def test_units_that_do_not_fit_are_refused(units, text):
+    _, _, problems = pair(*units)
+    assert [p.rule for p in problems] == ["unit"]
+    assert text in problems[0].text
+    assert problems[0].line == 7
+
+
+def test_direction_follows_from_the_kinds():
+    connections, _, problems = pair(start=("b", "u"), end=("a", "y"))
+    assert problems == []
+    assert (connections[0].source, connections[0].target) == ("a", "b")
+
+
+@pytest.mark.parametrize(
+    ("connection", "text"),
+    [
+        (wire(start=("c", "y")), "'c' is not a component"),
+        (wire(start=("a", "z")), "declares no connector 'z'"),
+        (wire(start=("", "y")), "belongs to no component"),
+        (wire(start=("b", "u")), "an output must be connected to an input"),
+    ],
+)
+def test_connections_that_lead_nowhere_are_refused(connection, text):
+    a = component("a", [Connector("y", "output", "Real", "", 2)])
+    b = component("b", [Connector("u", "input", "Real", "", 3)])
+    fmus = {"a": fmu(variable("y", "output")), "b": fmu(variable("u", "input"))}
+    _, _, problems = check(structure([a, b], [wire(), connection]), fmus)
+    assert any(text in p.text and p.line == 7 for p in problems)
+
+
+def test_doubly_connected_inputs_are_refused_and_unconnected_ones_told():
+    a = component("a", [Connector("y", "output", "Real", "", 2)])
+    b = component("b", [Connector("u", "input", "Real", "", 3), Connector("w", "input", "Real", "", 4)])
+    fmus = {"a": fmu(variable("y", "output")), "b": fmu(variable("u", "input"), variable("w", "input"))}
+    problems, warnings = [], []
+    checker = ScenarioChecks(structure([a, b], [wire(), wire()]), fmus, problems, warnings)
+    checker.components(checker.connections())
+    assert [(p.line, p.text) for p in problems] == [(3, "input 'b.u' has 2 connections; one is allowed")]
+    told = "input 'b.w' is declared but not connected; it keeps its start value of the FMU"
+    assert [(w.line, w.text) for w in warnings] == [(4, told)]
+
+
+@pytest.mark.parametrize(
+    ("connector", "text"),
+    [
+        (Connector("none", "output", "Real", "", 5), "has no such variable"),
+        (Connector("y", "input", "Real", "", 5), "kind is 'input', in the FMU 'output'"),
+        (Connector("y", "output", "Integer", "", 5), "type is Integer, in the FMU Real"),
+        (Connector("y", "output", "Real", "m", 5), "do not measure the same thing"),
+        (Connector("y", "inout", "Real", "", 5), "'inout' is not supported"),
+    ],
+)
+def test_connectors_must_agree_with_the_fmu(connector, text):
+    _, _, problems = check(structure([component("a", [connector])], []), {"a": fmu(variable("y", "output", "N"))})
+    assert any(text in p.text and p.line == 5 for p in problems)
+
+
+@pytest.mark.parametrize("kind", ["Integer", "Boolean", "String", "Enumeration"])
+def test_variables_of_one_type_can_be_connected(kind):
+    a = component("a", [Connector("y", "output", kind, "", 2)])
+    b = component("b", [Connector("u", "input", "", "", 3)])
+    fmus = {"a": fmu(variable("y", "output", kind=kind)), "b": fmu(variable("u", "input", kind=kind))}
+    connections, _, problems = check(structure([a, b], [wire()]), fmus)
+    assert (len(connections), problems) == (1, [])
+    fmus["b"] = fmu(variable("u", "input"))
+    _, _, problems = check(structure([a, b], [wire()]), fmus)
+    assert ["only variables of the same type can be connected" in p.text for p in problems] == [True]
+
+
+def test_binary_values_are_not_exchanged():
+    a = component("a", [Connector("y", "output", "Binary", "", 2)])
+    b = component("b", [Connector("u", "input", "Binary", "", 3)])
+    _, _, problems = check(structure([a, b], [wire()]), {})
+    assert ["'a.y' is Binary, which cannot be exchanged" in p.text for p in problems] == [True]
+
+
+def parameter(name, value, unit="", kind="Real"):
+    return Parameter(name, kind, value, unit, "parameters.ssv", 11)
+
+
+def parameters_of(given, *variables, prefix="", system=()):
+    binding = [Binding("", ParameterSet("s", tuple(system), {}), 1)] if system else []
+    written = structure([component("a", [], given, prefix)], [], binding)
+    _, components, problems = check(written, {"a": fmu(*variables)})
+    return components[0].parameters, problems
+
+
+def test_parameters_are_converted_to_the_fmus_unit():
+    values, problems = parameters_of([parameter("f", 2.0, "kN")], variable("f", "parameter", "N"))
+    assert problems == []
+    assert values == {"f": 2000.0}
+
+
+def test_a_prefix_is_put_before_the_names():
+    values, problems = parameters_of([parameter("b", 1.0)], variable("a.b", "parameter"), prefix="a.")
+    assert problems == []
+    assert values == {"a.b": 1.0}
+
+
+def test_the_systems_binding_takes_priority():
+    values, problems = parameters_of([parameter("f", 1.0)], variable("f", "parameter"), system=[parameter("a.f", 2.0)])
+    assert problems == []
+    assert values == {"f": 2.0}
+
+
+def test_a_later_binding_takes_priority():
+    first = component("a", [], [parameter("f", 1.0), parameter("g", 5.0)])
+    both = dataclasses.replace(
+        first, bindings=(*first.bindings, Binding("", ParameterSet("q", (parameter("f", 3.0),), {}), 2))
+    )
+    fmus = {"a": fmu(variable("f", "parameter"), variable("g", "parameter"))}
+    _, components, problems = check(structure([both], []), fmus)
+    assert problems == []
+    assert components[0].parameters == {"f": 3.0, "g": 5.0}
+
+
+@pytest.mark.parametrize(
+    ("given", "declared", "text"),
+    [
+        (parameter("x", 1.0), variable("f", "parameter"), "has no such variable"),
+        (parameter("f", 1.0), variable("f", "output"), "causality 'output'"),
+        (parameter("f", 1.0), variable("f", "parameter", variability="constant"), "it is constant"),
+        (
+            parameter("f", 1.0),
+            variable("f", "parameter", kind="Integer"),
+            "written as Real, in the FMU it is Integer",
+        ),
+        (parameter("f", True, kind="Boolean"), variable("f", "parameter"), "written as Boolean"),
+        (parameter("f", 1.0, "m"), variable("f", "parameter", "N"), "do not measure the same thing"),
+        (parameter("f", 1.0), variable("f", "parameter", "N", minimum=2.0), "= 1 N is below its minimum 2"),
+        (
+            parameter("f", 9.0, "kN"),
+            variable("f", "parameter", "N", maximum=800.0),
+            "= 9000 N is above its maximum 800",
+        ),
+    ],
+)
+def test_parameters_that_cannot_be_set_are_refused(given, declared, text):
+    _, problems = parameters_of([given], declared)
+    assert len(problems) == 1
+    assert text in problems[0].text
+    if problems[0].rule != "unit":
+        assert (problems[0].file, problems[0].line) == ("parameters.ssv", 11)
+
+
+def test_system_parameters_of_nobody_are_refused():
+    _, problems = parameters_of([], variable("f", "parameter"), system=[parameter("c.f", 2.0)])
+    assert ["'c.f' belongs to no component" in p.text for p in problems] == [True]
+
+
+def test_component_names_must_differ():
+    a = component("a", [])
+    _, _, problems = check(structure([a, a], []), {"a": fmu()})
+    assert any("is used 2 times" in p.text for p in problems)
+
+
+def test_common_units_are_consistent():
+    """A unit's square check: kN.m / m = kN and so on, by dimension and factor."""
+    assert COMMON["kN.m"].factor == COMMON["kN"].factor * COMMON["m"].factor
+    assert [a + b for a, b in zip(COMMON["N/m"].dimension, COMMON["m"].dimension, strict=True)] == list(
+        COMMON["N"].dimension
+    )
+    assert [a + b for a, b in zip(COMMON["W"].dimension, COMMON["s"].dimension, strict=True)] == list(
+        COMMON["J"].dimension
+    )

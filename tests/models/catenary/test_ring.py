@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from models.catenary.definition.line_definition import read
+from models.catenary.definition.line_reading import read
 from models.catenary.line_energy import LineBalance
 from models.catenary.line_model import CatenaryModel, StripMotion
 from models.catenary.line_part import CatenaryPart
@@ -348,7 +348,7 @@ def test_responses_reach_round_the_seam(ring_maker):
     """Single ones and those of an interval side by side, against whole solutions."""
     ring = CatenaryModel(ring_maker(20))
     factor = factorised(ring.modes.K + 4e6 * ring.modes.M + 2e3 * ring.modes.C)
-    compliance = Compliance(factor, ring.B, ring.dropper_stiffness)
+    compliance = Compliance(factor, ring.dropper_law.B, ring.dropper_law.stiffness)
     n, wraps = factor.matrix.shape[0], 0
     wire = ring.wires[0]
     for x in (1.0, 300.0, 640.0, 998.0):
@@ -361,10 +361,10 @@ def test_responses_reach_round_the_seam(ring_maker):
         assert np.abs(found - whole).max() < 1e-13 * np.abs(whole).max()
         every = np.arange(n)
         assert (columns.at(every) == found).all()
-        stretch = np.zeros((ring.B.shape[0], len(places)))
+        stretch = np.zeros((ring.dropper_law.B.shape[0], len(places)))
         near = columns.dropper_index
-        stretch[near] = columns.dropper_force / ring.dropper_stiffness[near, None]
-        assert np.abs(stretch - ring.B @ whole).max() < 1e-13 * np.abs(whole).max()
+        stretch[near] = columns.dropper_force / ring.dropper_law.stiffness[near, None]
+        assert np.abs(stretch - ring.dropper_law.B @ whole).max() < 1e-13 * np.abs(whole).max()
     assert wraps
 
 
@@ -450,7 +450,7 @@ def test_kernels_go_round_as_numpy_does(ring_maker, cx, monkeypatch):
         monkeypatch.setenv("OPENPANTO_KERNEL", kernel)
         line = CatenaryModel(ring_maker(10))
         record = CoupledModel(line, [cx.with_values({"start_position": 1485.0, "raise_duration": 0.05})]).run(0.4, STEP)
-        assert type(line._step(STEP).stepper).__name__ == {"numpy": "Stepper", "numba": "CompiledStepper"}[kernel]
+        assert type(line._step(STEP).engine).__name__ == {"numpy": "NumpyEngine", "numba": "NumbaEngine"}[kernel]
         records.append(record)
     plain, compiled = records
     assert plain.contact_point[-1, 0, 0] > 1500.0

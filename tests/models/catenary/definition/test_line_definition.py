@@ -4,7 +4,8 @@ import tomllib
 
 import pytest
 
-from models.catenary.definition.line_definition import Rayleigh, load, read
+from models.catenary.definition.line_definition import Rayleigh
+from models.catenary.definition.line_reading import load, read
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError, Table
 from models.library.catalogue import UnknownNameError, line_names, line_path, load_line

@@ -7,7 +7,6 @@ from models.catenary.contact_and_slack.crossing import STRIP_EDGE
 from models.catenary.line_model import CatenaryModel, StripMotion
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics.elasticity import arm_loads
-from models.catenary.step.numpy_engine import local_motion
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import load_line
 
@@ -31,7 +30,7 @@ def pair(section_maker, sections_maker):
 def height(model, section, x):
     wire = model.wires[section]
     element, xi = wire.locate(x)
-    return wire.touch(element, xi).height
+    return wire.interval(element).lift(element, xi)[1]
 
 
 def lateral(model, section, x):
@@ -178,7 +177,7 @@ def test_a_wire_that_is_not_near_would_not_be_met_either(pair):
     for x in (first - 3.0, first - 0.5, first + 5.0, last - 5.0, last + 0.5, last + 3.0):
         strip = np.zeros((2, 2, 3))
         strip[:, 0] = [[x, 0.7, 5.0], [x, -0.7, 5.0]]
-        met = wire.find(strip, lambda i: i.positions(local_motion(i, state.motion)[0]), -1) is not None
+        met = wire.find(strip, lambda i: i.positions(i.local(state.motion)[0]), -1) is not None
         near.append(wire.is_near(strip))
         assert near[-1] or not met
     assert near == [False, True, True, True, True, False]

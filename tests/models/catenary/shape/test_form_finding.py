@@ -146,7 +146,8 @@ def test_dropper_lengths_of_EN_50318_2018():
 
 
 def _lengths_of_LN2(pre_sag_between):
-    line = dataclasses.replace(load_line("LN2"), pre_sag_between=pre_sag_between)
+    line = load_line("LN2")
+    line = dataclasses.replace(line, profile=dataclasses.replace(line.profile, pre_sag_between=pre_sag_between))
     mesh = build_mesh(line)
     x = mesh.points[mesh.droppers[:, 0], 0]
     return find_form(line, mesh).unstrained_length[(x > 501.7) & (x < 551.2)]
@@ -164,7 +165,7 @@ def test_the_printed_lengths_of_LN2_decide_where_its_sag_begins():
     apart = {between: float(np.ptp(_lengths_of_LN2(between))) for between in ("supports", "droppers")}
     assert apart == {"supports": pytest.approx(0.208, abs=1e-3), "droppers": pytest.approx(0.168, abs=1e-3)}
     nearer = min(apart, key=lambda between: abs(apart[between] - 0.175))
-    assert load_line("LN2").pre_sag_between == load_line("LN2_ring").pre_sag_between == nearer
+    assert load_line("LN2").profile.pre_sag_between == load_line("LN2_ring").profile.pre_sag_between == nearer
 
 
 def test_stitch_wire_carries_its_droppers_like_a_string():

@@ -10,9 +10,11 @@ from models.catenary.linear_motion.attachment_solver import CUT, Banded, Sparse,
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.interval_modes import slower_than
 from models.catenary.linear_motion.sparse_products import BlockProduct, Product, TransposedProduct
-from models.catenary.step.engine_choice import kernels, make_stepper
-from models.catenary.step.numba_engine import CompiledStepper
-from models.catenary.step.numpy_engine import Stepper, _by_blocks
+from models.catenary.linear_motion.step_matrices import StepMatrices
+from models.catenary.step.engine_choice import kernels, make_engine
+from models.catenary.step.numba_engine import NumbaEngine
+from models.catenary.step.numpy_engine import NumpyEngine, _by_blocks
+from models.catenary.step.step_engine import AppliedForce
 from models.coupled.monolithic import CoupledModel
 from models.library.catalogue import load_line
 from models.numerics.kernel_cache import KernelError
@@ -132,35 +134,43 @@ def test_a_solution_that_does_not_die_out_is_whole():
     assert values[:, 0] == pytest.approx(splu(matrix.tocsc()).solve(load), rel=1e-9)
 
 
+def _matrices(model, step=1e-3):
+    return StepMatrices(model.modes, Newmark(step))
+
+
+def _compliance(model, matrices):
+    return Compliance(matrices.factor, model.dropper_law.B, model.dropper_law.stiffness)
+
+
 def test_responses_to_unit_loads_are_columns_of_the_inverse(model):
-    now = model._step(1e-3)
+    matrices = _matrices(model)
     interval = model.wires[0].intervals[40]
-    columns = now.compliance.units(interval.ends)
+    columns = _compliance(model, matrices).units(interval.ends)
     everywhere = np.arange(len(model.modes.attached))
     unit = np.eye(len(everywhere))[interval.ends]
-    whole = np.stack([now.stepper.factor.solve(load) for load in unit], axis=1)
+    whole = np.stack([matrices.factor.solve(load) for load in unit], axis=1)
     assert columns.at(everywhere) == pytest.approx(whole, abs=1e-14 * np.abs(whole).max())
-    stretch = np.zeros((len(model.dropper_stiffness), len(interval.ends)))
+    stretch = np.zeros((len(model.dropper_law.stiffness), len(interval.ends)))
     near = columns.dropper_index
-    stretch[near] = columns.dropper_force / model.dropper_stiffness[near, None]
+    stretch[near] = columns.dropper_force / model.dropper_law.stiffness[near, None]
     # Both ends of a dropper may lie where a column is cut.
-    assert stretch == pytest.approx(model.B @ whole, abs=4.0 * CUT * np.abs(whole).max())
+    assert stretch == pytest.approx(model.dropper_law.B @ whole, abs=4.0 * CUT * np.abs(whole).max())
 
 
 def test_what_a_strip_comes_to_is_prepared_one_response_at_a_time(model):
-    now = model._step(1e-3)
+    compliance = _compliance(model, _matrices(model))
     places = model.wires[0].intervals[30].sides[1]
     for count in range(1, len(places) + 1):
-        now.compliance.prepare(places)
-        assert sum(place in now.compliance._kept for place in places.tolist()) == count
+        compliance.prepare(places)
+        assert sum(place in compliance._kept for place in places.tolist()) == count
 
 
 def test_compliance_of_droppers_is_symmetric(model):
-    columns = Compliance(model._step(1e-3).stepper.factor, model.B, model.dropper_stiffness).dropper_columns
+    columns = _compliance(model, _matrices(model)).dropper_columns
     i, j = 20, 22
     response = {}
     for k in (i, j):
-        stretch = columns[k].dropper_force[:, 0] / model.dropper_stiffness[columns[k].dropper_index]
+        stretch = columns[k].dropper_force[:, 0] / model.dropper_law.stiffness[columns[k].dropper_index]
         response[k] = dict(zip(columns[k].dropper_index.tolist(), stretch, strict=True))
     assert response[i][j] == pytest.approx(response[j][i], rel=1e-9)
     assert response[i][i] > abs(response[i][j])
@@ -204,23 +214,29 @@ def compiled_kernels():
     return kernels()
 
 
+def _engines(model, compiled_kernels, step=1e-3):
+    matrices = _matrices(model, step)
+    return NumpyEngine(matrices), NumbaEngine(matrices, compiled_kernels)
+
+
 def test_compiled_steps_are_the_plain_ones(model, compiled_kernels):
-    """Two steppers over one motion each, with forces on an interval and on attachments in every step."""
-    newmark = Newmark(1e-3)
-    steppers = Stepper(model.modes, newmark), CompiledStepper(model.modes, newmark, compiled_kernels)
+    """Two engines over one motion each, with forces on a point of an interval and on attachments in every step."""
+    engines = _engines(model, compiled_kernels)
     rng = np.random.default_rng(2)
     motions = []
-    for _ in steppers:
+    for _ in engines:
         state, _ = _moving(model, 6)
         motions.append(state.motion)
-    span = model.wires[0].intervals[12].modes
+    interval = model.wires[0].intervals[12]
+    columns = _compliance(model, _matrices(model)).units(interval.ends)
+    responses = [engine.response(interval, columns) for engine in engines]
     for _ in range(30):
         pressed = 10.0 * rng.standard_normal(len(model.modes.attached))
-        force = rng.standard_normal(span.stop - span.start)
-        for stepper, motion in zip(steppers, motions, strict=True):
-            stepper.begin(motion, pressed)
-            stepper.press(span, force)
-            stepper.finish(motion)
+        force, known = 100.0 * rng.standard_normal(2)
+        for engine, response, motion in zip(engines, responses, motions, strict=True):
+            engine.begin(motion, pressed.copy(), [AppliedForce(response, interval.first + 1, 0.7, known)])
+            engine.apply(response.point(interval.first, 0.3), force)
+            engine.finish(motion)
     for name in ("modal", "momentum", "attached"):
         plain, compiled = (getattr(motion, name) for motion in motions)
         for one, other in zip(np.atleast_2d(plain), np.atleast_2d(compiled), strict=True):
@@ -228,23 +244,21 @@ def test_compiled_steps_are_the_plain_ones(model, compiled_kernels):
 
 
 def test_a_step_that_was_prepared_is_forgotten_when_the_step_size_changes(model, compiled_kernels):
-    """Back and forth between step sizes, against the plain stepper."""
-    sizes = [Newmark(h) for h in (1e-3, 0.5e-3)]
-    plain = [Stepper(model.modes, n) for n in sizes]
-    compiled = [CompiledStepper(model.modes, n, compiled_kernels) for n in sizes]
+    """Back and forth between step sizes, against the plain engine."""
+    plain, compiled = zip(*(_engines(model, compiled_kernels, h) for h in (1e-3, 0.5e-3)), strict=True)
     motions = [_moving(model, 7)[0].motion for _ in range(2)]
     still = np.zeros(len(model.modes.attached))
     for n in range(20):
-        for steppers, motion in zip((plain, compiled), motions, strict=True):
-            steppers[n % 3 // 2].begin(motion, still)
-            steppers[n % 3 // 2].finish(motion)
+        for engines, motion in zip((plain, compiled), motions, strict=True):
+            engines[n % 3 // 2].begin(motion, still)
+            engines[n % 3 // 2].finish(motion)
     assert motions[1].modal[0] == pytest.approx(motions[0].modal[0], abs=1e-11 * np.abs(motions[0].modal[0]).max())
 
 
 def test_a_compiled_step_goes_on_from_a_snapshot_bit_for_bit(model, compiled_kernels, monkeypatch):
     monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
     fresh = CatenaryModel(model.definition)
-    assert isinstance(fresh._step(1e-3).stepper, CompiledStepper)
+    assert isinstance(fresh._step(1e-3).engine, NumbaEngine)
     state, _ = _moving(fresh, 8)
     for _ in range(5):
         fresh.step(state, 1e-3, _far())
@@ -257,18 +271,18 @@ def test_a_compiled_step_goes_on_from_a_snapshot_bit_for_bit(model, compiled_ker
 
 
 def test_kernels_can_be_left_out_or_insisted_on(model, monkeypatch):
-    newmark = Newmark(1e-3)
+    matrices = _matrices(model)
     monkeypatch.setenv("OPENPANTO_KERNEL", "numpy")
-    assert type(make_stepper(model.modes, newmark)) is Stepper
+    assert type(make_engine(matrices)) is NumpyEngine
     monkeypatch.setenv("OPENPANTO_KERNEL", "cuda")
     with pytest.raises(KernelError, match="'cuda'; use auto, numpy or numba"):
-        make_stepper(model.modes, newmark)
+        make_engine(matrices)
     monkeypatch.setattr("models.numerics.kernel_cache.importlib.util.find_spec", lambda _: None)
     monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
     with pytest.raises(KernelError, match="numba is not installed"):
-        make_stepper(model.modes, newmark)
+        make_engine(matrices)
     monkeypatch.setenv("OPENPANTO_KERNEL", "auto")
-    assert type(make_stepper(model.modes, newmark)) is Stepper
+    assert type(make_engine(matrices)) is NumpyEngine
 
 
 def test_a_whole_run_is_the_same_with_and_without_kernels(short_line, cx, compiled_kernels, monkeypatch):

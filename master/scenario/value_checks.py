@@ -1,0 +1,117 @@
+"""What the numbers of a scenario rule out before anything is run.
+
+A stop time that does not cover the interval of interest, a pantograph that starts beyond it or that nothing lifts. The
+master knows no physics but what FMUs show: a pantograph whose FMU has the parameters ``speed`` and ``start_position``,
+as ours have, is at ``start_position + speed (t - start)``. Of others nothing is said here; what their run has covered
+is seen at its end (`master.evaluation.interval_coverage`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from master.system.components import Component, System
+from master.system.pantograph_motion import final_position, pantographs, parameter_value
+from master.system.step_rounding import ROUNDING
+
+#: What a run goes on for after the last pantograph has left the interval [s]: the filter looks that far ahead, and the
+#: waves that supports are lifted by leave late.
+AFTER_INTERVAL: Final = 0.5
+#: Parameters that lift a pantograph, in N or N.m.
+_LIFTS: Final = ("static_force", "static_moment")
+
+
+def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
+    """Yield what cannot be meant, a sentence each.
+
+    Parameters
+    ----------
+    may_stop_early : bool
+        Whether the run may end before the interval of interest does, because the user has said so.
+    """
+    for pantograph in pantographs(system):
+        yield from _idle(pantograph)
+        if not may_stop_early:
+            yield from _uncovered(system, pantograph)
+
+
+def empty_cells(system: System, names: Sequence[str]) -> str:
+    """Return what is wrong with parameters that a table has no value for, empty if they are not the line's.
+
+    A pantograph without values takes no part in a variant; without its line nothing is left to run.
+    """
+    lines = {c.catenary for c in system.contacts}
+    found = [name for name in names if any(name.startswith(f"{line}.") for line in lines)]
+    return f"the table has no value for {', '.join(found)}: write one into every row" if found else ""
+
+
+def half_empty_rows(system: System, empty: Sequence[str], absent: Sequence[str]) -> str:
+    """Return what is wrong with a table's row that fills some cells of a pantograph, or none of any pantograph.
+
+    A pantograph without values takes no part; one with some would run with the scenario's values for the others, and
+    without any pantograph there is nothing to tell of a run.
+    """
+    trains = [p.name for p in pantographs(system)]
+    half = [name for name in empty if name.partition(".")[0] in trains and name.partition(".")[0] not in absent]
+    if half:
+        return f"the table has no value for {', '.join(half)}: write one, or leave all cells of that pantograph empty"
+    if trains and all(name in absent for name in trains):
+        return f"the table leaves out every pantograph ({', '.join(trains)}): write the values of one of them"
+    return ""
+
+
+def stop_after_interval(system: System) -> float | str:
+    """Return the stop time at which the last pantograph has left the interval of interest [s], or why there is none.
+
+    It is a whole number of steps after the start, `AFTER_INTERVAL` after the last pantograph has passed the end.
+    """
+    end = system.settings.interval.end
+    if end is None:
+        return "the interval of interest has no end that the run could go on until; give it one, or a stop time"
+    found = pantographs(system)
+    if not found:
+        return "no pantograph is told a contact force whose run could go on until the interval ends; give a stop time"
+    times = []
+    for pantograph in found:
+        start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
+        if start is None or speed is None:
+            return f"the FMU of '{pantograph.name}' tells no start_position and speed: give a stop time"
+        if speed <= 0.0:
+            return f"{pantograph.name}.speed = {speed:g} m/s never leads to the end of the interval, {end:g} m"
+        times.append((end - start) / speed)
+    steps = math.ceil((max(0.0, *times) + AFTER_INTERVAL) / system.step - ROUNDING)
+    return system.start + steps * system.step
+
+
+def _idle(pantograph: Component) -> Iterator[str]:
+    for name in _LIFTS:
+        value = parameter_value(pantograph, name)
+        if value is not None and value <= 0.0:
+            unit = pantograph.fmu.variables[name].unit
+            yield f"{pantograph.name}.{name} = {value:g} {unit} never lifts the strip to the wire: give it more than 0"
+
+
+def _uncovered(system: System, pantograph: Component) -> Iterator[str]:
+    interval, last = system.settings.interval, final_position(system, pantograph)
+    start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
+    if last is None or start is None or speed is None:
+        return
+    stride = speed * system.step
+    if interval.start is not None and start > interval.start + stride:
+        yield (
+            f"'{pantograph.name}' starts at {start:g} m, beyond the start of the interval of interest, "
+            f"{interval.start:g} m: give it an earlier start_position, or the interval a later start"
+        )
+    elif interval.end is not None and last < interval.end - stride:
+        where = f"'{pantograph.name}' at {last:.6g} m, before the end of the interval of interest, {interval.end:g} m"
+        cure = _cure(system, start, speed, interval.end)
+        yield f"the run ends at {system.stop:g} s with {where}: {cure}, or run a part of it with --stop"
+
+
+def _cure(system: System, start: float, speed: float, end: float) -> str:
+    if speed <= 0.0:
+        return f"its speed is {speed:g} m/s"
+    needed = system.start + math.ceil(10.0 * (end - start) / speed) / 10.0
+    return f'stop at {needed:g} s or later, or write until="end" into Interval'

@@ -1,0 +1,112 @@
+"""Reading a line's definition file, and checking what its tables say of one another."""
+
+from __future__ import annotations
+
+import dataclasses
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from models.catenary.definition.line_definition import (
+    LINE_TYPES,
+    CatenaryDefinition,
+    Section,
+)
+from models.catenary.definition.section_reading import read_section
+from models.definition_files import field_schema
+from models.definition_files.toml_reader import Table
+
+
+def load(path: Path) -> CatenaryDefinition:
+    """Read a line's definition file.
+
+    Raises
+    ------
+    DefinitionError
+        With every mistake found in the file.
+    """
+    return read(Table.load(path))
+
+
+def read(table: Table) -> CatenaryDefinition:
+    """Read a line's definition from a parsed table; raises ``DefinitionError``."""
+    line = field_schema.read(CatenaryDefinition, table, sections=(), provenance=table.provenance)
+    has_arms, has_hangers = line.steady_arm is not None, line.type == "compound"
+    tables = table.tables("section") or [table]
+    sections = tuple(read_section(t, has_arms=has_arms, has_hangers=has_hangers) for t in tables)
+    definition = dataclasses.replace(line, sections=sections)
+    for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic):
+        check(table, definition)
+    table.finish()
+    return definition
+
+
+def _check_stitch(table: Table, definition: CatenaryDefinition) -> None:
+    stitch = definition.stitch_wire
+    if stitch is None:
+        return
+    if stitch.tension >= definition.messenger_wire.tension:
+        table.problem("stitch_wire.tension", "must be less than that of the messenger wire, which it relieves")
+    for section in definition.sections:
+        _check_stitch_length(table, section, stitch.length)
+
+
+def _check_stitch_length(table: Table, section: Section, length: float) -> None:
+    """Stitch wires must not meet, and must carry droppers on both sides of every support."""
+    half = length / 2.0
+    supports = [s.x for s in section.supports]
+    if any(b - a <= length for a, b in pairwise(supports)):
+        table.problem("stitch_wire.length", f"{length:g} m: the stitch wires of neighbouring supports overlap")
+        return
+    first, last = section.ends.working
+    droppers = sorted(x for span in section.spans for x in span.droppers)
+    for support in (x for x in supports[1:-1] if first <= x <= last):
+        left = _any_between(droppers, support - half, support)
+        if not (left and _any_between(droppers, support, support + half)):
+            text = f"{length:g} m: no dropper hangs on one half of the stitch wire at {support:g} m"
+            table.problem("stitch_wire.length", text)
+            return
+
+
+def _any_between(x: Sequence[float], low: float, high: float) -> bool:
+    """Whether one of the values, in rising order, lies between two others."""
+    after = bisect_right(x, low)
+    return after < len(x) and x[after] < high
+
+
+def _check_auxiliary(table: Table, definition: CatenaryDefinition) -> None:
+    profile = definition.profile
+    height = profile.auxiliary_height
+    if height is not None and height >= profile.encumbrance:
+        text = f"{height:g} m: the auxiliary wire must lie below the encumbrance, {profile.encumbrance:g} m"
+        table.problem("profile.auxiliary_height", text)
+
+
+def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:
+    """A line that closes on itself is one section of wires that something holds, and none of them crosses the seam."""
+    if not any(section.periodic for section in definition.sections):
+        return
+    if len(definition.sections) > 1:
+        text = f"{len(definition.sections)} sections: a periodic line has one; write one section, or no 'periodic'"
+        table.problem("section", text)
+    if definition.steady_arm is None:
+        text = "a periodic line needs a table [steady_arm]: it has no anchors, and nothing else holds the contact wire"
+        table.problem("steady_arm", text)
+    if definition.stitch_wire is not None:
+        text = "a periodic line cannot have stitch wires: that of its first support would lie across the place where it"
+        table.problem("stitch_wire", f"{text} closes; take type 'simple' or 'compound'")
+
+
+def _check_type(table: Table, definition: CatenaryDefinition) -> None:
+    if definition.type not in LINE_TYPES:
+        return  # said already
+    stitched, compound = definition.type == "stitched", definition.type == "compound"
+    if stitched != (definition.stitch_wire is not None):
+        table.problem("stitch_wire", "a table [stitch_wire] is needed for type 'stitched', and only for it")
+    if compound != (definition.auxiliary_wire is not None):
+        table.problem("auxiliary_wire", "a table [auxiliary_wire] is needed for type 'compound', and only for it")
+    if compound != table.has("hanger"):
+        table.problem("hanger", "a table [hanger] is needed for type 'compound', and only for it")
+    if compound != (definition.profile.auxiliary_height is not None):
+        table.problem("profile.auxiliary_height", "is needed for type 'compound', and only for it")

@@ -1,0 +1,134 @@
+"""Names and files that FMUs are made of, the hash of their sources, and the mark that says whose an FMU is."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+
+import pytest
+
+from fmus.__main__ import main
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import MARK, BuildError, content_hash, fingerprint, recipe
+from master.fmu import fmu_provision
+from models.library.catalogue import line_path, pantograph_path
+from tests.fmus.support import Instance, toy_recipe, toy_variant
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Definitions of a user: a line and two kinds of pantograph."""
+    folder = tmp_path / "my definitions"
+    folder.mkdir()
+    shutil.copy(line_path("C270"), folder / "Mine.toml")
+    shutil.copy(pantograph_path("CX"), folder / "Light.toml")
+    shutil.copy(pantograph_path("CX_multibody"), folder / "Bodies.toml")
+    return folder
+
+
+def test_a_file_becomes_an_fmu_of_its_name(own, tmp_path, capsys):
+    words = [str(own / f"{name}.toml") for name in ("Light", "Bodies")]
+    assert main(["build", *words, "--out", str(tmp_path / "out")]) == 0
+    built = [tmp_path / "out" / f"Pantograph_{name}.fmu" for name in ("Light", "Bodies")]
+    assert capsys.readouterr().out.split() == [str(path) for path in built]
+    instance = Instance(built[0])
+    instance.initialise(**{"contact.force": 100.0})
+    instance.step(0.0)
+    assert instance["A.z"] < 5.02
+    instance.free()
+
+
+def test_a_line_gets_as_many_ports_as_wanted(own, tmp_path, capsys):
+    assert main(["build", str(own / "Mine.toml"), "--pantographs", "2", "--out", str(tmp_path)]) == 0
+    path = tmp_path / "Catenary_Mine_P2.fmu"
+    assert capsys.readouterr().out.strip() == str(path)
+    assert main(["fingerprint", "--pantographs", "2", str(own / "Mine.toml")]) == 0
+    guid = capsys.readouterr().out.strip()
+    mark = fmu_provision.read_mark(path)
+    assert (mark["guid"], mark["definition"], mark["pantographs"]) == (guid, "my definitions/Mine.toml", "2")
+    assert fmu_provision.why_not_ours(path) == ""
+
+
+def test_the_guid_follows_the_file_and_not_its_place(own, tmp_path):
+    path = own / "Light.toml"
+    before = fingerprint(recipe(str(path)))
+    (tmp_path / "other").mkdir()
+    shutil.copy(path, tmp_path / "other")
+    assert fingerprint(recipe(str(tmp_path / "other" / "Light.toml"))) == before
+    path.write_text(path.read_text().replace("168", "170"))
+    assert fingerprint(recipe(str(path))) != before
+
+
+def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
+    path, said = build(recipe(str(own / "Light.toml")), tmp_path), []
+    assert fmu_provision.provide_fmu(path, said.append) == path
+    assert said == []
+    (own / "Light.toml").write_text((own / "Light.toml").read_text().replace("168", "170"))
+    fmu_provision.provide_fmu(path, said.append)
+    assert said == ["building Pantograph_Light.fmu again: its sources have changed"]
+    assert fmu_provision.stored_guid(path) == fingerprint(recipe(str(own / "Light.toml")))
+    fmu_provision.provide_fmu(path, said.append)
+    assert len(said) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("none.toml", None, "cannot be read (No such file or directory)"),
+        ("broken.toml", "type = ", "is not a TOML file"),
+        ("other.toml", 'type = "boat"', "defines neither a line"),
+        ("two words.toml", 'type = "lumped"', "may hold letters, digits and _ only"),
+        ("b\u00fcgel.toml", 'type = "lumped"', "may hold letters, digits and _ only"),
+        ("empty.toml", 'type = "lumped"', "Pantograph_empty cannot be built"),
+    ],
+)
+def test_what_is_no_definition_is_refused_in_words(tmp_path, capsys, name, text, said):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    assert main(["build", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
+
+
+def test_a_pantograph_has_no_ports(own):
+    with pytest.raises(BuildError, match="only lines have pantograph ports"):
+        recipe(str(own / "Light.toml"), 2)
+
+
+def test_the_mark_holds_the_hash_of_all_other_files(tmp_path):
+    with zipfile.ZipFile(build(recipe("Pantograph_CX"), tmp_path)) as file:
+        files = {name: file.read(name) for name in file.namelist()}
+    mark = dict(line.split("=", 1) for line in files[MARK].decode().splitlines())
+    assert mark["content"] == content_hash(files)
+    assert content_hash({**files, "resources/definition.toml": b""}) != mark["content"]
+    assert "definition" not in mark  # of the library
+
+
+def test_fingerprint_is_the_guid(instantiate):
+    assert instantiate().description.guid == fingerprint(toy_recipe())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "file"),
+    [
+        ("GAIN = 1.0", "GAIN = 2.0", "law.py"),
+        ("choice: round", "Table 2", "toy.toml"),
+        ("not used", "of no use", "slave.py"),
+    ],
+)
+def test_any_change_of_sources_changes_the_fingerprint(tmp_path, old, new, file):
+    assert fingerprint(toy_recipe(toy_variant(tmp_path, old, new, file))) != fingerprint(toy_recipe())
+
+
+def test_unknown_name_lists_the_known_ones(tmp_path, capsys):
+    assert main(["build", "Catenary_LN2", "Catenary_Nowhere", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("error: There is no FMU 'Catenary_Nowhere'; known are")
+    assert "Catenary_LN2" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_list_names_every_definition(capsys):
+    assert main(["list"]) == 0
+    assert "Catenary_LN2" in capsys.readouterr().out.split()

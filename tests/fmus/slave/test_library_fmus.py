@@ -1,0 +1,74 @@
+"""The FMUs of the library: valid, complete, restorable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import fingerprint, known_names, recipe
+from tests.fmus.support import Instance, names_of, run
+
+READY = [name for name in known_names() if "Catenary" not in name or find_spec("models.catenary.line_part")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fmus")
+
+
+@pytest.fixture(scope="module", params=READY)
+def fmu(request: pytest.FixtureRequest, folder: Path) -> Path:
+    return build(recipe(request.param), folder)
+
+
+@pytest.fixture
+def instance(fmu: Path) -> Iterator[Instance]:
+    made = Instance(fmu)
+    yield made
+    made.free()
+
+
+def test_fmpy_finds_no_problems(fmu):
+    assert validate_fmu(str(fmu)) == []
+
+
+def test_every_real_has_a_unit_and_every_variable_a_description(fmu):
+    description = fmpy.read_model_description(str(fmu))
+    for variable in description.modelVariables:
+        assert variable.description
+        assert variable.unit or variable.type != "Real"
+
+
+def test_identity_is_the_content(fmu):
+    assert fmpy.read_model_description(str(fmu)).guid == fingerprint(recipe(fmu.stem))
+
+
+def test_saved_state_continues_bit_for_bit_here_and_elsewhere(instance, fmu):
+    observed = names_of(instance, "output", "local")
+    instance.initialise()
+    run(instance, range(20), observed)
+    data = instance.slave.serializeFMUstate(instance.slave.getFMUstate())
+    first = run(instance, range(20, 50), observed)
+    other = Instance(fmu)
+    other.slave.setFMUstate(other.slave.deSerializeFMUstate(data))
+    assert run(other, range(20, 50), observed) == first
+    instance.slave.setFMUstate(instance.slave.deSerializeFMUstate(data))
+    assert run(instance, range(20, 50), observed) == first
+    assert first[0] != first[-1]
+    other.free()
+
+
+def test_outputs_at_the_end_of_initialization_are_those_before(instance):
+    computed = names_of(instance, "output", "local", "calculatedParameter")
+    instance.slave.setupExperiment(startTime=0.0)
+    instance.slave.enterInitializationMode()
+    before = instance.get(computed)
+    instance.slave.exitInitializationMode()
+    assert instance.get(computed) == before
+    assert not instance.messages

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
@@ -166,6 +167,14 @@ def plain_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
         table.add_column(escape(head), justify="right" if i else "left")
     for row in rows:
         table.add_row(*map(escape, row))
+    return table
+
+
+def ruled_table(title: str, caption: str = "", width: int = 80) -> Table:
+    """Return an empty table without a frame, its head underlined, for a terminal of a width."""
+    table = Table(title=escape(title) or None, caption=escape(caption) or None, box=SIMPLE_HEAD, width=width - 1)
+    table.title_justify = table.caption_justify = "left"
+    table.pad_edge = False
     return table
 
 

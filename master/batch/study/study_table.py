@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, Literal
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -13,8 +12,10 @@ from rich.table import Table
 from master.batch.study.family import Family, Interval
 from master.batch.study.study_evaluation import StudyEntry
 from master.batch.study.study_outcome import StudyOutcome, differences, filter_remarks, filters, judged_by, shown
+from master.report.result_tables import ruled_table
 
-_WIDTH: Final = 80
+#: Heads of columns that hold words.
+_TEXTS: Final = ("variant", "less", "study", "variants", "what")
 _SIGMA: Final = "\u03c3"
 _FIGURE_HEADS: Final = (*("variant", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),)
 
@@ -40,7 +41,8 @@ def show(console: Console, outcome: StudyOutcome) -> None:
 def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: StudyOutcome) -> Table:
     """Return the statistics of all pantographs; yellow where a limit is not kept."""
     where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
-    table = _table(f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
+    title = f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]"
+    table = _table(title, _FIGURE_HEADS, _failing(found, judged_by(outcome.done)))
     for e in found:
         q = e.assessment.quality
         numbers = (q.mean, q.sigma, q.sigma_share, q.maximum, q.minimum, q.statistical_minimum)
@@ -49,7 +51,6 @@ def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: Stud
         slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
         style = "" if e.assessment.passed else "yellow"
         table.add_row(_name(e), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
-    table.caption, table.caption_justify = escape(_failing(found, judged_by(outcome.done))), "left"
     return table
 
 
@@ -105,15 +106,11 @@ def list_table(families: Sequence[Family]) -> Table:
     return table
 
 
-def _table(title: str, heads: Sequence[str]) -> Table:
-    table = Table(
-        title=escape(title) if title else None, title_justify="left", width=_WIDTH - 1, box=SIMPLE_HEAD, pad_edge=False
-    )
-    texts = ("variant", "less", "study", "variants", "what")
+def _table(title: str, heads: Sequence[str], caption: str = "") -> Table:
+    table = ruled_table(title, caption)
     for head in heads:
-        is_text = head in texts
-        table.add_column(
-            head, justify="left" if is_text else "right", no_wrap=not is_text, ratio=1 if head == "variant" else None
-        )
+        is_text = head in _TEXTS
+        justify: Literal["left", "right"] = "left" if is_text else "right"
+        table.add_column(head, justify=justify, no_wrap=not is_text, ratio=1 if head == "variant" else None)
     table.padding = (0, 0)
     return table

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -13,6 +12,7 @@ from rich.table import Table
 from master.batch.verification.case import Case
 from master.batch.verification.judgement import Judged, Verdict
 from master.batch.verification.verification_outcome import CaseOutcome, count_verdicts
+from master.report.result_tables import ruled_table
 
 _STYLES: Final[dict[Verdict, str]] = {
     "holds": "green",
@@ -37,16 +37,8 @@ def show_case(console: Console, outcome: CaseOutcome) -> None:
 
 def case_table(outcome: CaseOutcome, width: int) -> Table:
     """Return a case's rows as a table."""
-    title = escape(f"{outcome.case.name}: {outcome.case.title}")
-    table = Table(
-        title=title,
-        title_justify="left",
-        width=min(width, 120) - 1,
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-        caption=escape(count_verdicts((outcome,))),
-        caption_justify="left",
-    )
+    title = f"{outcome.case.name}: {outcome.case.title}"
+    table = ruled_table(title, count_verdicts((outcome,)), min(width, 120))
     for head in _HEADS:
         table.add_column(head, no_wrap=head in _NUMBERS, justify="right" if head == "computed" else "left")
     several = len(outcome.case.runs) > 1

@@ -1,4 +1,4 @@
-"""A study on the terminal, 80 columns wide."""
+"""The tables of a study for a terminal 80 columns wide."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from master.batch.study.study_evaluation import StudyEntry
 from master.batch.study.study_outcome import StudyOutcome, differences, filter_remarks, filters, judged_by, shown
 from master.report.result_tables import ruled_table
 
-#: Heads of columns that hold words.
-_TEXTS: Final = ("variant", "less", "study", "variants", "what")
+#: Heads of the columns that hold words.
+_TEXTS: Final = ("variant", "compared with", "study", "variants", "title")
 _SIGMA: Final = "\u03c3"
 _FIGURE_HEADS: Final = (*("variant", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),)
 
 
 def show(console: Console, outcome: StudyOutcome) -> None:
-    """Print a study: figures and differences for each interval, then the changes of wire, then what failed."""
+    """Print a study: figures and differences for each interval, changes of wire, and what failed."""
     for interval in outcome.family.settings.interval:
         found = outcome.entries(interval)
         if found:
@@ -39,7 +39,7 @@ def show(console: Console, outcome: StudyOutcome) -> None:
 
 
 def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: StudyOutcome) -> Table:
-    """Return the statistics of all pantographs; yellow where a limit is not kept."""
+    """Return the statistics of all pantographs; rows are yellow where a limit is not met."""
     where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
     title = f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]"
     table = _table(title, _FIGURE_HEADS, _failing(found, judged_by(outcome.done)))
@@ -63,7 +63,7 @@ def _name_of(e: StudyEntry) -> str:
 
 
 def _failing(found: Sequence[StudyEntry], title: str) -> str:
-    """Return which limits are not kept, and by whom."""
+    """Return which limits are not met, and by which pantographs."""
     failing: dict[str, list[str]] = {}
     for e in found:
         for criterion in e.assessment.criteria:
@@ -79,15 +79,18 @@ def _failing(found: Sequence[StudyEntry], title: str) -> str:
 
 
 def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, float]]]) -> Table:
-    """Return what stands beside what."""
-    table = _table("less the one ahead, and less the single one [N]", ("variant", "less", _SIGMA, "max", "min"))
+    """Return the differences between pantographs."""
+    table = _table(
+        "differences from the pantograph ahead and from the single one [N]",
+        ("variant", "compared with", _SIGMA, "max", "min"),
+    )
     for variant, pantograph, other, change in rows:
         table.add_row(escape(f"{variant}, {pantograph}"), escape(other), *(f"{d:+.1f}" for d in change))
     return table
 
 
 def sharing_table(found: Sequence[StudyEntry]) -> Table:
-    """Return how the strips pass from wire to wire."""
+    """Return the passages of the strips from wire to wire."""
     heads = ("variant", "from m", "to m", "s", "losses per wire", "least total N")
     table = _table("From wire to wire: both touched", heads)
     for e in found:
@@ -98,8 +101,8 @@ def sharing_table(found: Sequence[StudyEntry]) -> Table:
 
 
 def list_table(families: Sequence[Family]) -> Table:
-    """Return families with their variants."""
-    table = _table("", ("study", "variants", "what"))
+    """Return the studies with their variants."""
+    table = _table("", ("study", "variants", "title"))
     for family in families:
         names = "\n".join(v.name for v in family.variants)
         table.add_row(escape(family.name), escape(names), escape(family.settings.title))

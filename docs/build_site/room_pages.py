@@ -28,7 +28,8 @@ def page(root: Path, room: str, modules: list[str]) -> str:
     """Return a room's page: its duty, then every module, documented by mkdocstrings."""
     init = root.joinpath(*room.split("."), "__init__.py").read_text(encoding="utf-8")
     duty = ast.get_docstring(ast.parse(init)) or ""
-    parts = [f"# {room}", "", duty.partition("\n\n")[0], ""]
+    # Of what a reader looks for the rooms come last.
+    parts = ["---", "search:", "  boost: 0.3", "---", "", f"# {room}", "", duty.partition("\n\n")[0], ""]
     for module in modules:
         parts += [f"::: {module}", ""]
     return "\n".join(parts)

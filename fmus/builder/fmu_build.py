@@ -36,7 +36,7 @@ hold(globals())
 
 
 class {name}({base}):
-    """The adapter, with what is special about this FMU."""
+    """The adapter, with what is particular to this FMU."""
 
     fingerprint = "{fingerprint}"
     description = {title!r}
@@ -55,7 +55,7 @@ def build(wanted: Recipe, folder: Path, loader: bool = True, runtime: Mapping[st
     wanted : Recipe
     folder : Path
     loader : bool
-        Whether our loader is to stand before pythonfmu's Linux library; where it cannot be had, it does not.
+        Whether to put our loader in front of pythonfmu's Linux library, where it is to be had.
     runtime : mapping, optional
         The Python that the FMU is to bring along (``fmus.loader.runtime``): path -> content.
 
@@ -75,7 +75,7 @@ def build(wanted: Recipe, folder: Path, loader: bool = True, runtime: Mapping[st
 
 
 def _write_atomically(path: Path, data: bytes) -> None:
-    """Write the file beside its place, of any process's own name there, and put it in its place when it is whole."""
+    """Write a file beside its place, under a name that no other process takes, and rename it once it is whole."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".tmp")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -160,7 +160,7 @@ def why_no_loader() -> str:
 
 
 def _origin(wanted: Recipe, folder: Path) -> dict[str, str]:
-    """Return where a user's definition lies, seen from the FMU: so that it is known to be stale when that changes."""
+    """Return where a user's definition lies, relative to the FMU, which is stale once that file changes."""
     if not wanted.is_own:
         return {}
     path = wanted.definition.resolve()
@@ -214,7 +214,7 @@ def _script(wanted: Recipe, sources: FmuSources) -> str:
 
 
 def _describe(wanted: Recipe, sources: FmuSources, script: str, resources: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return model description and page, made by the packed sources themselves: so they are known to import."""
+    """Return model description and page, made by the packed sources themselves, which shows that they import."""
     with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
         for name, data in resources.items():
             path = Path(folder) / name
@@ -231,7 +231,7 @@ def _describe(wanted: Recipe, sources: FmuSources, script: str, resources: Mappi
 def _instance(wanted: Recipe, script: str, folder: str) -> Any:
     try:
         slave_class = getattr(importlib.import_module(script), wanted.name)
-        with redirect_stderr(io.StringIO()):  # an adapter tells hosts there what is raised here as well
+        with redirect_stderr(io.StringIO()):  # an adapter reports there, for hosts, what it raises here
             return slave_class(instance_name=wanted.name, resources=folder)
     except Exception as error:
         # The user's file, not the copy of it that is gone by now.
@@ -253,13 +253,13 @@ def _page(wanted: Recipe, sources: FmuSources, slave: Any) -> bytes:
 
 @contextmanager
 def _importable(folder: str, names: tuple[str, ...]) -> Iterator[None]:
-    """Make a folder's modules importable for a while, and forget them afterwards: their files go away."""
+    """Make a folder's modules importable for a while; forget them afterwards, since their files go away."""
     no_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     sys.path.insert(0, folder)
     try:
         yield
     finally:
-        with suppress(ValueError):  # the script takes it away itself
+        with suppress(ValueError):  # the script removes it itself
             sys.path.remove(folder)
         sys.dont_write_bytecode = no_bytecode
         for name in [n for n in sys.modules if n.partition(".")[0] in names]:

@@ -51,7 +51,7 @@ class BuildError(ValueError):
 
 
 class UnknownFmuError(BuildError):
-    """No FMU of this name; lists those that there are."""
+    """No FMU has this name; lists those that exist."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Recipe:
     roots : mapping
         Packages that are carried along, and their folders.
     is_own : bool
-        Whether the definition is a file of the user's, not of the library: the FMU remembers where it lay.
+        Whether the definition is the user's file rather than one of the library: the FMU remembers where it lay.
     """
 
     name: str
@@ -181,7 +181,7 @@ def fingerprint(wanted: Recipe) -> str:
 
 
 def content_hash(files: Mapping[str, bytes]) -> str:
-    """Return a SHA-256 of an FMU's files but the mark, which holds it: of an FMU that nobody changed by hand."""
+    """Return a SHA-256 of an FMU's files except the mark, which holds it: so a change made by hand is seen."""
     return _digest({name: data for name, data in files.items() if name != MARK})
 
 
@@ -195,7 +195,7 @@ def _definition(folder: str, name: str) -> Path | None:
 
 
 def _head(path: Path) -> dict[str, str]:
-    """Return the plain texts of a definition; a file that cannot be read has none, the build says why."""
+    """Return the plain texts of a definition; a file that cannot be read passes here, as the build says why."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -26,7 +26,7 @@ from master.system.components import System
 
 def add_calibrate(verbs: Any) -> None:
     """Declare ``calibrate`` and its options."""
-    text = "find the parameter value that gives the wanted mean force and store it in the scenario"
+    text = "find the parameter value that gives the wanted mean force, and store it in the scenario"
     parser = add_verb(verbs, "calibrate", text, _calibrate, scenario=True)
     add_overrides(parser)
     parser.add_argument(
@@ -83,7 +83,9 @@ def _task(options: argparse.Namespace, system: System) -> Calibration:
     parameter = options.parameter or (known.parameter if known else None)
     mean = options.mean or (known.mean_force if known else None)
     if parameter is None or mean is None:
-        raise RequestError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
+        raise RequestError(
+            "the scenario does not say what to calibrate to which mean force; give --parameter and --mean"
+        )
     tolerance = options.tolerance or (known.tolerance if known else 0.1)
     return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
 
@@ -107,11 +109,13 @@ def _trial(system: System, task: Calibration, value: float) -> float:
             if assessment.quality.contact == task.contact:
                 say(f"{task.parameter} = {value:.6g}: mean force {assessment.quality.mean:.3f} N")
                 return assessment.quality.mean
-    raise MasterError(f"contact {task.contact} has no figures in the interval of interest; nothing to calibrate on")
+    raise MasterError(
+        f"contact {task.contact} has no figures in the interval of interest; so there is nothing to calibrate"
+    )
 
 
 def _place(package: Package, parameter: str) -> tuple[Path, str]:
-    """Return the ``.ssv`` file that holds a parameter, and its name there."""
+    """Return the ``.ssv`` file that holds a parameter, and the name of the parameter there."""
     if not package.writable:
         raise RequestError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
     structure = read_structure(Sources(package.root), Reader(SSD_NAME))

@@ -1,4 +1,4 @@
-"""What ``summary.json`` says of a run."""
+"""The contents of ``summary.json``: what a run was, how it ended, what it took, its figures."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ from master.recording.continuation import Continuation
 from master.results.results_folder import FORMAT, GENERATOR
 from master.results.run_results import Results
 from master.system.components import Component, System, Variable
-from master.system.contacts import find_contacts
 
 
 def describe(system: System, run: str) -> dict[str, Any]:
-    """Return what is known of a run when it begins: which it is, its settings, components and contacts."""
+    """Return what is known of a run at its beginning: identity, settings, components and contacts."""
     return {
         "generator": GENERATOR,
         "format": FORMAT,
@@ -39,7 +38,7 @@ def describe(system: System, run: str) -> dict[str, Any]:
             **system.settings.model_dump(mode="json"),
         },
         "components": [_component(c) for c in system.components],
-        "contacts": [asdict(c) for c in find_contacts(system.connections)],
+        "contacts": [c.as_data() for c in system.contacts],
     }
 
 
@@ -86,7 +85,7 @@ def origin(continuation: Continuation | None) -> dict[str, Any]:
 
 
 def performance(timing: Timing, simulated: float) -> dict[str, Any]:
-    """Return what a run took, for this much simulated time [s]."""
+    """Return what a run of this much simulated time [s] took."""
     return {
         "initialisation_time": timing.initialisation,
         "wall_time": timing.stepping,
@@ -96,7 +95,7 @@ def performance(timing: Timing, simulated: float) -> dict[str, Any]:
 
 
 def figures(done: Results) -> dict[str, Any]:
-    """Return the figures, verdicts, events and energy balances for summary.json."""
+    """Return figures, verdicts, events and energy balances."""
     events = done.events
     return {
         "filter": done.evaluation.filter.sentence,
@@ -128,13 +127,13 @@ def _assessed(a: Assessment) -> dict[str, Any]:
 
 
 def filter_data(chosen: ForceFilter) -> dict[str, Any]:
-    """Return a filter as a summary's settings have it."""
+    """Return a filter as it stands in the settings of a summary."""
     known = asdict(chosen)
     return known if chosen.kind == "butterworth" else {**known, "order": None, "phase": None}
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what computed."""
+    """Return the versions of the software that computed."""
     found = {"python": platform.python_version()}
     for name in ("openpanto", "fmpy", "numpy"):
         try:
@@ -145,9 +144,9 @@ def versions() -> dict[str, str]:
 
 
 def peak_memory() -> float:
-    """Return the largest memory that the process has occupied so far [MB]."""
+    """Return the peak memory of the process so far [MB]."""
     status = Path("/proc/self/status")
-    if status.is_file():  # Linux counts in its resource usage what the program took that has started this one
+    if status.is_file():  # the resource usage of Linux includes what the program that started this one took
         found = re.search(r"^VmHWM:\s*(\d+) kB$", status.read_text(encoding="ascii", errors="replace"), re.MULTILINE)
         if found is not None:
             return int(found[1]) / 1024.0

@@ -133,8 +133,8 @@ def run_host(host, orders, **environment):
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "LD_"))}
     clean |= {"OMP_NUM_THREADS": "1", "PATH": "/usr/bin:/bin", **environment}
     done = subprocess.run(host, input=os.fsencode(orders), env=clean, capture_output=True, check=False)
-    told = done.stderr.decode("utf-8", "backslashreplace")
-    return subprocess.CompletedProcess(done.args, done.returncode, done.stdout.decode(), told)
+    said = done.stderr.decode("utf-8", "backslashreplace")
+    return subprocess.CompletedProcess(done.args, done.returncode, done.stdout.decode(), said)
 
 
 def numbers(done):

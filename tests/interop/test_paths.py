@@ -264,7 +264,7 @@ def test_an_initialisation_that_fails_is_an_error(host, pair, tmp_path):
 
 
 def _refused(done, text):
-    """The host said that there is no instance, told why once through its logger, and ended by itself."""
+    """The host said that there is no instance, gave the reason once through its logger, and ended by itself."""
     assert done.returncode == 0, done.stderr
     assert done.stdout == "NULL\nNULL\n"  # tried twice
     logged = [line for line in done.stderr.splitlines() if line.startswith("[part, status 3]")]

@@ -132,7 +132,7 @@ def test_libraries_come_with_those_that_they_need_in_order(tmp_path):
 @linux
 def test_no_library_goes_without_its_licence(tmp_path):
     put(tmp_path, "libnobody.so.1")
-    with pytest.raises(InstallationError, match=r"the licence of .*libnobody\.so\.1 is not to be found"):
+    with pytest.raises(InstallationError, match=r"the licence of .*libnobody\.so\.1 cannot be found"):
         licences(own(), {"lib/libnobody.so.1": tmp_path / "libnobody.so.1"})
 
 

@@ -1,4 +1,4 @@
-"""Run the FMUs of a packed scenario in CoFmuPy, which reads a configuration of its own instead of SSP."""
+"""Run the FMUs of a packed scenario in CoFmuPy, which reads its own configuration instead of SSP."""
 
 import contextlib
 import io

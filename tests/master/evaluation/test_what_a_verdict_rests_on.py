@@ -59,7 +59,7 @@ def test_limits_that_nothing_was_held_to_are_named():
     assert whole.assessments()[0].warnings == ()
     (found,) = bare.assessments()
     assert found.passed
-    assert found.unchecked.startswith("not checked: uplift at supports, for no support")
+    assert found.unchecked.startswith("not checked: uplift at supports, because no support")
     assert "contact height range, for the height" in found.unchecked
     assert run_summary.figures(bare)["quality"][0]["unchecked"] == found.unchecked
     assert found.unchecked in page(bare)

@@ -265,7 +265,7 @@ def test_one_calibration_at_a_time_stores_its_value(toy, capsys, holder):
     (toy / "parameters.ssv").write_text(before + " ")
     _, text = running.communicate(timeout=120)
     assert running.returncode == 1, first + text
-    assert "parameters.ssv was changed during the calibration: nothing is stored" in " ".join(text.split())
+    assert "parameters.ssv was changed during the calibration; nothing was stored" in " ".join(text.split())
     assert (toy / "parameters.ssv").read_text() == before + " "
 
 

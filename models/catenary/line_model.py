@@ -21,8 +21,9 @@ from models.catenary.contact_and_slack.local_problem import (
 from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.linear_motion.compliance import Compliance
-from models.catenary.linear_motion.interval_modes import IntervalModes, interval_modes, slower_than
+from models.catenary.linear_motion.interval_modes import IntervalModes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
+from models.catenary.linear_motion.mode_finding import interval_modes
 from models.catenary.linear_motion.sparse_products import Product, inner
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS
@@ -131,7 +132,7 @@ class StripMotion:
 
 @dataclass(frozen=True)
 class _Step:
-    """What belongs to one step size; ``pull`` finds what a change of the attachments in it adds to droppers' pulls."""
+    """What belongs to one step size; ``pull`` gives what a change of the attachments adds to the droppers' pulls."""
 
     engine: StepEngine
     pull: Product
@@ -185,9 +186,9 @@ class CatenaryModel:
         )
 
     def rehearse(self, step: float, strips: FloatArray) -> None:
-        """Take a step with a line at rest that is thrown away, so that the first real one need not lay anything out.
+        """Take a trial step of a line at rest, so that the first real one finds everything laid out.
 
-        Factorisation, compiled code and the responses about the strips are there afterwards: a paced run must not wait.
+        Factorisation, compiled code and responses near the strips exist afterwards: a paced run must not wait for them.
 
         Parameters
         ----------
@@ -195,7 +196,7 @@ class CatenaryModel:
             Time step [s].
         strips : ndarray, shape (n_pantographs, 2, 2, 3)
         """
-        with suppress(LocalSolutionError):  # the real step will tell, if it finds the same
+        with suppress(LocalSolutionError):  # the real step will raise it, if it recurs
             self.step(self.initial_state(len(strips)), step, StripMotion(strips, np.zeros(len(strips))))
 
     def step(self, state: CatenaryState, step: float, motion: StripMotion) -> ContactResult:
@@ -325,7 +326,7 @@ class CatenaryModel:
         return np.asarray(plan_rotation(self._angles) @ nodal).reshape(-1, NODE_DOFS)[self.mesh.owner]
 
     def set_velocity(self, state: CatenaryState, velocity: FloatArray) -> None:
-        """Give the nodes velocities.
+        """Set the velocities of the nodes.
 
         Parameters
         ----------
@@ -363,7 +364,7 @@ class CatenaryModel:
 
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:
-        """Say in words that matrices are not positive definite: their parts are too different, or it buckles."""
+        """Explain matrices that are not positive definite: parts of the line differ too much, or it buckles."""
         try:
             yield
         except np.linalg.LinAlgError as error:
@@ -455,7 +456,7 @@ class CatenaryModel:
         return z_a + share * (z_b - z_a) - (height - self._radii), v_a + share * (v_b - v_a) - rate
 
     def _strip_compliance(self, contacts: Sequence[ContactCandidate], motion: StripMotion) -> FloatArray:
-        """Two contacts of one strip share its retreat."""
+        """Return how far strips give way to the contacts' forces [m/N]; two contacts of one strip share its retreat."""
         if len(contacts) == 1:
             return motion.compliance[contacts[0].pantograph].reshape(1, 1)
         owners = [c.pantograph for c in contacts]
@@ -474,7 +475,7 @@ class CatenaryModel:
             engine.attached[column.rows] -= compensation * column.values[:, 0]
 
     def _note(self, state: CatenaryState, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
-        """Note the forces at the end of the step; the next one begins with them."""
+        """Record the forces at the end of the step; the next one begins with them."""
         state.slack, state.compensation = forces.slack, forces.compensation
         state.impact_velocity[...] = 0.0
         for contact, velocity, closed in zip(contacts, forces.velocity, forces.closed, strict=True):

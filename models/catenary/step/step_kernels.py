@@ -1,8 +1,8 @@
 """The two halves of a line's step in one pass each, for numba.
 
-The same arithmetic as `numpy_engine.NumpyEngine`, but nothing is read twice and no intermediate array is
-written: how much is read and written sets the pace.
-Indices are unsigned, which spares the compiler the question whether they count from the end.
+The same arithmetic as `numpy_engine.NumpyEngine`, but nothing is read twice and no intermediate array
+is written: how much is read and written sets the pace.
+Indices are unsigned, which spares the compiler the check whether they count from the end.
 What belongs together is handed over together, as a tuple or as one array (`unpacked`).
 
 This module imports nothing of the project and is not divided: it is compiled from a copy in the user's cache

@@ -41,7 +41,6 @@ from master.results.run_results import Results
 from master.safety.interruption import interruptible
 from master.safety.supervision import unfinished
 from master.system.components import System
-from master.system.contacts import find_contacts
 from master.system.step_rounding import adjustments
 
 
@@ -187,7 +186,7 @@ class RunSession:
     ) -> None:
         self._system, self._network, self._folder = system, network, folder
         self._description, self._options, self._schedule = description, options, schedule
-        self._contacts = find_contacts(system.connections)
+        self._contacts = system.contacts
         self._algorithm = make_algorithm(system.settings.coupling)
         whole = TimeGrid(system.start, system.step, system.step_count)
         self._grid = whole if options.continuation is None else options.continuation.grid(system)

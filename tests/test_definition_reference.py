@@ -6,6 +6,7 @@ import ast
 import importlib
 import inspect
 import re
+import shlex
 import sys
 import tomllib
 from pathlib import Path
@@ -168,3 +169,31 @@ def test_every_room_has_a_page():
     assert {"models.catenary.shape", "fmus.slave", "master.coupling"} <= set(rooms)
     page = room_pages.page(ROOT, "master.coupling", rooms["master.coupling"])
     assert "::: master.coupling.network" in page
+
+
+def test_the_guide_to_lines_names_keys_that_there_are(references):
+    text = (ROOT / "docs" / "lines.md").read_text(encoding="utf-8")
+    table = re.search(r"\| table \| key \| meaning \|\n\|---\|---\|---\|\n(.*?)\n\n", text, re.DOTALL)[1]
+    rows = [row.split("|")[1:3] for row in table.splitlines()]
+    named = {key for _, keys in rows for key in re.findall(r"`(\w+)`", keys)}
+    named |= {name.split(".")[-1] for tables, _ in rows for name in re.findall(r"`\[+([\w.]+)\]+`", tables)}
+    assert len(named) > 50
+    assert named <= {key.name for key in references["line"].keys.values()}
+
+
+def _tutorial_lines():
+    """Every call of the command in the tutorials: file and line."""
+    for path in sorted((ROOT / "docs" / "tutorials").glob("*.md")):
+        for block in re.findall(r"```sh\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL):
+            lines = block.replace("\\\n", " ").splitlines()
+            yield from ((path.stem, line.strip()) for line in lines if line.strip().startswith("openpanto "))
+
+
+def test_every_command_of_the_tutorials_is_understood():
+    parser = _module("command_pages").parser_of("openpanto")
+    calls = list(_tutorial_lines())
+    assert len(calls) > 15
+    if parser is None:
+        pytest.skip("the command openpanto is not there yet")
+    for _, line in calls:
+        parser.parse_args(shlex.split(line, comments=True)[1:])

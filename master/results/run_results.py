@@ -49,7 +49,7 @@ class Results:
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts of the run."""
-        return tuple(Contact(**c) for c in self.summary.get("contacts", []))
+        return tuple(Contact.from_data(c) for c in self.summary.get("contacts", []))
 
     @property
     def interval(self) -> tuple[float | None, float | None]:

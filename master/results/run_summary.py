@@ -20,7 +20,6 @@ from master.recording.continuation import Continuation
 from master.results.results_folder import FORMAT, GENERATOR
 from master.results.run_results import Results
 from master.system.components import Component, System, Variable
-from master.system.contacts import find_contacts
 
 
 def describe(system: System, run: str) -> dict[str, Any]:
@@ -39,7 +38,7 @@ def describe(system: System, run: str) -> dict[str, Any]:
             **system.settings.model_dump(mode="json"),
         },
         "components": [_component(c) for c in system.components],
-        "contacts": [asdict(c) for c in find_contacts(system.connections)],
+        "contacts": [c.as_data() for c in system.contacts],
     }
 
 

@@ -5,7 +5,7 @@ then a small problem in the forces alone [1]_: with T what droppers would pull i
 slack one must add to that, delta the penetrations and F the contact forces,
 
     T = T_free - A_dd f + A_dc F,          f = max(0, -(1 - r) T),
-    delta = delta_free - A_cc F + A_cd f,  F = law(delta, delta').
+    delta = delta_free - A_cc F + A_cd f,  F = law(delta, delta'),
 
 with r the droppers' stiffness ratio in compression, and T as `dropper_law` has it.
 

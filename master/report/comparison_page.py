@@ -1,4 +1,4 @@
-"""Reports of two or more runs side by side; every contact of every run is a column."""
+"""The page that compares two or more runs; every contact of every run is a column."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def _verdict(c: Column) -> str:
 
 
 def _filters(runs: Sequence[Results]) -> str:
-    """Return which filters the runs were evaluated with."""
+    """Return the filters with which the runs were evaluated."""
     return f"Filter: {html_markup.text('; '.join(dict.fromkeys(run.evaluation.filter.sentence for run in runs)))}."
 
 
@@ -159,7 +159,7 @@ def _difference(first: str, other: str) -> str:
 
 
 def comparison_charts(found: Sequence[Column]) -> list[Chart]:
-    """Return the curves of all columns, overlaid."""
+    """Return the charts in which the curves of all columns lie over one another."""
     charts = [_force_chart(found), _histogram(found), _spectrum(found), _bands(found)]
     if any(c.run.uplifts for c in found):
         charts.append(_uplift(found))
@@ -235,5 +235,5 @@ def _quality_section(runs: Sequence[Results]) -> list[str]:
     tables = [dict(quality_rows(run.summary)) for run in runs]
     names = list(dict.fromkeys(name for table in tables for name in table))
     rows = [(name, *(table.get(name, "-") for table in tables)) for name in names]
-    heads = ["what", *run_names([run.folder for run in runs])]
+    heads = ["item", *run_names([run.folder for run in runs])]
     return ["<h2>Numerical quality</h2>", html_markup.table(heads, rows, numbers=False)]

@@ -1,4 +1,4 @@
-"""A study as a page: one HTML file that needs nothing else."""
+"""The page of a study: a single HTML file that needs no other."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from master.report.charts.chart import Chart
 from master.report.run_page import INTERVAL_NOTE
 
 _STATUS = {
-    "running": "Not finished: still running, or killed. What follows is what was computed.",
-    "interrupted": "Interrupted. What follows is what was computed.",
+    "running": "Not finished: the study is still running or was killed. The results so far follow.",
+    "interrupted": "Interrupted. The results so far follow.",
 }
 
 
@@ -63,8 +63,8 @@ def _tables(found: Sequence[StudyEntry], title: str) -> list[str]:
     parts += [f"<p class='note'>{html_markup.text(r)}</p>" for r in filter_remarks(found)]
     if beside := differences(found):
         lines = [[f"{v}, {p}", other, *(f"{d:+.1f}" for d in change)] for v, p, other, change in beside]
-        heads = ["variant, pantograph", "less", "sigma [N]", "maximum [N]", "minimum [N]"]
-        parts += ["<h3>Leading and trailing, one and two</h3>", html_markup.table(heads, lines)]
+        heads = ["variant, pantograph", "compared with", "sigma [N]", "maximum [N]", "minimum [N]"]
+        parts += ["<h3>Differences between pantographs</h3>", html_markup.table(heads, lines)]
     return parts
 
 
@@ -72,7 +72,14 @@ def _sharing(outcome: StudyOutcome) -> list[str]:
     found = [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing is not None]
     if not found:
         return []
-    heads = ["variant, pantograph", "both wires from [m]", "to [m]", "[s]", "losses per wire", "least total force [N]"]
+    heads = [
+        "variant, pantograph",
+        "both wires touched from [m]",
+        "to [m]",
+        "for [s]",
+        "losses per wire",
+        "lowest total force [N]",
+    ]
     rows = [
         [
             f"{e.variant}, {e.pantograph}",

@@ -1,4 +1,4 @@
-"""A verification: cases one after the other, and what is left of them on disk after each."""
+"""A verification: its cases are judged one after the other, and its files written after each."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ def verify(
     runs: Runs,
     show: Callable[[CaseOutcome], None] = lambda _: None,
 ) -> Verification:
-    """Run and judge cases; page and JSON in ``folder`` are written again after each.
+    """Run and judge cases; page and JSON file are written after each.
 
     Parameters
     ----------
     cases : sequence of Case
-        What is verified, in this order.
+        The cases, in this order.
     folder : Path
-        Made, or taken over if it is an earlier verification's.
+        Created, or taken over from an earlier verification.
     runs : Runs
         Makes the runs.
     show : callable
-        Called with every finished case.
+        Called with each finished case.
 
     Raises
     ------
     InterruptedRunError, KeyboardInterrupt
-        If the user stops it; the finished cases are in the page then.
+        If the user stops it; the page then has the finished cases.
     MasterError
         If the folder holds something else.
     """

@@ -14,10 +14,10 @@ from master.report.charts.chart import Axis, Bars, Chart, Curve, Level, Part, st
 from master.report.charts.line_charts import interval_band
 from master.results.run_results import Results
 
-#: What is said of a place on a line that closes on itself.
+#: Added to the name of a position on a line that closes on itself.
 IN_LAP: Final = " in its lap"
 TIME: Final = Axis("time", "s")
-#: Points of one of many histories, and how many of them are shown at first.
+#: Points of a history among many, and how many histories are shown at first.
 FEW_POINTS: Final = 700
 _SHOWN: Final = 8
 

@@ -170,7 +170,7 @@ def test_what_is_no_file_is_not_replaced(tmp_path, write, raised):
     """Such as /dev/null, for everybody, when it is root who writes."""
     path = tmp_path / "device"
     os.mkfifo(path)
-    with pytest.raises(raised, match="is no file, and is left alone"):
+    with pytest.raises(raised, match="is not a file and is left alone"):
         write(path, b"new")
     assert path.is_fifo()
     assert [p.name for p in tmp_path.iterdir()] == ["device"]

@@ -30,7 +30,7 @@ def write_whole(path: Path, data: bytes) -> None:
     """
     # A device, such as /dev/null, would be replaced by a file for all users of the computer.
     if path.exists() and not (path.is_file() or path.is_dir()):
-        raise OSError(errno.EEXIST, "this is no file, and is left alone; choose another", str(path))
+        raise OSError(errno.EEXIST, "this is not a file and is left alone; choose another", str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART}")  # two commands do not mix
     try:
         with temporary.open("wb") as file:

@@ -26,13 +26,6 @@ from models.catenary.linear_motion.sparse_products import Product, inner
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_form
-from models.catenary.shape.line_matrices import (
-    compression_ratio,
-    dropper_rows,
-    dropper_stiffness,
-    pendulum_stiffness,
-    slack_delay,
-)
 from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.shape.wire_intervals import (
     Interval,
@@ -157,18 +150,20 @@ class CatenaryModel:
         self.definition = definition
         self.mesh: CatenaryMesh = build_mesh(definition)
         self.static: StaticState = find_form(definition, self.mesh)
-        self.dropper_stiffness = dropper_stiffness(definition, self.mesh, self.static.positions)
+        droppers = self.static.droppers
+        self.dropper_stiffness = droppers.stiffness
         #: What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
         self.rest_compensation = self.static.dropper_force - self.static.elastic_force
-        self.unilateral = 1.0 - compression_ratio(definition, self.mesh)
-        self.slack_delay = slack_delay(definition, self.mesh)
+        self.unilateral = 1.0 - droppers.compression_ratio
+        self.slack_delay = droppers.slack_delay
         attached = attachments(self.mesh)
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
-        self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.points)
+        self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.shape.points)
         #: Coordinates of the line.
         with self._solvable("move in modes of its intervals"):
             self.modes = self._modes([part for parts in by_wire for part in parts])
-        self.B = self._dropper_rows()
+        #: Rows of the droppers' elongations over the attachments' displacements, which are in global axes.
+        self.B = droppers.rows[:, self.modes.attached].tocsr()
         self._rest_load = self.B.T @ self.rest_compensation
         #: Elastic forces of the droppers from the attachments' displacements; those of their dampers from velocities.
         self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
@@ -372,26 +367,20 @@ class CatenaryModel:
 
     def _modes(self, parts: Sequence[Interval]) -> IntervalModes:
         """Return the line's coordinates and matrices, droppers included."""
-        static, Q = self.static, plan_rotation(self._angles)
-        stretch = dropper_rows(self.mesh, static.positions)
+        matrices, stretch, Q = self.static.shape.matrices, self.static.droppers.rows, plan_rotation(self._angles)
         droppers = stretch.T @ sp.diags(self.dropper_stiffness) @ stretch
         damping = self.definition.damping
-        C = static.matrices.C + damping.of("dropper").alpha * droppers
-        stiffness = static.matrices.K + droppers
+        C = matrices.C + damping.of("dropper").alpha * droppers
+        stiffness = matrices.K + droppers
         if self.definition.dynamics.geometric_stiffness:
-            stiffness = stiffness + self._pendulums()  # not in C: alpha times it would be a damping that nothing has
-        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (stiffness, static.matrices.M, C))
+            # Not in C: alpha times it would be a damping that nothing has.
+            stiffness = stiffness + self.static.pendulum_stiffness()
+        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (stiffness, matrices.M, C))
         K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
         rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
         modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel(), self.mesh.owner)
         highest = self.definition.dynamics.highest_frequency
         return slower_than(modes, highest) if highest else modes
-
-    def _pendulums(self) -> sp.csc_matrix:
-        """Return what the static tension of droppers and steady arms holds them back by; none where they are slack."""
-        mesh, static = self.mesh, self.static
-        tension = np.concatenate([static.dropper_force, static.arm_force])
-        return pendulum_stiffness(np.vstack([mesh.droppers, mesh.arms]), np.maximum(tension, 0.0), static.positions)
 
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:
@@ -402,10 +391,6 @@ class CatenaryModel:
             raise EquilibriumError(
                 f"line '{self.definition.name}' cannot {doing}: {error}; check masses, tensions and stiffnesses"
             ) from error
-
-    def _dropper_rows(self) -> sp.csr_matrix:
-        """Return the rows of dropper elongation over the attachments' displacements, which are in global axes."""
-        return dropper_rows(self.mesh, self.static.positions)[:, self.modes.attached].tocsr()
 
     def _wires(self, by_wire: Sequence[Sequence[Interval]]) -> Iterator[ContactWire]:
         spans = iter(self.modes.spans)

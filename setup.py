@@ -1,4 +1,4 @@
-"""Building the package: with the FMUs' loader, compiled, where that can be done; everything else is in pyproject.toml.
+"""Build the package with the FMUs' loader compiled, where that is possible; everything else is in pyproject.toml.
 
 A wheel that holds the loader runs under every Python 3 on Linux x86-64 with a glibc that is new enough, and is tagged
 so. Elsewhere, or without a compiler, the wheel is pure: there the loader is compiled when an FMU is built, or FMUs

@@ -9,7 +9,8 @@ from pathlib import Path
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 
 STEP = 1e-3
 

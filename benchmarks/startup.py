@@ -109,7 +109,8 @@ def fmu_phases(spans: int) -> dict[str, float]:
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 
-    from fmus.builder.fmu_build import build, recipe
+    from fmus.builder.fmu_build import build
+    from fmus.builder.recipe import recipe
 
     phases = Phases()
     with tempfile.TemporaryDirectory() as name:

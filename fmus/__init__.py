@@ -1,1 +1,1 @@
-"""FMI 2.0 co-simulation units of the models: thin adapters on pythonfmu, and their build."""
+"""FMI 2.0 around the models, without arithmetic: the slave in an FMU, its loader, its build; imports models."""

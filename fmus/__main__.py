@@ -1,4 +1,4 @@
-"""Command line: ``python -m fmus build | doctor | fingerprint | list``."""
+"""Command line: ``python -m fmus build | runtime | doctor | fingerprint | list``."""
 
 from __future__ import annotations
 
@@ -8,18 +8,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fmus.builder.fmu_build import (
-    MAX_PORTS,
-    BuildError,
-    Recipe,
-    UnknownFmuError,
-    build,
-    fingerprint,
-    known_names,
-    recipe,
-    why_no_loader,
-)
-from fmus.builder.standalone import bundled_platform, runtime_of, write_runtime
+from fmus.builder.fmu_build import build, why_no_loader
+from fmus.builder.recipe import MAX_PORTS, BuildError, Recipe, UnknownFmuError, fingerprint, known_names, recipe
+from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
 from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
 from models.definition_files.toml_reader import printable
@@ -28,21 +19,21 @@ DEFAULT_FOLDER = Path("build/fmus")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 for success, 1 for a failure, 2 for a command line that was not understood."""
+    """Run a command; return 0 for success, 1 for failure, 2 for a command line that was not understood."""
     options = _parser().parse_args(arguments)
     try:
         code: int | None = options.run(options)
         if sys.stdout is not None:  # closed by the caller
-            sys.stdout.flush()  # here, where an error can still be told
+            sys.stdout.flush()  # here, where an error can still be reported
     except (UnknownFmuError, BuildError) as error:
         return _fail(str(error))
-    except BrokenPipeError:  # whoever read the output had enough of it
+    except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
         return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
     except MemoryError:
-        return _fail("there is not enough memory; end other programs, or raise the limit (ulimit -v)")
+        return _fail("there is not enough memory; close other programs, or raise the limit (ulimit -v)")
     except KeyboardInterrupt:
         return _fail("interrupted")
     return code or 0
@@ -54,9 +45,9 @@ def _fail(text: str) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs, and see whether they run here.")
+    parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs and check whether they run here.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
-    verb = verbs.add_parser("build", help="build FMUs, all of the library if none is named")
+    verb = verbs.add_parser("build", help="build FMUs, by default all of the library")
     verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, path/to/LINE.toml ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
@@ -72,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--out", type=Path, default=Path("build/runtime"), metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to take it from (the present one)")
     verb.set_defaults(run=_write_runtime)
-    verb = verbs.add_parser("doctor", help="say what this machine lacks for running an FMU")
+    verb = verbs.add_parser("doctor", help="report what this machine lacks to run an FMU")
     verb.add_argument("fmu", type=Path, metavar="FILE", help="X.fmu")
     verb.set_defaults(run=_examine)
     verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
@@ -104,7 +95,7 @@ def _build(options: argparse.Namespace) -> None:
 def _runtime(options: argparse.Namespace, replaced: Path) -> Runtime | None:
     """Return the Python that an FMU is to bring along, if it is asked for or the FMU that it replaces brings one."""
     if options.standalone or options.runtime is not None:
-        return _told(runtime_of(options.runtime))
+        return _noted(runtime_of(options.runtime))
     there = bundled_platform(replaced) if options.standalone is None else ""
     if not there:
         return None
@@ -117,14 +108,15 @@ def _runtime(options: argparse.Namespace, replaced: Path) -> Runtime | None:
     return runtime
 
 
-def _told(runtime: Runtime) -> Runtime:
+def _noted(runtime: Runtime) -> Runtime:
+    """Return a runtime, after a note if it could not be tried out."""
     if not runtime.was_tried:
         print(f"note: the Python for {runtime.platform} could not be tried out on this system", file=sys.stderr)
     return runtime
 
 
 def _write_runtime(options: argparse.Namespace) -> None:
-    print(write_runtime(_told(runtime_of(options.runtime)), options.out))
+    print(write_runtime(_noted(runtime_of(options.runtime)), options.out))
 
 
 def _examine(options: argparse.Namespace) -> int:
@@ -132,7 +124,7 @@ def _examine(options: argparse.Namespace) -> int:
 
 
 def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:
-    # All names are looked up before anything is built: a typing error must not cost a build.
+    # All names are looked up before anything is built: a typing mistake must not cost a build.
     return [recipe(name, pantographs) for name in names]
 
 

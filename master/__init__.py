@@ -1,6 +1,7 @@
-"""The co-simulation master: runs SSP scenarios of FMUs and judges the contact quality.
+"""The co-simulation master: runs SSP scenarios of FMUs and judges the quality of the contact.
 
-It meets the physics only through ``.fmu`` files. The order of reading is the path of the data:
-``ssp`` (files) -> ``system`` (what is coupled to what) -> ``instance`` and ``algorithm`` (execution)
--> ``simulation`` and ``recorder`` -> ``quality`` -> ``results`` and ``report``.
+It meets the physics only through ``.fmu`` files. Its rooms follow the path of the data: ``ssp`` (files as written) ->
+``system`` (what is coupled to what) -> ``fmu`` and ``coupling`` (execution) -> ``scenario`` and ``recording`` ->
+``evaluation`` -> ``results`` -> ``run`` and ``report`` -> ``batch`` (many runs) -> ``commands``. ``errors``, ``arrays``
+and ``safety`` lie below them all. Every isolated FMU's process imports this file, so it imports nothing itself.
 """

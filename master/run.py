@@ -1,12 +1,10 @@
-"""One run of a scenario: load, couple, record, assess, write."""
+"""One run of a scenario: claim the folder, load, couple, record, conclude."""
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,12 +16,11 @@ from master.coupling.macro_steps import Observer, RunOutcome, TimeGrid, simulate
 from master.coupling.network import Network
 from master.coupling.off_wire_stop import OffWireStop
 from master.coupling.real_time import WallClockPacer
-from master.coupling.stopwatch import Stopwatch, Timing
-from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RequestError, RunError
-from master.evaluation.interval_coverage import never_touched, shortfall
-from master.fmu.instance import Instance
-from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
-from master.recording.checkpoint import NAME as CHECKPOINT
+from master.coupling.stopwatch import Stopwatch
+from master.errors import ForeignResultsError, InterruptedRunError, MasterError, RunError
+from master.evaluation.interval_coverage import not_judgeable
+from master.fmu.isolation.isolated_instance import Isolation
+from master.fmu.loading import loaded_fmus
 from master.recording.checkpoint import Checkpoint
 from master.recording.checkpoint_writer import (
     CheckpointObserver,
@@ -34,34 +31,35 @@ from master.recording.checkpoint_writer import (
     take,
 )
 from master.recording.continuation import Continuation
+from master.recording.recorder import RERUN_ADVICE
 from master.recording.recording import Recording
 from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
 from master.recording.static_geometry import GeometryObserver
-from master.results import results_folder, run_results, run_summary
+from master.results import run_summary
+from master.results.results_folder import RunFolder, claimed_for_run, write_forces
 from master.results.run_results import Results
-from master.safety.interruption import heeded_at_once, interruptible
-from master.safety.supervision import phase, unfinished
-from master.system.components import Component, System, Variable
-from master.system.contacts import find_contacts
+from master.safety.interruption import interruptible
+from master.safety.supervision import unfinished
+from master.system.components import System
 from master.system.step_rounding import adjustments
 
 
 @dataclass(frozen=True)
-class Manner:
-    """How a system is run, which changes none of its figures.
+class RunOptions:
+    """How a system is run; no option changes a figure.
 
     Attributes
     ----------
     checkpoint : float, optional
-        When the whole state is to be written to the folder [s].
+        When the whole state is written to the folder [s].
     checkpoint_every : float, optional
-        After how much simulated time again and again [s].
+        Simulated time after which it is written again and again [s].
     continuation : Continuation, optional
-        Where the run goes on from, instead of its beginning.
+        Where the run continues from, instead of its beginning.
     isolation : Isolation, optional
-        Given if every FMU is to have a process of its own.
+        Given if every FMU is to have its own process.
     real_time : float, optional
-        Simulated seconds per second of wall clock; as fast as it goes if not given.
+        Simulated seconds per second of wall clock; as fast as possible if not given.
     """
 
     checkpoint: float | None = None
@@ -70,11 +68,19 @@ class Manner:
     isolation: Isolation | None = None
     real_time: float | None = None
 
+    def schedule(self, system: System) -> CheckpointSchedule:
+        """Return after which macro steps checkpoints are written; refuses what does not fit the system."""
+        once, every = self.checkpoint, self.checkpoint_every
+        return CheckpointSchedule(
+            None if once is None else index_at(system, once),
+            None if every is None else steps_between(system, every),
+        )
 
-_PLAIN: Final = Manner()
+
+_DEFAULT: Final = RunOptions()
 
 
-def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner: Manner = _PLAIN) -> Results:
+def run(system: System, folder: Path, observers: Sequence[Observer] = (), options: RunOptions = _DEFAULT) -> Results:
     """Run a system and leave its results in ``folder``.
 
     Parameters
@@ -82,10 +88,10 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
     system : System
         What to run.
     folder : Path
-        Results folder; made, or emptied if it is ours, or gone on with if the manner says so.
+        Results folder; made, or emptied if it is ours, or continued in if the options say so.
     observers : sequence of Observer
         Further observers (progress).
-    manner : Manner
+    options : RunOptions
 
     Raises
     ------
@@ -98,191 +104,107 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), manner
     RequestError
         If checkpoint or continuation do not fit the system.
     """
-    schedule = _schedule(system, manner)
-    with results_folder.claimed(folder):
-        identity = _take_folder(system, folder, manner.continuation)
-        with unfinished(folder / results_folder.SUMMARY, identity):
-            results_folder.write_json(
-                folder / results_folder.SUMMARY, {**_description(system, identity), "status": "running"}
-            )
-            return _run(system, folder, observers, manner, schedule, identity)
-
-
-def _run(
-    system: System,
-    folder: Path,
-    observers: Sequence[Observer],
-    manner: Manner,
-    schedule: CheckpointSchedule,
-    identity: str,
-) -> Results:
-    farewells: list[FmuWarning] = []
-    with (
-        interruptible() as stop_wanted,
-        _failure_noted(system, folder, identity, stop_wanted),
-        loaded(system, manner.isolation, farewells) as network,
-    ):
-        session = _Session(system, network, folder, manner, identity)
-        watchers = [*session.observers, *observers, *session.last_observers(schedule)]
-        continuation = manner.continuation
-        way_in = {} if continuation is None else {"prepare": continuation.prepare}
-        outcome = simulate(network, session.algorithm, session.grid, watchers, stop_wanted, **way_in)
-    for observer in watchers:
-        if isinstance(observer, FmuWarningObserver):
-            for farewell in farewells:
-                observer.add(farewell)
-    return _concluded(session, outcome, folder)
-
-
-def _concluded(session: _Session, outcome: RunOutcome, folder: Path) -> Results:
-    try:
-        recordings = session.recordings(outcome)
-        outcome = session.checked(outcome, recordings[0])
-        done = session.conclude(outcome, recordings)
-    except ForeignResultsError as error:
-        session.disown(error)
-        raise ForeignResultsError(f"{outcome.error}. {error}" if outcome.error else str(error)) from error
-    except MasterError as error:  # no room for the summary, say
-        cause = outcome.error or error
-        raise RunError(f"{cause}. What was written before is in {folder}, marked running") from error
-    if outcome.status != "complete":
-        kind = InterruptedRunError if outcome.status == "interrupted" else RunError
-        raise kind(_what_happened(outcome, folder)) from outcome.error
-    return done
-
-
-def _schedule(system: System, manner: Manner) -> CheckpointSchedule:
-    once, every = manner.checkpoint, manner.checkpoint_every
-    return CheckpointSchedule(
-        None if once is None else index_at(system, once),
-        None if every is None else steps_between(system, every),
-    )
-
-
-def _take_folder(system: System, folder: Path, continuation: Continuation | None) -> str:
-    """Make the folder ready and return the identity of the run in it: a new one, or that of the run that goes on."""
-    if continuation is not None:
-        continuation.check(system)
-        if continuation.is_same_run:
-            known = results_folder.identity(folder)
-            if not known or known != continuation.checkpoint.run:
-                raise RequestError(f"{continuation.file} comes from another run than the results beside it")
-            return known
-    results_folder.prepare(folder, None if continuation is None else Path(continuation.file))
-    return uuid.uuid4().hex
+    schedule = options.schedule(system)
+    if options.continuation is not None:
+        options.continuation.check(system)
+    with claimed_for_run(folder, options.continuation) as own, unfinished(own.summary_file, own.run):
+        description = run_summary.describe(system, own.run)
+        own.write_summary({**description, "status": "running"})
+        troubles: dict[str, str] = {}
+        with (
+            interruptible() as stop_wanted,
+            _failure_noted(own, description, stop_wanted),
+            connected_fmus(system, options.isolation, troubles) as network,
+        ):
+            session = RunSession(system, network, own, description, options, schedule)
+            outcome = session.simulate(observers, stop_wanted)
+        session.warn_of(troubles)
+        return session.conclude(outcome)
 
 
 @contextmanager
-def _failure_noted(system: System, folder: Path, identity: str, stop_wanted: Callable[[], bool]) -> Iterator[None]:
-    """Mark the folder's summary as failed, or interrupted, if the run does not even begin."""
-    try:
-        yield
-    except (MasterError, KeyboardInterrupt) as error:
-        # An FMU in Python takes the interruption for a failure of its own.
-        is_interrupted = isinstance(error, KeyboardInterrupt) or stop_wanted()
-        cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
-        outcome = RunOutcome("interrupted" if is_interrupted else "failed", 0, system.start, cause)
-        if _is_still(folder, identity):
-            results_folder.write_json(
-                folder / results_folder.SUMMARY, {**_description(system, identity), **_ending(outcome)}
-            )
-        if is_interrupted:
-            raise InterruptedRunError(_what_happened(outcome, folder)) from error
-        raise
-
-
-@contextmanager
-def loaded(
-    system: System, isolation: Isolation | None = None, farewells: list[FmuWarning] | None = None
+def connected_fmus(
+    system: System, isolation: Isolation | None = None, troubles: dict[str, str] | None = None
 ) -> Iterator[Network]:
-    """Load the FMUs of a system and connect them; they are freed at last.
+    """Load the FMUs of a system and connect them; they are freed at the end.
 
     Parameters
     ----------
     system : System
     isolation : Isolation, optional
-        Given if each is to have a process of its own.
-    farewells : list of FmuWarning, optional
-        Takes what goes wrong when they are freed.
+        Given if each is to have its own process.
+    troubles : dict, optional
+        Takes what goes wrong when they are freed, by component.
     """
-    instances: list[Instance | IsolatedInstance] = []
-    if isolation is None:
-        _check_single(system)
-    try:
-        with phase("loading"), heeded_at_once():
-            for component in system.components:
-                # One by one: those loaded so far must be freed on failure.
-                instance = Instance(component) if isolation is None else IsolatedInstance(component, isolation)
-                instances.append(instance)
+    with loaded_fmus(system.components, isolation, troubles) as instances:
         yield Network(instances, system.connections, system.discrete)
-    finally:
-        with phase("closing"):
-            _free(instances, [] if farewells is None else farewells)
 
 
-def _check_single(system: System) -> None:
-    """Refuse several instances of an FMU of which a process can hold only one."""
-    first: dict[str, str] = {}
-    for c in system.components:
-        if c.fmu.is_single and (other := first.setdefault(c.fmu.sha256, c.name)) != c.name:
-            text = f"both are of {c.fmu.path.name}, of which a process can hold only one; --isolate gives each its own"
-            raise RunError(f"components '{other}' and '{c.name}': {text}")
+@contextmanager
+def _failure_noted(folder: RunFolder, description: dict[str, Any], stop_wanted: Callable[[], bool]) -> Iterator[None]:
+    """Mark the folder's summary as failed, or interrupted, if the run does not even begin."""
+    try:
+        yield
+    except (MasterError, KeyboardInterrupt) as error:
+        # An FMU in Python takes the interruption for its own failure.
+        is_interrupted = isinstance(error, KeyboardInterrupt) or stop_wanted()
+        cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
+        start = description["settings"]["start"]
+        outcome = RunOutcome("interrupted" if is_interrupted else "failed", 0, start, cause)
+        if folder.is_intact:
+            folder.write_summary({**description, **run_summary.ending(outcome)})
+        if is_interrupted:
+            raise InterruptedRunError(_what_happened(outcome, folder.path)) from error
+        raise
 
 
-def _free(instances: Sequence[Instance | IsolatedInstance], farewells: list[FmuWarning]) -> None:
-    """Free all, also after one at which the user lost patience."""
-    interruption = None
-    for instance in reversed(instances):
-        try:
-            with heeded_at_once():
-                said = instance.close()
-        except KeyboardInterrupt as error:
-            interruption = error
-            continue
-        if said:
-            farewells.append(FmuWarning(instance.name, said, is_own=False))
-    if interruption is not None:
-        raise interruption
+class RunSession:
+    """The observers of a run, and what is made of what they saw.
 
+    Parameters
+    ----------
+    system : System
+    network : Network
+        Its FMUs, connected.
+    folder : RunFolder
+        Where the results go.
+    description : dict
+        What the summary says of the run from its beginning.
+    options : RunOptions
+    schedule : CheckpointSchedule
+        When checkpoints are written.
+    """
 
-def _is_still(folder: Path, identity: str) -> bool:
-    """Whether it is the run of this identity whose results lie in the folder."""
-    with suppress(MasterError):
-        return results_folder.identity(folder) == identity
-    return False
-
-
-class _Session:
-    """The observers of a run and what is made of them in the end."""
-
-    def __init__(self, system: System, network: Network, folder: Path, manner: Manner, identity: str) -> None:
-        self._system = system
-        self._manner = manner
-        self._identity = identity
-        self._network = network
-        self._folder = folder
-        self._contacts = find_contacts(system.connections)
-        self._plans = recording_plans(system)
-        self.algorithm = make_algorithm(system.settings.coupling)
+    def __init__(
+        self,
+        system: System,
+        network: Network,
+        folder: RunFolder,
+        description: dict[str, Any],
+        options: RunOptions,
+        schedule: CheckpointSchedule,
+    ) -> None:
+        self._system, self._network, self._folder = system, network, folder
+        self._description, self._options, self._schedule = description, options, schedule
+        self._contacts = system.contacts
+        self._algorithm = make_algorithm(system.settings.coupling)
         whole = TimeGrid(system.start, system.step, system.step_count)
-        self.grid = whole if manner.continuation is None else manner.continuation.grid(system)
-        self._geometry = GeometryObserver(
-            system, lambda g: results_folder.write_json(folder / results_folder.GEOMETRY, g)
-        )
+        self._grid = whole if options.continuation is None else options.continuation.grid(system)
+        self._geometry = GeometryObserver(system, folder.write_geometry)
         self._power = CouplingPowerObserver(self._contacts, network)
-        self._contact_loss_stop = ContactLossStop(self._contacts, network)
+        self._loss_stop = ContactLossStop(self._contacts, network)
         self._off_wire_stop = OffWireStop(system, self._contacts, network, lambda: self._geometry.geometry)
-        self._cautions = FmuWarningObserver()
-        self._stateful: tuple[StatefulObserver, ...] = (self._power, self._contact_loss_stop)
+        self._warnings = [FmuWarningObserver()]
+        self._stateful: tuple[StatefulObserver, ...] = (self._power, self._loss_stop)
         self._stopwatch = Stopwatch()
-        self._pacer = None if manner.real_time is None else WallClockPacer(self.grid, manner.real_time)
-        made = self._take_up(manner.continuation)
-        self._recorders = [
-            make_recorder(system, network, plan, folder, made, manner.real_time is not None) for plan in self._plans
-        ]
+        self._pacer = None if options.real_time is None else WallClockPacer(self._grid, options.real_time)
+        self._plans = recording_plans(system)
+        made, is_steady = self._restored(), options.real_time is not None
+        self._recorders = [make_recorder(system, network, p, folder.path, made, is_steady) for p in self._plans]
 
-    def _take_up(self, continuation: Continuation | None) -> int | None:
-        """Go on with what the observers of the same run remembered; returns the steps that it had made, if any."""
+    def _restored(self) -> int | None:
+        """Restore the observers of the run that continues; return the macro steps that it had made, if any."""
+        continuation = self._options.continuation
         if continuation is None or not continuation.is_same_run:
             return None
         checkpoint = continuation.checkpoint
@@ -290,184 +212,108 @@ class _Session:
             observer.restore(checkpoint.observers[observer.name])
         return checkpoint.index
 
-    @property
-    def observers(self) -> list[Observer]:
-        """Those that belong to every run."""
-        return [
-            self._geometry,
-            *self._recorders,
-            self._power,
-            self._stopwatch,
-            self._contact_loss_stop,
-            self._off_wire_stop,
-            self._cautions,
-        ]
-
-    def last_observers(self, schedule: CheckpointSchedule) -> list[Observer]:
-        """Those that have to see a step after all others: checkpoints, and at the very last the clock."""
-        path = self._folder / CHECKPOINT
-        checkpoints = [CheckpointObserver(self._checkpoint, path, schedule)] if schedule else []
-        return [*checkpoints, *([self._pacer] if self._pacer else [])]
+    def simulate(self, observers: Sequence[Observer], stop_wanted: Callable[[], bool]) -> RunOutcome:
+        """Step over the grid, watched by the run's observers and by further ones."""
+        self._warnings += [o for o in observers if isinstance(o, FmuWarningObserver)]
+        everyone: list[Observer] = [self._geometry, *self._recorders, self._power, self._stopwatch]
+        everyone += [self._loss_stop, self._off_wire_stop, self._warnings[0], *observers]
+        # These have to see a step after all others: checkpoints, and at the very last the clock.
+        if self._schedule:
+            everyone.append(CheckpointObserver(self._checkpoint, self._folder.checkpoint_file, self._schedule))
+        if self._pacer:
+            everyone.append(self._pacer)
+        continuation = self._options.continuation
+        way_in = {} if continuation is None else {"prepare": continuation.prepare}
+        return simulate(self._network, self._algorithm, self._grid, everyone, stop_wanted, **way_in)
 
     def _checkpoint(self, network: Network, index: int) -> Checkpoint:
         for recorder in self._recorders:
-            recorder.sync()  # no checkpoint is ahead of the rows that it goes on from
-        return take(self._system, network, self.algorithm, index, self._stateful, self._identity)
+            recorder.sync()  # no checkpoint is ahead of the rows that a run continues from
+        return take(self._system, network, self._algorithm, index, self._stateful, self._folder.run)
 
-    def conclude(self, outcome: RunOutcome, recordings: tuple[Recording, ...]) -> Results:
-        """Write the summary and return the results, of what is in the files."""
-        description = {
-            **_description(self._system, self._identity),
-            **_ending(outcome),
-            **self._not_judged(outcome, recordings[0]),
-        }
-        done = Results(self._folder, description, recordings, self._geometry.geometry)
-        summary = {
-            **description,
-            **_origin(self._manner.continuation),
-            **run_summary.figures(done),
-            "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
-            "performance": self._performance(outcome),
-            "recordings": [recording_name(p, self._system.step) for p in self._plans],
-            "adjustments": list(adjustments(self._system, self._manner.checkpoint_every)),
-            "warnings": [{"component": w.component, "text": w.text} for w in self._cautions.warnings],
-            "scenario_warnings": list(self._system.warnings),
-        }
-        run_results.write_forces(done)
-        results_folder.write_json(self._folder / results_folder.SUMMARY, summary)
-        return replace(done, summary=summary)
+    def warn_of(self, troubles: dict[str, str]) -> None:
+        """Add what went wrong when FMUs were freed to what they have warned of."""
+        for observer in self._warnings:
+            for component, text in troubles.items():
+                observer.add(FmuWarning(component, text, is_own=False))
 
-    def disown(self, error: ForeignResultsError) -> None:
-        """Mark results that are not what was written, if they are this run's at all."""
-        if _is_still(self._folder, self._identity):
-            data = {**_description(self._system, self._identity), "status": "failed", "reason": str(error)}
-            results_folder.write_json(self._folder / results_folder.SUMMARY, data)
-
-    def recordings(self, outcome: RunOutcome) -> tuple[Recording, ...]:
-        """Read what was recorded.
+    def conclude(self, outcome: RunOutcome) -> Results:
+        """Write the summary and return the results, of what is in the files.
 
         Raises
         ------
         ForeignResultsError
             If the files are no longer those that this run wrote.
+        RunError
+            If the run did not come to its end, or the summary cannot be written.
         """
-        advice = "while the run went on; run it again, in a folder of its own (--out)"
-        if not _is_still(self._folder, self._identity):
-            raise ForeignResultsError(f"the results in {self._folder} were removed or taken by another run {advice}")
-        for recorder in self._recorders:
-            if not recorder.path.is_file():
-                raise ForeignResultsError(f"{recorder.path} was removed {advice}")
-        recordings = tuple(r.recording for r in self._recorders)
-        for recorder, recording in zip(self._recorders, recordings, strict=True):
-            if outcome.status == "complete" and len(recording.time) != recorder.rows:
-                found = f"has {len(recording.time)} rows, {recorder.rows} were written"
-                raise ForeignResultsError(f"{recorder.path} {found}: it was changed {advice}")
-            if outcome.status == "complete" and not recorder.is_as_written:
-                raise ForeignResultsError(f"{recorder.path} is not what was written: it was changed {advice}")
-        return recordings
+        try:
+            recordings = self._recordings(outcome.status == "complete")
+            outcome, not_judged = self._judged(outcome, recordings[0])
+            done = self._written(outcome, not_judged, recordings)
+        except ForeignResultsError as error:
+            if self._folder.is_intact:
+                self._folder.write_summary({**self._description, "status": "failed", "reason": str(error)})
+            raise ForeignResultsError(f"{outcome.error}. {error}" if outcome.error else str(error)) from error
+        except MasterError as error:  # no room for the summary, say
+            cause = outcome.error or error
+            kept = f"What was written before is in {self._folder.path}, marked running"
+            raise RunError(f"{cause}. {kept}") from error
+        if outcome.status != "complete":
+            kind = InterruptedRunError if outcome.status == "interrupted" else RunError
+            raise kind(_what_happened(outcome, self._folder.path)) from outcome.error
+        return done
 
-    def checked(self, outcome: RunOutcome, recording: Recording) -> RunOutcome:
-        """Return how the run ended once it is seen whether it has covered what it was to cover."""
-        reason = self._lacking(recording) if outcome.status == "complete" else ""
-        if not reason or self._may_lack:
-            return outcome
-        error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")
-        return replace(outcome, status="incomplete", error=error)
+    def _recordings(self, is_complete: bool) -> tuple[Recording, ...]:
+        """Read what was recorded, if it is still this run's."""
+        if not self._folder.is_intact:
+            text = f"the results in {self._folder.path} were removed or taken by another run"
+            raise ForeignResultsError(f"{text} {RERUN_ADVICE}")
+        return tuple(recorder.read_back(is_complete) for recorder in self._recorders)
 
-    @property
-    def _may_lack(self) -> bool:
-        """Whether the user has asked for less than the interval of interest."""
-        continuation = self._manner.continuation
-        begins_anew = continuation is not None and not continuation.is_same_run
-        return self._system.may_stop_early or begins_anew
-
-    def _lacking(self, recording: Recording) -> str:
+    def _judged(self, outcome: RunOutcome, recording: Recording) -> tuple[RunOutcome, str]:
+        """Return how the run ended if it has to cover its interval of interest, and why it cannot be judged, if so."""
+        if outcome.status != "complete":
+            return outcome, ""
         interval = self._system.settings.interval
-        if reason := shortfall(recording, self._contacts, (interval.start, interval.end)):
-            return reason
-        silent = never_touched(recording, self._contacts)
-        return f"'{silent}' never touches the wire" if silent else ""
+        reason = not_judgeable(recording, self._contacts, (interval.start, interval.end))
+        continuation = self._options.continuation
+        is_part = continuation is not None and not continuation.is_same_run
+        if not reason or self._system.may_stop_early or is_part:
+            return outcome, reason
+        error = RunError(f"{reason}; run it longer, or ask for a part of it with --stop")
+        return replace(outcome, status="incomplete", error=error), ""
 
-    def _not_judged(self, outcome: RunOutcome, recording: Recording) -> dict[str, str]:
-        reason = self._lacking(recording) if outcome.status == "complete" else ""
-        return {"not_judged": reason} if reason else {}
+    def _written(self, outcome: RunOutcome, not_judged: str, recordings: tuple[Recording, ...]) -> Results:
+        description = {
+            **self._description,
+            **run_summary.ending(outcome),
+            **({"not_judged": not_judged} if not_judged else {}),
+        }
+        done = Results(self._folder.path, description, recordings, self._geometry.geometry)
+        summary = {
+            **description,
+            **run_summary.origin(self._options.continuation),
+            **run_summary.figures(done),
+            "interface_power": [asdict(p) for p in self._power.summary(self._system.step)],
+            "performance": self._performance(outcome),
+            "recordings": [recording_name(p, self._system.step) for p in self._plans],
+            "adjustments": list(adjustments(self._system, self._options.checkpoint_every)),
+            "warnings": [{"component": w.component, "text": w.text} for w in self._warnings[0].warnings],
+            "scenario_warnings": list(self._system.warnings),
+        }
+        write_forces(self._folder.path, done.signals)
+        self._folder.write_summary(summary)
+        return replace(done, summary=summary)
 
     def _performance(self, outcome: RunOutcome) -> dict[str, Any]:
         punctuality = self._pacer.punctuality if self._pacer else None
         return {
-            **_performance(self._stopwatch.timing, outcome.time - self.grid.begin),
-            "isolated": self._manner.isolation is not None,
+            **run_summary.performance(self._stopwatch.timing, outcome.time - self._grid.begin),
+            "isolated": self._options.isolation is not None,
             "component_time": {s.name: s.stepping_time for s in self._network.slaves if isinstance(s, Recordable)},
             **({"real_time": asdict(punctuality)} if punctuality else {}),
         }
-
-
-def _origin(continuation: Continuation | None) -> dict[str, Any]:
-    if continuation is None:
-        return {}
-    c = continuation
-    return {"resumed": {"file": c.file, "time": c.checkpoint.time, "renewed": list(c.renewed)}}
-
-
-def _performance(timing: Timing, simulated: float) -> dict[str, float]:
-    return {
-        "initialisation_time": timing.initialisation,
-        "wall_time": timing.stepping,
-        "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
-        "peak_memory": run_summary.peak_memory(),
-    }
-
-
-def _description(system: System, identity: str) -> dict[str, Any]:
-    return {
-        "generator": results_folder.GENERATOR,
-        "format": results_folder.FORMAT,
-        "run": identity,
-        "scenario": system.name,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": run_summary.versions(),
-        "settings": {
-            "start": system.start,
-            "stop": system.stop,
-            "step": system.step,
-            **system.settings.model_dump(mode="json"),
-        },
-        "components": [_component(c) for c in system.components],
-        "contacts": [asdict(c) for c in find_contacts(system.connections)],
-    }
-
-
-def _component(component: Component) -> dict[str, Any]:
-    fmu = component.fmu
-    return {
-        "name": component.name,
-        "fmu": fmu.path.name,
-        "guid": fmu.guid,
-        "sha256": fmu.sha256,
-        "tool": fmu.tool,
-        "parameters": component.parameters,
-        "tolerance": component.tolerance,
-        "inputs": [_input(component, v) for v in fmu.variables.values() if v.causality == "parameter"],
-    }
-
-
-def _input(component: Component, variable: Variable) -> dict[str, Any]:
-    return {
-        "name": variable.name,
-        "value": component.parameters.get(variable.name, variable.start),
-        "unit": variable.unit,
-        "description": variable.description,
-        "changed": variable.name in component.parameters,
-    }
-
-
-def _ending(outcome: RunOutcome) -> dict[str, Any]:
-    return {
-        "status": outcome.status,
-        "reason": str(outcome.error) if outcome.error else "",
-        "steps": outcome.steps,
-        "time_reached": outcome.time,
-    }
 
 
 def _what_happened(outcome: RunOutcome, folder: Path) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from master.errors import ScenarioError
-from master.run import Manner, run
+from master.run import RunOptions, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 
@@ -247,9 +247,9 @@ def problems(folder, **overrides):
     return [str(p) for p in caught.value.problems]
 
 
-def ran(folder, tmp_path, manner=None, **overrides):
+def ran(folder, tmp_path, options=None, **overrides):
     """The recording of a run, by name the values at all times."""
     with open_scenario(folder, Overrides(**overrides), build=False) as found:
-        done = run(found.system, tmp_path / "out", manner=manner or Manner())
+        done = run(found.system, tmp_path / "out", options=options or RunOptions())
     recording = done.recordings[0]
     return {name: recording[name] for name in recording.names}

@@ -13,7 +13,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from fmus.builder import fmu_build as building
-from fmus.builder.fmu_build import BuildError
+from fmus.builder import recipe
+from fmus.builder.recipe import BuildError
 from master.batch.calibration import store_value
 from master.errors import MasterError
 from master.safety import safe_files
@@ -28,16 +29,15 @@ WRITES = {"write_text", "write_bytes", "savefig", "savetxt", "write_table", "sav
 #: Functions that may: they write beside the file's place, into memory, or into a temporary folder of their own.
 WHOLE = {
     "master/safety/folder_lock.py": {"_sign"},
-    "master/results/run_results.py": {"write_forces"},
+    "master/results/results_folder.py": {"write_forces"},
     "master/safety/safe_files.py": {"write_atomically"},
     "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},
-    "master/batch/verification/verification_page.py": {"_picture"},
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_whole", "write_csv", "write_figure"},
     "models/numerics/kernel_cache.py": None,
-    "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_whole"},
+    "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_atomically"},
     "fmus/loader/runtime.py": {"_archive", "_replace"},
 }
 #: Functions that are called ``write_text`` and ``save`` and are no writing by a file's name.
@@ -84,7 +84,7 @@ def full(*_):
         (lambda p: physics_files.write_text(p, "new"), OSError),
         (lambda p: physics_files.write_csv(p, ["a"], [np.zeros(3)]), OSError),
         (lambda p: physics_files.write_figure(p, Figure(), 50), OSError),
-        (lambda p: building._write_whole(p, b"new"), OSError),
+        (lambda p: building._write_atomically(p, b"new"), OSError),
     ],
 )
 def test_a_full_disk_leaves_the_old_file_and_names_it(tmp_path, monkeypatch, write, raised):
@@ -104,7 +104,7 @@ def test_an_fmu_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(building, "archive", lambda *_: b"new")
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(BuildError, match=r"Pantograph_CX\.fmu cannot be written \(No space left on device\)"):
-        building.build(building.recipe("Pantograph_CX"), tmp_path)
+        building.build(recipe.recipe("Pantograph_CX"), tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 

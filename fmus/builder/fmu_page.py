@@ -36,7 +36,7 @@ _RUNNING: Final = (
 
 @dataclass(frozen=True)
 class About:
-    """What the page says besides what it takes from the variables.
+    """What the page says in addition to what it takes from the variables.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class About:
 
 @dataclass(frozen=True)
 class Row:
-    """Variables that differ in their indices only, in one line."""
+    """Variables that differ only in their indices, on one line."""
 
     name: str
     unit: str

@@ -1,4 +1,4 @@
-"""Packing source packages under a private name.
+"""Source packages, packed under a private name.
 
 FMUs in one process share ``sys.modules``: a module named ``models`` would be taken from whichever FMU
 came first. So each FMU carries what it needs, and no more, inside one package whose name holds the FMU's
@@ -48,7 +48,7 @@ class Module:
 
     @property
     def is_optional(self) -> bool:
-        """Whether it needs what a machine may lack; then it is carried along, but not imported by its name."""
+        """Whether it needs what a machine may lack; it is then carried along, but not imported by name."""
         return any(_root(name) in OPTIONAL for node in _imports(self) for name in _imported_names(node))
 
     def inner_path(self) -> str:

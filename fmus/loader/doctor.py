@@ -1,4 +1,4 @@
-"""What a machine lacks for running an FMU, in words: ``python -m fmus doctor X.fmu``."""
+"""What a machine lacks to run an FMU, in words: ``python -m fmus doctor X.fmu``."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _PLATFORMS: Final = {
     ("Darwin", "x86_64"): ("darwin64", ".dylib"),
 }
 _SECONDS: Final = 300
-#: Most that an FMU of ours may unpack to [bytes]; they take a few megabytes.
+#: The largest size that an FMU of ours may unpack to [bytes]; they take a few megabytes.
 _LARGEST: Final = 1024**3
-#: What reading something that is no FMU raises: zipfile documents only some of it.
+#: What reading a file that is not an FMU can raise: zipfile documents only some of it.
 _UNREADABLE: Final = (
     OSError,
     ValueError,
@@ -80,7 +80,7 @@ sys.exit(0 if slave.do_step(0.0, 1e-3) else 1)
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: in order (ok), worth knowing (note), or in the way (missing)."""
+    """One thing that was checked: fine (ok), worth knowing (note), or an obstacle (missing)."""
 
     level: Level
     text: str
@@ -110,7 +110,7 @@ class Package:
     guid: str
 
     def library(self) -> str:
-        """Return the name of this platform's library, empty if FMUs have none for it."""
+        """Return the name of the library for this platform, empty if FMUs have none for it."""
         folder, suffix = _PLATFORMS.get((platform.system(), platform.machine()), ("", ""))
         return f"binaries/{folder}/{self.identifier}{suffix}" if folder else ""
 
@@ -121,7 +121,7 @@ class Package:
 
 
 def examine(path: Path) -> list[Finding]:
-    """Look at an FMU and at this machine; return all that was found."""
+    """Examine an FMU and this machine; return all findings."""
     try:
         package = read_package(path)
     except _UNREADABLE as error:
@@ -140,7 +140,7 @@ def read_package(path: Path) -> Package:
     Raises
     ------
     ValueError
-        If it is no FMI 2.0 co-simulation FMU made with pythonfmu; zipfile's and the XML parser's errors too.
+        If it is not an FMI 2.0 co-simulation FMU made with pythonfmu; zipfile and the XML parser raise others.
     """
     with zipfile.ZipFile(path) as file:
         names = frozenset(file.namelist())
@@ -157,7 +157,7 @@ def read_package(path: Path) -> Package:
 
 
 def ask(name: str | None = None) -> Interpreter | None:
-    """Ask an interpreter (default: the one that tools take) what it has; None if it cannot be run."""
+    """Ask an interpreter (by default the one that tools use) what it has; return None if it cannot be run."""
     name = name or interpreter_name()
     command = [name, "-c", PROBE.read_text(encoding="utf-8")]
     try:
@@ -166,12 +166,12 @@ def ask(name: str | None = None) -> Interpreter | None:
         return None
     _, _, answers = done.stdout.partition("openpanto_probe:\n")  # what a site's own code prints comes before
     lines = [*answers.splitlines(), "", "", "", ""]
-    # Without PATH it does not know its own place.
+    # Without PATH it does not know where it is.
     return Interpreter(lines[0] or name, *lines[1:4]) if done.returncode == 0 and lines[1] else None
 
 
 def interpreter_name() -> str:
-    """Return what tools take: what OPENPANTO_PYTHON names, or the first python3 on PATH."""
+    """Return the interpreter that tools use: what OPENPANTO_PYTHON names, or the first python3 on PATH."""
     default = "python" if platform.system() == "Windows" else "python3"
     return os.environ.get("OPENPANTO_PYTHON") or default
 
@@ -314,7 +314,7 @@ def _other_hosts(package: Package, python: Interpreter) -> Iterator[Finding]:
 
 
 def main(path: Path) -> int:
-    """Print what was found; 1 if something is missing."""
+    """Print the findings; return 1 if something is missing."""
     found = examine(path)
     for finding in found:
         print(finding)

@@ -1,4 +1,4 @@
-"""Asked of the Python that an FMU runs in, before pythonfmu is: whether the FMU's code can be loaded, and why not.
+"""Whether an FMU's code can be loaded, and why not: run in the FMU's Python before pythonfmu is used.
 
 The loader carries this text. pythonfmu's library does not survive code that cannot be imported or compiled, or a path
 that Python takes for another one; so such an FMU never reaches it. Old Pythons must understand this file.
@@ -29,7 +29,7 @@ def problem(resources: str, script: str) -> str:
     except ModuleNotFoundError as error:
         name = str(error.name).partition(".")[0]
         if name.startswith(("openpanto_", script)):
-            return "the FMU is incomplete: " + str(error) + "; unpack it again, or build it anew"
+            return "the FMU is incomplete: " + str(error) + "; unpack it again, or rebuild it"
         return "the Python in this process (" + _place() + ") lacks the package " + name + "; install it there"
     except BaseException as error:
         return "the FMU cannot be loaded: " + (str(error) or type(error).__name__)
@@ -42,7 +42,7 @@ def forget(resources: str, _: str = "") -> None:
     """Take the folder out of the places that modules come from; all that is needed has been imported."""
     try:
         while True:
-            sys.path.remove(resources)  # in one piece: another thread may be adding its own FMU's folder
+            sys.path.remove(resources)  # atomic: another thread may be adding the folder of its FMU
     except ValueError:
         pass
 

@@ -1,19 +1,19 @@
 /* The library of an FMU that its host loads: it brings Python into the process and passes every call on to pythonfmu.
  *
  * pythonfmu's own library leaves Python's symbols to whoever loads it, takes the first Python that it comes across,
- * ends it when the process ends, and dies of resource locations, files and code that it did not expect. So it lies
+ * ends it when the process ends, and crashes on resource locations, files and code that it did not expect. So it lies
  * behind this one (NAME.pythonfmu.so beside NAME.so), which
  *
- * - decodes the resource location (RFC 3986, RFC 8089, plain paths) and looks whether the files are there;
+ * - decodes the resource location (RFC 3986, RFC 8089, plain paths) and checks that the files are there;
  * - compares the GUID with the one in resources/openpanto.txt;
  * - finds Python: already in the process, in a runtime that came with the FMU, named by OPENPANTO_PYTHON, or python3
- *   on PATH; initialises it before pythonfmu does, for who did not start Python does not end it either;
+ *   on PATH; initialises it before pythonfmu does, because whoever did not start Python does not end it either;
  * - lets Python load the FMU's code once (fmu_opening.py), and has pythonfmu do it only if that went well;
  * - makes an error that the FMU's code has logged the status of the call in which it did.
  *
- * Whatever fails is one sentence, through the host's logger and on standard error, and NULL or an error status.
+ * Whatever fails is reported in one sentence, through the host's logger and on standard error, and NULL or an error status.
  *
- * One file, and longer than others here: an FMU's loader has one door, fmi2Instantiate, every step behind it can fail in
+ * One file, longer than the others here: an FMU's loader has one door, fmi2Instantiate, every step behind it can fail in
  * the same way, and what is static can be seen by no other library in the host. What the system decides is in platform_*.c.
  *
  * To be compiled in this folder (the texts of the two Python files become part of the library); with the options in
@@ -136,9 +136,9 @@ static void clean(char *text) {
     }
 }
 
-/* ---- Telling -------------------------------------------------------------------------------------------------- */
+/* ---- Reporting ------------------------------------------------------------------------------------------------ */
 
-static void tell(const Callbacks *host, String name, Status status, String category, String message) {
+static void report(const Callbacks *host, String name, Status status, String category, String message) {
     if (!host || !host->logger) return;
     const char *fallback = status >= ERROR ? "logStatusError" : status == WARNING ? "logStatusWarning" : "logAll";
     host->logger(host->environment, name, status, category && *category ? category : fallback, message);
@@ -148,7 +148,7 @@ static void *refuse(const Callbacks *host, String name, Problem *problem) {
     clean(problem->text);
     fprintf(stderr, "%s: %s\n", name, problem->text);
     fflush(stderr);
-    tell(host, name, ERROR, NULL, problem->text);
+    report(host, name, ERROR, NULL, problem->text);
     return NULL;
 }
 
@@ -181,7 +181,7 @@ static void pass_message(void *environment, String name, Status status, String c
     clean(text);
     if (status == FATAL) status = ERROR; /* other instances are not touched by it */
     if (status > instance->worst) instance->worst = status;
-    if (instance->logging || status >= ERROR) tell(&instance->host, name, status, category, text);
+    if (instance->logging || status >= ERROR) report(&instance->host, name, status, category, text);
     free(text);
 }
 
@@ -315,7 +315,7 @@ static char *read_script_name(const char *folder, Problem *problem) {
     if (is_there) return name;
     free(name);
     fail(problem, "the FMU's resources in '%.400s' are incomplete: slavemodule.txt, or the script that it names, is missing; "
-                  "unpack the FMU again, or build it anew", folder);
+                  "unpack the FMU again, or rebuild it", folder);
     return NULL;
 }
 
@@ -425,7 +425,7 @@ static int load_python(const Interpreter *python, Problem *problem) {
 static int check_version(const char *version, const char *whose, Problem *problem) {
     const char *(*loaded)(void) = (const char *(*)(void))find_in_process("Py_GetVersion");
     size_t length = strlen(version);
-    if (!loaded) return fail(problem, "what %s names as Python's library is none", whose);
+    if (!loaded) return fail(problem, "what %s names as Python's library is not one", whose);
     if (strncmp(loaded(), version, length) == 0 && (loaded()[length] == '.' || loaded()[length] == ' ')) return 1;
     return fail(problem, "the Python library in this process is %.6s, but %s is %s; name the right one in "
                          "OPENPANTO_PYTHON", loaded(), whose, version);
@@ -702,7 +702,7 @@ static Component make_inner(Instance *instance, Problem *problem) {
     instance->worst = OK;
     Component made = make ? make(instance->name, 1, "", instance->path, &instance->own, 0, 1) : NULL;
     call_opening("forget", instance->path, "", answer, sizeof answer);
-    /* "": it was told, by whoever knew why */
+    /* "": it was reported by whoever knew why */
     if (!made) fail(problem, "%s", instance->worst < ERROR ? "pythonfmu made no instance of the FMU" : "");
     return made;
 }
@@ -725,7 +725,7 @@ static void compare_versions(const Instance *instance, const char *folder) {
     if (call_opening("other_versions", wanted, setting(&about, "content"), answer, sizeof answer) && *answer) {
         clean(answer);
         fprintf(stderr, "%s: %s\n", instance->name, answer);
-        tell(&instance->host, instance->name, WARNING, NULL, answer);
+        report(&instance->host, instance->name, WARNING, NULL, answer);
     }
     free(about.text);
 }

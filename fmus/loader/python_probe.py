@@ -1,6 +1,6 @@
-"""Asked of the Python that an FMU would run in; prints one answer a line, after a line that says where they begin.
+"""What the Python that an FMU would run in has: one answer per line, after a line that marks where they begin.
 
-The loader carries this text. Nothing that Python 3.8 does not know.
+The loader carries this text. Python 3.8 must understand it.
 """
 
 import importlib.util

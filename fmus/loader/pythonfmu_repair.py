@@ -1,11 +1,11 @@
-"""A repair of pythonfmu's Linux library, which gives memory back twice when the process ends.
+"""A repair of pythonfmu's Linux library, which frees memory twice when the process ends.
 
 The library keeps Python's state in a static object. As ``exit`` runs, that object's destructor comes first; then the
 library's own clean-up (its fini array) releases the object once more, through memory that is free by then. Sometimes
-that ends the process with "corrupted double-linked list", after a run that was right in everything else. The repair
+that ends the process with "corrupted double-linked list", after a run that was otherwise correct. The repair
 leaves the first release and takes out the second: the fini array's entry in the dynamic section becomes the flag
-NODELETE, so that the library stays loaded until the end (as it does anyway, for it has unique symbols), and its size
-becomes 0. No instruction changes.
+NODELETE, so that the library stays loaded until the end (as it does anyway, because it has unique symbols), and its
+size becomes 0. No instruction changes.
 """
 
 from __future__ import annotations

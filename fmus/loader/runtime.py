@@ -26,17 +26,17 @@ from typing import Final
 
 import pythonfmu
 
-from fmus.loader.elf import is_aligned
-from fmus.loader.installation import PACKAGES, Installation, InstallationError, own
-from fmus.loader.licences import COMPILED_HERE, licences
+from fmus.loader.elf_library import is_aligned
 from fmus.loader.loader_build import DESCRIPTION
-from fmus.loader.rehearsal import LoadedModules, RehearsalError, rehearse
+from fmus.loader.module_rehearsal import LoadedModules, RehearsalError, rehearse
+from fmus.loader.python_installation import PACKAGES, Installation, InstallationError, own
+from fmus.loader.runtime_licences import COMPILED_HERE, licences
 from fmus.loader.shared_libraries import BlasError, Libraries, collect_libraries
 
 #: Version of this layout, for the loader.
 FORMAT: Final = 1
-#: Modules of the standard library that come along though no good run loads them: what other systems and encodings
-#: need, and what puts an error into words.
+#: Modules of the standard library that are included although no successful run loads them: other systems and
+#: encodings need them, or errors are put into words with them.
 _ALWAYS: Final = frozenset(
     {
         "_strptime",
@@ -62,7 +62,7 @@ _ALWAYS: Final = frozenset(
 _REPLACED: Final = frozenset({"_hashlib", "_ssl", "_uuid"})
 #: What hashlib takes instead.
 _ADDED: Final = frozenset({"_md5", "_sha1", "_sha256", "_sha512", "_sha3", "_blake2"})
-#: What stands in the place of modules that would load all of scipy.linalg, scipy.sparse.linalg and numpy for few names.
+#: Stand-ins for modules that would load all of scipy.linalg, scipy.sparse.linalg and numpy for the sake of a few names.
 _FRONTS: Final[Mapping[str, str]] = {
     "numpy.random": "class Generator: pass\nclass RandomState: pass\n",
     "scipy._lib._array_api": """Array = object
@@ -140,7 +140,7 @@ def make_runtime(source: Installation, resources: Iterable[Path]) -> Runtime:
 
 
 def _smallest(source: Installation, here: Installation, folders: Sequence[Path], work: Path) -> Runtime:
-    """Return the smallest runtime that works: other versions of numpy and scipy may be built otherwise."""
+    """Return the smallest runtime that works: other versions of numpy and scipy may be built differently."""
     compiled = work / COMPILED_HERE
     compiled.mkdir()
     used = _lazily_used(folders)
@@ -277,7 +277,7 @@ def _byte_code(name: str, source: bytes) -> bytes:
     """Return a module's byte code, which is never compared with a source (PEP 552)."""
     tree = ast.parse(source) if name in _DOCSTRINGS_NEEDED else _without_docstrings(source)
     code = compile(tree, name, "exec", dont_inherit=True, optimize=0)
-    # Twice: what marshal writes depends on who else holds an object, and only a copy of its own has no such past.
+    # Twice: what marshal writes depends on who else holds an object, which nobody does of a fresh copy.
     body = marshal.dumps(marshal.loads(marshal.dumps(code)))
     return importlib.util.MAGIC_NUMBER + _BYTE_CODE_UNCHECKED + importlib.util.source_hash(source) + body
 
@@ -347,7 +347,7 @@ def write_files(files: Mapping[str, bytes], folder: Path) -> None:
 
 
 def _replace(path: Path, data: bytes) -> None:
-    """Put a file in the place of the old one, whole; an error names it."""
+    """Replace a file as a whole; an error names it."""
     temporary = path.with_name(f".{path.name}.part")
     try:
         temporary.write_bytes(data)

@@ -11,11 +11,11 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Final
 
-from fmus.loader.elf import needed, soname
-from fmus.loader.installation import PACKAGES, Installation, InstallationError
+from fmus.loader.elf_library import needed, soname
 from fmus.loader.loader_build import needed_versions
+from fmus.loader.python_installation import PACKAGES, Installation, InstallationError
 
-#: Libraries of glibc: these are the machine's, whoever brings others breaks it.
+#: Libraries of glibc, which are the machine's: to bring others would break it.
 _GLIBC: Final = frozenset(
     {
         "ld-linux-x86-64.so.2",
@@ -74,7 +74,7 @@ def collect_libraries(source: Installation, modules: Mapping[str, Path], one_bla
     ----------
     source : Installation
     modules : mapping
-        Place in the runtime -> file; those that are not libraries are passed over.
+        Place in the runtime -> file; those that are not libraries are skipped.
     one_blas : Path, optional
         Folder to compile the library in that lets numpy use scipy's OpenBLAS (``one_blas.c``); without it the runtime
         holds both copies.
@@ -82,7 +82,7 @@ def collect_libraries(source: Installation, modules: Mapping[str, Path], one_bla
     Raises
     ------
     InstallationError
-        If a library is nowhere to be found.
+        If a library cannot be found.
     BlasError
         If that library cannot be compiled here.
     """
@@ -107,7 +107,7 @@ def _of_linux(source: Installation, modules: Mapping[str, Path], one_blas: Path 
 
 
 def _one_blas(found: Mapping[str, Path], folder: Path) -> dict[str, Path]:
-    """Compile what stands in the place of numpy's OpenBLAS and hands over to scipy's."""
+    """Compile the stand-in for numpy's OpenBLAS that hands over to scipy's."""
     numpys = [name for name in found if name.startswith("libscipy_openblas64_-")]
     scipys = [path for name, path in found.items() if name.startswith("libscipy_openblas-")]
     if len(numpys) != 1 or len(scipys) != 1:
@@ -152,7 +152,7 @@ def _of_windows(source: Installation) -> Libraries:
     files = {f"packages/{p.parent.name}/{p.name}": p for p in wheels}
     # Compiled modules of Python find their libraries (libffi) in their own folder.
     files |= {f"extensions/{p.name}": p for p in sorted(source.extensions.glob("libffi*.dll"))}
-    # pythonfmu's library needs this one, which Python does without and wheels bring under a name of their own.
+    # pythonfmu's library needs this one, which Python does without and wheels bring under another name.
     visual_c = next((p for p in wheels if p.name.startswith("msvcp140-")), None)
     first = {f"lib/{p.name}": p for p in sorted(source.root.glob("vcruntime*.dll"))}
     first |= {"lib/msvcp140.dll": visual_c} if visual_c else {}

@@ -28,8 +28,8 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "An overhead contact line of several spans in three dimensions: contact wire and messenger wire (and stitch "
         "wires, where the definition has them) as tensioned Euler-Bernoulli beams, droppers that carry tension only, "
         "steady arms, stagger, clamps as lumped masses, proportional damping. The static shape is found first (given "
-        "contact-wire height and pre-sag, the dropper lengths follow); the dynamics are linear about it, but for the "
-        "slackening droppers and the contact, and are integrated with constant steps. The pantograph tells the ends "
+        "contact-wire height and pre-sag, the dropper lengths follow); the dynamics are linear about it, except for "
+        "slackening droppers and the contact, and are integrated with constant steps. The pantograph gives the ends "
         "of its collector strip; the line finds where the wire crosses the strip, the contact force from the "
         "interpenetration, and its point of application. Between communication points the strip is continued from "
         "its last positions and velocities, so hosts that hold inputs lose no accuracy."
@@ -48,7 +48,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "definition.",
         "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: a strip meets the "
         "same wire again after every lap, with what its last passage has left of the wire's motion.",
-        "All that the definition marks as a choice is not taken from the source.",
+        "Whatever the definition marks as a choice is not taken from the source.",
     )
 
     def _read_definition(self, path: Path) -> CatenaryDefinition:
@@ -133,7 +133,7 @@ def _uplift_port(part: CatenaryPart) -> Port:
 
 
 def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:
-    told = (("force", "N", "tension of"), ("slack", "1", "1 while it is slack, else 0:"))
+    observed = (("force", "N", "tension of"), ("slack", "1", "1 while it is slack, else 0:"))
     return tuple(
         Port(
             tuple(
@@ -142,7 +142,7 @@ def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:
             ),
             attrgetter(f"dropper_{name}"),
         )
-        for name, unit, text in told
+        for name, unit, text in observed
     )
 
 

@@ -1,4 +1,4 @@
-"""Ports of a pantograph."""
+"""Ports of a lumped pantograph, and those that every pantograph has."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     limits: ClassVar[tuple[str, ...]] = (
         "Vertical motion only: the strip does not roll, and the lateral point of application has no effect.",
         "Linear springs and dampers, identified at one working height; no friction, no stops.",
-        "No aerodynamic uplift of its own: add it to static_force.",
+        "No aerodynamic uplift: add it to static_force.",
         "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
     )
 
@@ -52,7 +52,7 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
 
 
 def pantograph_ports(part: Any) -> Ports:
-    """Return the ports that every pantograph has, and those of its own observations."""
+    """Return the ports that every pantograph has, and those of its observations."""
     return Ports(
         inputs=(
             Signal("contact.force", "N", "contact force; positive pushes the strip down", 0.0),

@@ -16,7 +16,7 @@ from fmus.slave.ports import Signal, Table, Variable
 #: A fixed date: the same source must give the same FMU.
 DATE: Final = "1980-01-01T00:00:00Z"
 STEP_SIZE: Final = 1e-3
-#: What tools do that are told nothing else; the models keep their own steps and know no tolerance.
+#: What tools do by default; the models keep their own steps and know no tolerance.
 STOP_TIME: Final = 1.0
 TOLERANCE: Final = 1e-6
 _VARIABILITY: Final = {

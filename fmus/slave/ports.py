@@ -82,9 +82,9 @@ class Variable:
 
 
 class Table:
-    """Every variable of an FMU; value references count on from 0 in the order of this table.
+    """Every variable of an FMU; value references count from 0 in the order of this table.
 
-    Parameters come first and computed values last, so that one comparison tells what a value reference means.
+    Parameters come first and computed values last, so that one comparison shows what a value reference means.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Table:
         return len(self.variables)
 
     def start_values(self) -> FloatArray:
-        """Return the values before anything is set or computed: starts, and NaN for what is not known yet."""
+        """Return the values before anything is set or computed: start values, and NaN for what is not known yet."""
         starts = [v.signal.start for v in self.variables]
         return np.array([np.nan if s is None else s for s in starts], dtype=np.float64)
 
@@ -147,7 +147,7 @@ def vector(prefix: str, unit: str, description: str, start: Sequence[float] | No
 
 
 def energy_ports(contacts: Sequence[str]) -> tuple[Port, ...]:
-    """Return a part's energy balance and what is done at its contacts, which begin with these prefixes."""
+    """Return the ports of a part's energy balance and of the work at its contacts, which have these prefixes."""
     unless = "0 unless monitor_energy is 1"
     balance = tuple(Signal(f"energy.{name}", "J", f"{text}; {unless}") for name, text in BALANCE)
     work = tuple(

@@ -1,9 +1,9 @@
 """The state of an instance, and its bytes: self-describing, bit-exact, checked; nothing in them is ever executed.
 
-The master packs its checkpoints and the messages of its children in the same layout (``array_container``); as the
-packages may not import each other, each has the few lines of its own. It is ``MAGIC``; the length of the header, 8
-bytes; the header, ``{"header": ..., "arrays": [{"name", "dtype", "shape"}, ...]}``, JSON in UTF-8; the arrays in that
-order, C order; the SHA-256 of everything before it. Numbers are little-endian.
+The master packs its checkpoints in the same layout (``master/safety/array_container.py``); as the packages may not
+import each other, each has its own few lines. It is ``MAGIC``; the length of the header, 8 bytes; the header,
+``{"header": ..., "arrays": [{"name", "dtype", "shape"}, ...]}``, JSON in UTF-8; the arrays in that order, C order; the
+SHA-256 of everything before it. Numbers are little-endian.
 """
 
 from __future__ import annotations

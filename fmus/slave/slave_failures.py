@@ -1,4 +1,4 @@
-"""What went wrong in an instance, in words that are safe in every host, and how often the host was told."""
+"""What went wrong in an instance, in words that are safe in every host, and whether the host knows it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class SlaveFailures:
         return "" if is_known else text
 
     def restore(self, refused: str, broken: str) -> None:
-        """Take back the failures of a saved state, which the host has been told of."""
+        """Restore the failures of a saved state, which the host knows."""
         self.refused, self.broken = refused, broken
         self._is_repeated = bool(self.current)
 

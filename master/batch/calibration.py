@@ -1,4 +1,4 @@
-"""Finding the parameter (usually the static force) that gives the wanted mean contact force."""
+"""Find the value of a parameter (usually the static force) that gives the wanted mean contact force."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from master.safety import folder_lock
 from master.safety.safe_files import write_atomically
 
 MAX_RUNS: Final = 12
-#: Files of a scenario in which values stand.
+#: Suffixes of the files of a scenario that hold values.
 _TEXTS: Final = (".ssd", ".ssv", ".ssm", ".csv", ".toml")
-#: First change tried, as a share of the start value, and how much a step may exceed the bracket's secant.
+#: First change to be tried, as a share of the start value.
 _FIRST_CHANGE: Final = 0.03
 
 
 @dataclass(frozen=True)
 class CalibrationTrial:
-    """One run of a calibration: parameter value and what came out."""
+    """One run of a calibration: the value of the parameter and the result."""
 
     value: float
     result: float
@@ -31,7 +31,7 @@ class CalibrationTrial:
 
 @dataclass(frozen=True)
 class CalibrationResult:
-    """Result of a calibration: the chosen value, what it gives, and all trials in order."""
+    """The value that a calibration has found, its result, and all trials in order."""
 
     value: float
     result: float
@@ -45,20 +45,20 @@ def find_value(
     tolerance: float,
     guess: float | None = None,
 ) -> CalibrationResult:
-    """Find the value at which ``function`` gives ``target``.
+    """Return the value at which ``function`` gives ``target``.
 
-    Secant steps, held inside a bracket once there is one.
+    By secant steps, kept inside a bracket once there is one.
 
     Parameters
     ----------
     function : callable
-        Value -> result; each call is a whole run.
+        Value -> result; every call is a whole run.
     target, tolerance : float
-        Wanted result and how near is near enough.
+        Wanted result, and how near to it is enough.
     start : float
         First value tried.
     guess : float, optional
-        Second value; by default ``start`` plus the first miss (right where both are the same quantity).
+        Second value; by default ``start`` plus the first miss (right if both are the same quantity).
 
     Raises
     ------
@@ -83,16 +83,16 @@ def find_values(
     starts: Sequence[float],
     tolerance: float,
 ) -> tuple[CalibrationResult, ...]:
-    """Find the values at which every result of ``function`` is ``target``, all of them in the same runs.
+    """Return the values at which every result of ``function`` is ``target``, all found in the same runs.
 
-    Each result must depend mainly on the value in the same place: every value takes its own secant steps.
+    Each result must depend mainly on the value in the same place, for every value takes its own secant steps.
 
     Parameters
     ----------
     function : callable
-        Values -> as many results; each call is a whole run.
+        Values -> as many results; every call is a whole run.
     target, tolerance : float
-        Wanted result and how near is near enough.
+        Wanted result, and how near to it is enough.
     starts : sequence of float
         First values tried.
 
@@ -114,7 +114,7 @@ def find_values(
 
 
 def _next_of_several(trials: list[CalibrationTrial], target: float, tolerance: float) -> float:
-    """Return the next value; a good one stays, and runs in which only the others changed tell nothing."""
+    """Return the next value; a good one stays, and runs in which only the others changed are ignored."""
     last = trials[-1]
     if abs(last.result - target) <= 0.5 * tolerance:
         return last.value
@@ -131,7 +131,7 @@ def _first_step(first: CalibrationTrial, target: float, guess: float | None) -> 
 
 
 def _next(trials: list[CalibrationTrial], target: float) -> float:
-    """Return the secant's value; the middle of the bracket if the secant leaves it or has hardly helped."""
+    """Return the value of the secant; the middle of the bracket if the secant leaves it or has hardly helped."""
     a, b = trials[-2], trials[-1]
     bracket = _bracket(trials, target)
     has_helped = abs(b.result - target) <= 0.5 * abs(a.result - target)
@@ -162,9 +162,9 @@ def _bracket(trials: list[CalibrationTrial], target: float) -> tuple[float, floa
 
 @contextmanager
 def unchanged(folder: Path) -> Iterator[Callable[[], None]]:
-    """Work on a scenario in which a value is to be stored at the end; gives what checks that nobody else did so.
+    """Work on a scenario that a value is stored in at the end; yields a check that nobody else changed it.
 
-    To be entered before the scenario is read.
+    Must be entered before the scenario is read.
 
     Parameters
     ----------
@@ -174,9 +174,9 @@ def unchanged(folder: Path) -> Iterator[Callable[[], None]]:
     Raises
     ------
     FolderInUseError
-        If another calibration is at work there.
+        If another calibration is working there.
     MasterError
-        By the check, naming a file that was changed meanwhile.
+        From the check, naming a file that was changed meanwhile.
     """
     with folder_lock.claimed(folder, "wait for it to end, or try with --dry-run"):
         before = _texts(folder)
@@ -185,21 +185,20 @@ def unchanged(folder: Path) -> Iterator[Callable[[], None]]:
             now = _texts(folder)
             for path in sorted({*before, *now}):
                 if before.get(path) != now.get(path):
-                    raise MasterError(f"{path} was changed during the calibration: nothing is stored, run it again")
+                    raise MasterError(f"{path} was changed during the calibration; nothing was stored, run it again")
 
         yield check
 
 
 def _texts(folder: Path) -> dict[Path, bytes]:
-    """Return the files that say what is computed; FMUs may be built meanwhile."""
+    """Return the files that determine what is computed; FMUs may be built meanwhile."""
     return {path: path.read_bytes() for path in folder.rglob("*") if path.suffix in _TEXTS and path.is_file()}
 
 
 def store_value(path: Path, parameter: str, value: float, note: str) -> None:
-    """Write a Real parameter's value into an ``.ssv`` file, leaving the rest of its text as it is.
+    """Write the value of a Real parameter into an ``.ssv`` file, leaving the rest of its text as it is.
 
-    A comment in front of the parameter says how the value was found; one from an earlier calibration is
-    replaced.
+    A comment before the parameter says how the value was found, and replaces that of an earlier calibration.
 
     Raises
     ------
@@ -213,9 +212,7 @@ def store_value(path: Path, parameter: str, value: float, note: str) -> None:
     )
     found = list(pattern.finditer(text))
     if len(found) != 1:
-        raise MasterError(
-            f"{path}: parameter '{parameter}' stands there {len(found)} times as ssv:Real; once is needed"
-        )
+        raise MasterError(f"{path}: parameter '{parameter}' occurs {len(found)} times as ssv:Real; it must occur once")
     m = found[0]
     comment = f"<!-- calibrated: {note.replace('--', '- -').replace('>', '')} -->"
     new = f"{m['indent']}{comment}\n{m['indent']}{m['head']}{value:.6g}{m['tail']}"

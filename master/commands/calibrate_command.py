@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from master.batch import calibration
-from master.commands.command_options import _add, _add_overrides, _overrides, _positive, _tell, _tell_warnings
-from master.commands.run_command import _run_shown
+from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say, say_warnings
+from master.commands.run_command import run_shown
 from master.errors import MasterError, Problem, RequestError, ScenarioError
 from master.results import run_results
 from master.scenario.open_scenario import open_scenario
@@ -24,17 +24,18 @@ from master.ssp.ssp_xml import Reader
 from master.system.components import System
 
 
-def _add_calibrate(verbs: Any) -> None:
-    text = "find the parameter value that gives the wanted mean force and store it in the scenario"
-    parser = _add(verbs, "calibrate", text, _calibrate, scenario=True)
-    _add_overrides(parser)
+def add_calibrate(verbs: Any) -> None:
+    """Declare ``calibrate`` and its options."""
+    text = "find the parameter value that gives the wanted mean force, and store it in the scenario"
+    parser = add_verb(verbs, "calibrate", text, _calibrate, scenario=True)
+    add_overrides(parser)
     parser.add_argument(
         "--parameter", metavar="COMPONENT.PARAMETER", help="what to change; default: as the scenario says"
     )
     parser.add_argument(
-        "--mean", type=_positive, metavar="N", help="wanted mean force [N]; default: as the scenario says"
+        "--mean", type=positive_number, metavar="N", help="wanted mean force [N]; default: as the scenario says"
     )
-    parser.add_argument("--tolerance", type=_positive, metavar="N", help="how near is near enough [N], default 0.1")
+    parser.add_argument("--tolerance", type=positive_number, metavar="N", help="how near is enough [N], default 0.1")
     parser.add_argument("--dry-run", action="store_true", help="do not store the value")
 
 
@@ -46,9 +47,9 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 
 def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[], None]) -> int:
-    with open_scenario(options.scenario, _overrides(options), _tell, not options.no_build) as scenario:
+    with open_scenario(options.scenario, overrides_of(options), say, not options.no_build) as scenario:
         system = scenario.system
-        _tell_warnings(system, _tell)
+        say_warnings(system)
         task = _task(options, system)
         place = _place(scenario.package, task.parameter) if is_stored else None
         found = _found(system, task)
@@ -82,7 +83,9 @@ def _task(options: argparse.Namespace, system: System) -> Calibration:
     parameter = options.parameter or (known.parameter if known else None)
     mean = options.mean or (known.mean_force if known else None)
     if parameter is None or mean is None:
-        raise RequestError("the scenario says neither what to calibrate nor to what; give --parameter and --mean")
+        raise RequestError(
+            "the scenario does not say what to calibrate to which mean force; give --parameter and --mean"
+        )
     tolerance = options.tolerance or (known.tolerance if known else 0.1)
     return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
 
@@ -101,16 +104,18 @@ def _trial(system: System, task: Calibration, value: float) -> float:
     changed = replace(component, parameters={**component.parameters, variable.name: value})
     components = (*system.components[:index], changed, *system.components[index + 1 :])
     with tempfile.TemporaryDirectory(prefix="calibrate-") as folder:
-        done = _run_shown(replace(system, components=components), Path(folder), quiet=False)
+        done = run_shown(replace(system, components=components), Path(folder), quiet=False)
         for assessment in done.assessments():
             if assessment.quality.contact == task.contact:
-                _tell(f"{task.parameter} = {value:.6g}: mean force {assessment.quality.mean:.3f} N")
+                say(f"{task.parameter} = {value:.6g}: mean force {assessment.quality.mean:.3f} N")
                 return assessment.quality.mean
-    raise MasterError(f"contact {task.contact} has no figures in the interval of interest; nothing to calibrate on")
+    raise MasterError(
+        f"contact {task.contact} has no figures in the interval of interest; so there is nothing to calibrate"
+    )
 
 
 def _place(package: Package, parameter: str) -> tuple[Path, str]:
-    """Return the ``.ssv`` file that holds a parameter, and its name there."""
+    """Return the ``.ssv`` file that holds a parameter, and the name of the parameter there."""
     if not package.writable:
         raise RequestError(f"{package.origin} is an archive; calibrate its folder, or use --dry-run")
     structure = read_structure(Sources(package.root), Reader(SSD_NAME))

@@ -1,41 +1,50 @@
 """The command line: ``python -m master [VERB] ...``.
 
 Exit codes: 0 done; 1 failed, invalid or incomplete (scenario, definition, FMU, results, limits that must hold in
-``verify``); 2 only a command line that was not understood; docs/reliability.md says more.
+``verify``); 2 only for a command line that was not understood. See docs/reliability.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
 
 from rich.console import Console
 
-from master.commands import report_commands, study_command, verify_command
-from master.commands.calibrate_command import _add_calibrate
-from master.commands.command_options import _add, _add_overrides, _add_tolerance
-from master.commands.run_command import _add_run
-from master.commands.scenario_commands import RUNTIME, _pack, _validate
+from master.commands.calibrate_command import add_calibrate
+from master.commands.report_commands import add_compare, add_report
+from master.commands.run_command import add_run
+from master.commands.scenario_commands import add_pack, add_validate
+from master.commands.study_command import add_study
+from master.commands.verify_command import add_verify
 from master.errors import MasterError, UsageError
-from master.report.terminal_summary import Terminal
+from master.report.terminal_summary import WIDTH, Terminal
 
-VERBS: Final = ("run", "pack", "validate", "compare", "report", "calibrate", "verify", "study")
-_WIDTH: Final = 80
+#: What declares each verb and its options, in the order of the help.
+VERBS: Final[Mapping[str, Callable[[Any], None]]] = {
+    "run": add_run,
+    "validate": add_validate,
+    "pack": add_pack,
+    "compare": add_compare,
+    "report": add_report,
+    "calibrate": add_calibrate,
+    "verify": add_verify,
+    "study": add_study,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
+    """Run the command line and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     if given and given[0] not in VERBS and given[0] not in ("-h", "--help"):
         given.insert(0, "run")
     options = _parser().parse_args(given)
-    error = Terminal(stderr=True, width=_WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
+    error = Terminal(stderr=True, width=WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
     try:
         code: int = options.verb(options)
-        sys.stdout.flush()  # here, where an error can still be told
+        sys.stdout.flush()  # here, where an error can still be reported
     except UsageError as failure:
         return _fail(error, failure, 2)
     except MasterError as failure:
@@ -58,25 +67,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m master",
         description="Run pantograph-catenary scenarios (SSP) and judge the contact quality.",
-        epilog="'run' may be left out: python -m master SCENARIO ...",
+        epilog="'run' may be omitted: python -m master SCENARIO ...",
     )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    _add_run(verbs)
-    checking = _add(verbs, "validate", "check a scenario without running it", _validate, scenario=True)
-    _add_overrides(checking)
-    _add_tolerance(checking)
-    packing = _add(verbs, "pack", "write a scenario as a .ssp archive, FMUs included", _pack, scenario=True)
-    packing.add_argument("--out", type=Path, metavar="FILE", help="default: dist/NAME.ssp")
-    packing.add_argument(
-        "--standalone",
-        action="store_true",
-        help=f"with the Python that the FMUs run in, as {RUNTIME}, for tools where OPENPANTO_RUNTIME names it",
-    )
-    report_commands.add_compare_arguments(
-        _add(verbs, "compare", report_commands.COMPARE_HELP, report_commands.run_compare)
-    )
-    report_commands.add_report_arguments(_add(verbs, "report", report_commands.REPORT_HELP, report_commands.run_report))
-    _add_calibrate(verbs)
-    verify_command.add_arguments(_add(verbs, "verify", verify_command.HELP, verify_command.run))
-    study_command.add_arguments(_add(verbs, "study", study_command.HELP, study_command.run))
+    for add in VERBS.values():
+        add(verbs)
     return parser

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
+from master.commands.command_options import add_verb
 from master.errors import MasterError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
@@ -17,37 +18,37 @@ from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import columns, comparison_page
 from master.report.film_file import FilmOptions, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
-from master.report.terminal_summary import Terminal
+from master.report.terminal_summary import WIDTH, Terminal
 from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
 from master.results.run_results import Results
 from master.safety import folder_lock
 from master.safety.safe_files import write_atomically
 
-REPORT_HELP: Final = "write plots and report of a run again, with a measurement or a film on request"
-COMPARE_HELP: Final = "two or more runs side by side"
-_WIDTH: Final = 80
 
-
-def add_report_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``report``."""
+def add_report(verbs: Any) -> None:
+    """Declare ``report`` and its options."""
+    text = "write plots and report of a run again, with a measurement or a film on request"
+    parser = add_verb(verbs, "report", text, _report)
     parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
-    parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to put beside")
+    parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to compare with")
     parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
     parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
-    parser.add_argument("--magnify", type=float, default=8.0, metavar="N", help="deformation in the film, default 8")
-    parser.add_argument("--parquet", action="store_true", help="write the time series as Parquet too")
+    parser.add_argument(
+        "--magnify", type=float, default=8.0, metavar="N", help="of deformations in the film, default 8"
+    )
+    parser.add_argument("--parquet", action="store_true", help="also write the time series as Parquet")
 
 
-def run_report(options: argparse.Namespace) -> int:
-    """Write the report of a run again, and what else is wanted."""
-    results_folder.identity(options.run)  # a folder that is none of ours is left alone
+def _report(options: argparse.Namespace) -> int:
+    """Write the report of a run again, and what else is asked for."""
+    results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
         summary = {**done.summary, **run_summary.figures(done), "format": results_folder.FORMAT}
         summary["settings"] = {**summary.get("settings", {}), "filter": run_summary.filter_data(done.evaluation.filter)}
         done = replace(done, summary=summary)
         measured = _measured(done, options.measured, options.contact) if options.measured else None
-        run_results.write_forces(done)
+        results_folder.write_forces(done.folder, done.signals)
         results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
         print(report_files.write(done, measured))
         if options.parquet:
@@ -70,12 +71,12 @@ def _claimed(folder: Path) -> Iterator[None]:
 
 
 def _warn_of_open_runs(runs: Sequence[Results]) -> None:
-    """Say which runs are not complete: what they show is a part."""
+    """Warn of runs that are not complete: they show only a part."""
     for done in runs:
         status = done.summary.get("status") or "complete"
         if status != "complete":
-            how = "was ended before it had finished" if status == "running" else f"is {status}"
-            text = f"warning: the run in {done.folder} {how}; figures are of what it left"
+            how = "ended before it was finished" if status == "running" else f"is {status}"
+            text = f"warning: the run in {done.folder} {how}; its figures are of what it left"
             Terminal(stderr=True).print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
 
 
@@ -83,10 +84,10 @@ def report_what_there_is(folder: Path) -> None:
     """Write the report of a run that stopped, if it has left anything to report on."""
     try:
         done = run_results.read(folder)
-        run_results.write_forces(done)
+        results_folder.write_forces(done.folder, done.signals)
         report_files.write(done)
     except MasterError:
-        return  # it stopped before anything was recorded; the error itself is told by the caller
+        return  # it stopped before anything was recorded; the caller reports the error itself
 
 
 def _measured(done: Results, path: Path, contact: int) -> MeasuredComparison:
@@ -100,7 +101,7 @@ def _measured(done: Results, path: Path, contact: int) -> MeasuredComparison:
 
 def _say_measured(measured: MeasuredComparison) -> None:
     rows = result_tables.plain_table(("low-passed", "simulated", "measured", "difference"), comparison_rows(measured))
-    console = Terminal(width=_WIDTH, highlight=False)
+    console = Terminal(width=WIDTH, highlight=False)
     console.print(rows)
     console.print(f"compared from {measured.start:.1f} m to {measured.end:.1f} m", markup=False)
     for warning in measured.warnings:
@@ -116,15 +117,16 @@ def _film(done: Results, options: argparse.Namespace) -> Path:
     return write_film(movie, options.film, FilmOptions(options.magnify, start=start, end=end))
 
 
-def add_compare_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``compare``."""
+def add_compare(verbs: Any) -> None:
+    """Declare ``compare`` and its options."""
+    parser = add_verb(verbs, "compare", "show two or more runs side by side", _compare)
     parser.add_argument("first", type=Path, metavar="RUN", help="results folder")
     parser.add_argument("others", type=Path, metavar="RUN", nargs="+", help="results folders")
     parser.add_argument("--report", type=Path, metavar="FILE", help="write a report in HTML")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
-def run_compare(options: argparse.Namespace) -> int:
+def _compare(options: argparse.Namespace) -> int:
     """Compare runs with the first one."""
     runs = [run_results.read(folder) for folder in (options.first, *options.others)]
     _warn_of_open_runs(runs)
@@ -142,7 +144,7 @@ def run_compare(options: argparse.Namespace) -> int:
 def _show(
     runs: Sequence[Results], pairs: Sequence[Sequence[run_difference.RunDifference]], options: argparse.Namespace
 ) -> None:
-    console = Terminal(width=_WIDTH, highlight=False)
+    console = Terminal(width=WIDTH, highlight=False)
     found = columns(runs)
     heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
     console.print(

@@ -1,55 +1,46 @@
-"""``python -m master verify``."""
+"""The verb ``verify``."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Final
-
-from rich.console import Console
+from typing import Any, Final
 
 from master.batch.verification.case import find_cases, load_cases
 from master.batch.verification.case_runs import RUNS, Runs
 from master.batch.verification.verification_outcome import CaseOutcome
 from master.batch.verification.verification_session import JSON, PAGE, verify
 from master.batch.verification.verification_table import list_table, show_case
-from master.coupling.macro_steps import Observer
-from master.report.progress import ProgressObserver
-from master.report.terminal_summary import Terminal, printable_json
-from master.system.components import System
+from master.commands.command_options import add_verb, batch_runner
+from master.report.terminal_summary import WIDTH, Terminal, printable_json
 
-HELP: Final = "run reference cases and judge every figure"
 _DEFAULT_FOLDER: Final = Path("results") / "verify"
-_WIDTH: Final = 80
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what may stand behind ``verify``."""
+def add_verify(verbs: Any) -> None:
+    """Declare ``verify`` and its options."""
+    parser = add_verb(verbs, "verify", "run reference cases and judge every figure", _verify)
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name of a case, or a case file; default: all")
-    parser.add_argument("--list", action="store_true", help="say which cases there are and run nothing")
+    parser.add_argument("--list", action="store_true", help="list the cases and run nothing")
     parser.add_argument("--out", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help="default: results/verify")
     parser.add_argument("--quiet", action="store_true", help="no progress, no tables; page and exit code only")
     parser.add_argument("--json", action="store_true", help=f"print {JSON} instead of tables")
     parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Verify; returns 0 if every row that is meant to hold does, 1 if not."""
+def _verify(options: argparse.Namespace) -> int:
+    """Verify; return 0 if every row that must hold does, 1 if not."""
     cases = load_cases(find_cases(options.cases))
     if options.list:
         Terminal(width=_width()).print(list_table(cases))
         return 0
     is_shown = not (options.quiet or options.json)
-    out, error = Terminal(width=_width(), highlight=False), Terminal(stderr=True)
-    runs = Runs(
-        options.out / RUNS,
-        _nobody if options.quiet else _progress(error),
-        _silent if options.quiet else _teller(error),
-        not options.no_build,
-    )
-    done = verify(cases, options.out, runs, _shower(out) if is_shown else _silent)
+    out = Terminal(width=_width(), highlight=False)
+    runs = Runs(options.out / RUNS, batch_runner(options))
+    show = partial(show_case, out) if is_shown else lambda _: None
+    done = verify(cases, options.out, runs, show)
     if options.json:
         print(printable_json((options.out / JSON).read_text(encoding="utf-8")), end="")
     elif is_shown:
@@ -61,41 +52,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _width() -> int | None:
-    """Return 80 where nobody looks, the terminal's own width otherwise."""
-    return None if Terminal().is_terminal else _WIDTH
+    """Return 80 where nobody looks on, else the width of the terminal."""
+    return None if Terminal().is_terminal else WIDTH
 
 
 def _failing(cases: Sequence[CaseOutcome]) -> Iterator[str]:
     for outcome in cases:
         for row in outcome.failing:
             yield f"FAILS: {outcome.case.name}, {row.title}: {row.shown}, wanted {row.reference}"
-
-
-def _silent(_: object) -> None:
-    pass
-
-
-def _teller(console: Console) -> Callable[[str], None]:
-    return lambda text: console.print(text, style="dim", markup=False, highlight=False)
-
-
-def _shower(console: Console) -> Callable[[CaseOutcome], None]:
-    return lambda outcome: show_case(console, outcome)
-
-
-@contextmanager
-def _nobody(_: System) -> Iterator[Sequence[Observer]]:
-    yield ()
-
-
-def _progress(console: Console) -> Callable[[System], AbstractContextManager[Sequence[Observer]]]:
-    @contextmanager
-    def watching(system: System) -> Iterator[Sequence[Observer]]:
-        console.print(f"running {system.name}", style="dim", markup=False, highlight=False)
-        progress = ProgressObserver(console, system.start, system.stop)
-        try:
-            yield [progress]
-        finally:
-            progress.finish()
-
-    return watching

@@ -1,4 +1,4 @@
-"""All that is told of a contact: figures, uplift and slack droppers in the interval, verdict, spans one by one."""
+"""The assessment of a contact: figures, uplift and slack droppers in the interval, verdict, span by span."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from master.recording.recording import Recording
 from master.recording.static_geometry import Geometry
 from master.system.contacts import Contact
 
-#: A pantograph's effect on a dropper begins this long before it passes, and is followed this long after [s].
+#: The effect of a pantograph on a dropper is counted from this long before it passes until this long after [s].
 _BEFORE: Final = 0.2
 _AFTER: Final = 1.0
-#: Supports nearer to each other than this stand at the same end of a span [m].
+#: Supports closer together than this stand at the same end of a span [m].
 _SHORTEST_SPAN: Final = 10.0
-#: Sigma drifts along the spans if a straight line through it rises or falls by more than this share of its mean, and
-#: explains it to this correlation: alternating spans do not drift.
+#: Sigma drifts along the spans if a straight line through it rises or falls by more than this share of its mean and
+#: correlates with it at least this well: alternating spans do not drift.
 _DRIFT_SHARE: Final = 0.1
 _DRIFT_CORRELATION: Final = 0.8
 _FEWEST_SPANS: Final = 3
-#: Limits that need more than the contact force, each with what is said where that is missing.
+#: Limits that need more than the contact force, each with the text for when that is missing.
 _NEEDED: Final = {
-    UPLIFT: f"{UPLIFT}, for no support of the interval has a recorded uplift",
-    HEIGHT_RANGE: f"{HEIGHT_RANGE}, for the height of the contact point is not recorded",
+    UPLIFT: f"{UPLIFT}, because no support of the interval has a recorded uplift",
+    HEIGHT_RANGE: f"{HEIGHT_RANGE}, because the height of the contact point is not recorded",
 }
 
 
@@ -53,9 +53,9 @@ class SpanFigures:
     Attributes
     ----------
     start, end : float
-        Its supports along the track [m].
+        Positions of its supports along the track [m].
     mean, sigma, minimum, maximum : float
-        [N]
+        Figures of the force [N].
     is_inside : bool
         Whether it lies in the interval of interest.
     """
@@ -81,15 +81,15 @@ class Assessment:
     criteria : tuple of Criterion
         Limits row by row.
     uplift : Uplift, optional
-        The largest of the interval's supports, ends included, over the whole run: waves arrive early and leave late.
+        The largest at the interval's supports, ends included, over the whole run: waves arrive early and leave late.
     supports : int
         How many supports stand in the interval.
     slack : float, optional
-        Share of the interval's droppers that are slack for a moment as this pantograph passes.
+        Share of the interval's droppers that go slack for a moment as this pantograph passes.
     spans : tuple of SpanFigures
         Every whole span after the contact has settled.
     withheld : str
-        Why there is no verdict; there are no criteria then. Empty if there is one.
+        Why there is no verdict, and no criteria; empty if there is one.
     early : str
         A warning if the interval begins while the pantograph is still being raised; else empty.
     """
@@ -106,33 +106,33 @@ class Assessment:
 
     @property
     def unchecked(self) -> str:
-        """Which limits the verdict says nothing of, because nothing was recorded to hold them to; else empty."""
+        """Which limits the verdict leaves out because what they need was not recorded; else empty."""
         held = {c.name for c in self.criteria}
         missing = [] if self.withheld else [why for name, why in _NEEDED.items() if name not in held]
         return f"not checked: {'; '.join(missing)}" if missing else ""
 
     @property
     def at_limit(self) -> tuple[str, ...]:
-        """What passes only as being at its limit."""
+        """What passes only because it is at its limit."""
         return tuple(c.name for c in self.criteria if c.is_at_limit)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the figures and the verdict do not say themselves, and a reader has to know."""
+        """What a reader has to know beyond the figures and the verdict."""
         return tuple(filter(None, (self.early, self.drift, self.unchecked)))
 
     @property
     def passed(self) -> bool:
-        """Whether every limit is kept, and nothing speaks against saying so."""
+        """Whether every limit is met and the verdict is not withheld."""
         return not self.withheld and all(c.passed for c in self.criteria)
 
     def without_verdict(self, reason: str) -> Assessment:
-        """Return the figures without a verdict, and why."""
+        """Return the figures without a verdict, with the reason."""
         return replace(self, criteria=(), withheld=reason)
 
     @property
     def drift(self) -> str:
-        """A warning if sigma drifts along the spans that are passed, for the run has not settled then; else empty."""
+        """A warning if sigma drifts along the spans, since the run has not settled then; else empty."""
         if not drifts([s.sigma for s in self.spans]):
             return ""
         first, last = self.spans[0], self.spans[-1]
@@ -160,7 +160,7 @@ def assess_contacts(
 
 @dataclass(frozen=True)
 class _Line:
-    """What was recorded, and the static geometry of one line."""
+    """The recordings, and the static geometry of one line."""
 
     recordings: Sequence[Recording]
     geometry: dict[str, float]
@@ -176,7 +176,7 @@ def _assessment(
 ) -> Assessment:
     limits = interval_of(quality, settings.interval)
     own = [u for u in uplifts if u.component == s.contact.catenary]
-    inside = [u for u in own if u.x is None or u.stands_in(limits)]  # a place that is not known may be in it
+    inside = [u for u in own if u.x is None or u.stands_in(limits)]  # an unknown position may be in it
     return Assessment(
         contact=s.contact,
         quality=quality,
@@ -196,7 +196,7 @@ def interval_of(quality: Quality, wanted: tuple[float | None, float | None]) -> 
 
 
 def _followers(recording: Recording, contacts: Sequence[Contact]) -> dict[Contact, Contact | None]:
-    """Return who comes next under the same line, None for the last one."""
+    """Return which contact comes next under the same line, None for the last one."""
     found: dict[Contact, Contact | None] = {}
     for line in dict.fromkeys(c.catenary for c in contacts):
         ordered = leading_first(recording, [c for c in contacts if c.catenary == line])
@@ -205,7 +205,7 @@ def _followers(recording: Recording, contacts: Sequence[Contact]) -> dict[Contac
 
 
 def passing_times(recording: Recording, contact: Contact, places: FloatArray) -> FloatArray:
-    """Return when a pantograph passes places along the track [s], shape (n,); infinite where it does not."""
+    """Return when a pantograph passes points of the track [s], shape (n,); infinite where it does not."""
     position = running_position(recording, contact)
     order = np.argsort(position, kind="stable")
     return np.interp(places, position[order], recording.time[order], left=np.inf, right=np.inf)
@@ -218,10 +218,10 @@ def slack_share(
     follower: Contact | None,
     limits: tuple[float, float],
 ) -> float | None:
-    """Return the share of the interval's droppers that are slack for a moment as a pantograph passes.
+    """Return the share of the interval's droppers that go slack for a moment as a pantograph passes.
 
-    From just before it passes until the next pantograph comes, or for a second. On a line that closes on itself a
-    dropper counts once a lap.
+    They are watched from just before it passes until the next pantograph comes, or for a second. On a line that
+    closes on itself a dropper counts once per lap.
     """
     own = [s for s in slackness(recordings) if s.component == contact.catenary and s.name.startswith("dropper")]
     met_at = [_droppers_met(geometry, s.name, limits) for s in own]
@@ -238,7 +238,7 @@ def slack_share(
 
 
 def _droppers_met(geometry: Mapping[str, float], name: str, limits: tuple[float, float]) -> FloatArray:
-    """Return where a dropper is met within limits [m]."""
+    """Return where a dropper is passed within limits [m]."""
     x = geometry.get(f"{name}.x")
     if x is None:
         return np.zeros(0)
@@ -246,7 +246,7 @@ def _droppers_met(geometry: Mapping[str, float], name: str, limits: tuple[float,
 
 
 def _count_slack(found: Slackness, begin: FloatArray, end: FloatArray) -> int:
-    """Return in how many stretches of time [s] a dropper is slack."""
+    """Return during how many of these periods [s] a dropper goes slack."""
     if not len(begin):
         return 0
     counted = np.concatenate(([0], np.cumsum(found.slack)))

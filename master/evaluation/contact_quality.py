@@ -15,8 +15,8 @@ from master.evaluation.filters import SETTLING, ForceFilter, band_pass, evaluate
 BANDS: Final = ((0.0, 2.0), (0.0, 5.0), (5.0, 20.0))
 #: Contact losses shorter than this make no arc that counts for NQ [s].
 SHORTEST_ARC: Final = 5e-3
-#: An extreme that moves by more than this share under another filter is told under all of them.
-TOLD_SHARE: Final = 0.05
+#: If an extreme moves by more than this share under another filter, it is shown under all of them.
+NOTABLE_SHARE: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Losses:
     count : int
         Number of losses.
     longest, total : float
-        Longest one and sum [s].
+        Longest one and their sum [s].
     percentage : float
-        Sum in percent of the interval's duration.
+        Sum as a percentage of the interval's duration.
     nq : float
-        The same with only the losses of at least `SHORTEST_ARC`: an estimate of the arcing percentage NQ.
+        The same for losses of at least `SHORTEST_ARC` alone: an estimate of the arcing percentage NQ.
     """
 
     count: int
@@ -44,7 +44,7 @@ class Losses:
 
 @dataclass(frozen=True)
 class Filtered:
-    """What the figures that depend on the filter would be under another one [N]."""
+    """The figures that depend on the filter, under another filter [N]."""
 
     filter: str
     mean: float
@@ -57,7 +57,7 @@ class Filtered:
 class Quality:
     """Figures of one contact in the interval of interest, SI; of the low-passed force unless called raw.
 
-    ``others`` are those that depend on the filter, under the other filters that the standards may mean.
+    ``others`` are the figures that depend on the filter, under the other filters that the standards may mean.
     """
 
     contact: int
@@ -91,10 +91,10 @@ class Quality:
         return sigma_share(self.mean, self.sigma)
 
     @property
-    def told(self) -> tuple[Filtered, ...]:
-        """The other filters' figures if maximum or minimum moves by more than `TOLD_SHARE`, else nothing."""
+    def filter_dependent(self) -> tuple[Filtered, ...]:
+        """The figures under the other filters if an extreme moves by more than `NOTABLE_SHARE`; else none."""
         pairs = [(o.maximum, self.maximum) for o in self.others] + [(o.minimum, self.minimum) for o in self.others]
-        return self.others if any(abs(a - b) > TOLD_SHARE * abs(b) for a, b in pairs) else ()
+        return self.others if any(abs(a - b) > NOTABLE_SHARE * abs(b) for a, b in pairs) else ()
 
 
 def sigma_share(mean: float, sigma: float) -> float:
@@ -159,7 +159,7 @@ def assess(
 
 @dataclass(frozen=True)
 class Sampled:
-    """A contact's record, and which samples of it the figures are taken from.
+    """The record of a contact, and which of its samples the figures are taken from.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ class Sampled:
 
 
 def figures_of(record: Sampled, chosen: ForceFilter, contact: int = 1) -> Quality | None:
-    """Return the figures of a contact's record, None if fewer than two samples count."""
+    """Return the figures of a contact, None if fewer than two samples count."""
     force, inside, step = record.force, record.inside, record.step
     if np.count_nonzero(inside) < 2:
         return None
@@ -225,7 +225,7 @@ def early_warning(record: Sampled, settling: float = SETTLING) -> str:
     ----------
     record : Sampled
     settling : float
-        How long after the first contact it has settled [s].
+        Time after the first contact by which it has settled [s].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A contact's force as it is evaluated and drawn: raw and low-passed, over time and track, and what of it counts."""
+"""The force of a contact as it is evaluated and drawn: raw and low-passed, over time and track, and what counts."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class EvaluationSettings:
     interval : (float or None, float or None)
         Interval of interest along the track [m]; None where it is open (`evaluated`).
     limits : LimitChoice
-        By which limits the figures are judged.
+        Limits that the figures are judged by.
     begin : float, optional
-        When the run began [s]: a recording that begins later, in contact, goes on with one and need not settle.
+        When the run began [s]: a recording that begins later, in contact, continues a run and need not settle.
     """
 
     filter: ForceFilter = DEFAULT
@@ -48,7 +48,7 @@ class Signals:
     Attributes
     ----------
     contact : Contact
-        Which.
+        The contact.
     time, position, raw, filtered : ndarray, shape (n,)
         Time [s], track position [m], contact force and its low-passed part [N].
     inside : ndarray, shape (n,)
@@ -58,7 +58,7 @@ class Signals:
     step : float
         Sampling step [s].
     filter : ForceFilter
-        What low-passed the force.
+        Low-pass of the force.
     """
 
     contact: Contact
@@ -79,14 +79,14 @@ class Signals:
 
     @property
     def sampled(self) -> Sampled:
-        """The record as the figures are made of it."""
+        """The record that the figures are made of."""
         return Sampled(self.raw, self.position, self.step, self.inside, self.height, self.lateral)
 
 
 def all_signals(
     recordings: Sequence[Recording], contacts: Sequence[Contact], settings: EvaluationSettings
 ) -> tuple[Signals, ...]:
-    """Return the signals of every contact whose force is in the recording at every step, the first one."""
+    """Return the signals of every contact whose force is in the first recording, that of every step."""
     recording = recordings[0] if recordings else None
     if recording is None or len(recording.time) < 2:
         return ()
@@ -98,10 +98,10 @@ def _has_force(recording: Recording, contact: Contact) -> bool:
 
 
 def settling_of(force: FloatArray, time: FloatArray, settings: EvaluationSettings) -> float:
-    """Return how long after its first contact a record has settled [s]: 0 for one that goes on in contact."""
+    """Return how long after its first contact a record has settled [s]: 0 for one that continues in contact."""
     step = float(time[-1] - time[0]) / (len(time) - 1)
-    goes_on = settings.begin is not None and time[0] > settings.begin + 0.5 * step and force[0] > 0.0
-    return 0.0 if goes_on else SETTLING
+    continues = settings.begin is not None and time[0] > settings.begin + 0.5 * step and force[0] > 0.0
+    return 0.0 if continues else SETTLING
 
 
 def contact_signals(recording: Recording, contact: Contact, settings: EvaluationSettings) -> Signals:
@@ -140,9 +140,9 @@ def power_spectrum(signal: FloatArray, step: float) -> tuple[FloatArray, FloatAr
 
 
 def force_table(signals: Sequence[Signals]) -> tuple[list[str], list[FloatArray]]:
-    """Return titles and columns of the low-passed forces: by contact place, force, and whether it counts (0 or 1).
+    """Return titles and columns of the low-passed forces: per contact position, force, and whether it counts (0 or 1).
 
-    Statistics of the force where it counts are the figures of the run.
+    The statistics of the force where it counts are the figures of the run.
     """
     titles, columns = ["time [s]"], [signals[0].time]
     for s in signals:

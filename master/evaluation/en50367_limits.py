@@ -1,7 +1,7 @@
 """The limits of EN 50367 for the quality of current collection, by supply system, each with where it comes from.
 
-Only the limit of sigma was found in texts on the standard; all others are recalled, not read in it, and say so wherever
-they are printed. A scenario may give its own limits instead.
+Only the limit of sigma was found in texts on the standard; all others are recalled, not read in it, and are marked so
+wherever they are printed. A scenario may give its own limits instead.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from master.evaluation.contact_quality import Filtered, Quality, sigma_share
 Supply = Literal["AC", "DC3", "DC1.5"]
 SUPPLIES: Final[dict[Supply, str]] = {"AC": "AC", "DC3": "DC 3 kV", "DC1.5": "DC 1.5 kV"}
 
-#: How far the mean may lie above the standard's upper limit and still be at it [N]: a choice. The source's reference
-#: pairs stand at 157.5 N, where the formula gives 157.3 N.
+#: How far the mean may lie above the standard's upper limit and still be at it [N]: a choice. The reference pairs of
+#: the source have 157.5 N, where the formula gives 157.3 N.
 AT_LIMIT: Final = 0.5
-#: A speed this near to one at which limits change is that speed [km/h]: speeds are told by recorded positions.
+#: A speed this near to one at which limits change is that speed [km/h]: speeds come from recorded positions.
 _NEAR_SPEED: Final = 0.01
 
 Origin = Literal["recalled", "read", "own"]
-#: What the origins of limits mean.
+#: Meaning of the origins of limits.
 ORIGINS: Final = "origin of a limit: recalled: not read in the standard; read: in texts on it; own: the scenario's"
 
 
 @dataclass(frozen=True)
 class OwnLimits:
-    """Limits that a scenario gives itself, SI; None where the standard's holds."""
+    """Limits that a scenario gives itself, SI; None where the standard applies."""
 
     mean_upper: float | None = None
     mean_lower: float | None = None
@@ -43,21 +43,21 @@ class OwnLimits:
 
 @dataclass(frozen=True)
 class LimitChoice:
-    """By which limits a run is judged: supply system, and the scenario's own limits."""
+    """The limits that a run is judged by: supply system, and the scenario's own limits."""
 
     supply: Supply = "AC"
     own: OwnLimits = field(default_factory=OwnLimits)
 
     @property
     def title(self) -> str:
-        """What the verdict is by."""
+        """The limits in words."""
         own = [f.name for f in fields(self.own) if getattr(self.own, f.name) is not None]
         return f"EN 50367, {SUPPLIES[self.supply]}{' and own limits' if own else ''}"
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit that holds.
+    """A limit that applies.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Limit:
     origin : str
         Whether it is recalled, read, or the scenario's own.
     slack : float
-        How far beyond it a figure is still at it.
+        How far beyond it a figure still counts as at it.
     """
 
     value: float
@@ -103,7 +103,7 @@ class Criterion:
     source, origin : str
         Where the limit comes from, and whether it is recalled, read there, or the scenario's own.
     remark : str
-        What the verdict rests on besides: that a figure is at its limit, or that another filter would decide otherwise.
+        What the verdict depends on besides: a figure at its limit, or another filter that would decide otherwise.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Criterion:
 
     @property
     def is_at_limit(self) -> bool:
-        """Whether it passes only as being at the limit."""
+        """Whether it passes only because it is at the limit."""
         return self.passed and self.remark.startswith(_AT)
 
     @property
@@ -178,14 +178,14 @@ def _above(v: float, bound: float) -> bool:
 
 
 def judge(quality: Quality, choice: LimitChoice, uplifts: Sequence[float] = ()) -> tuple[Criterion, ...]:
-    """Return the limits row by row.
+    """Return the verdicts, limit by limit.
 
     Parameters
     ----------
     quality : Quality
         Figures of a contact.
     choice : LimitChoice
-        By which limits.
+        Limits to judge by.
     uplifts : sequence of float
         Largest uplift of every support of the interval [m].
     """
@@ -203,7 +203,7 @@ def judge(quality: Quality, choice: LimitChoice, uplifts: Sequence[float] = ()) 
 
 @dataclass(frozen=True)
 class _ForceRow:
-    """A limit of a figure that depends on the filter; ``excess`` is how far beyond it the figure is."""
+    """A limit of a figure that depends on the filter; ``excess`` is how far the figure lies beyond it."""
 
     name: str
     value: Callable[[Filtered], str]
@@ -268,8 +268,8 @@ def _of_force(row: _ForceRow, own: Filtered, others: Sequence[Filtered]) -> Crit
     remarks = [f"{_AT}: {row.excess(own):.2f} N above it"] if passed and row.excess(own) > 0.0 else []
     contrary = [o for o in others if row.passes(o) != passed]
     if contrary:
-        told = ", ".join(f"{row.value(o)} with {o.filter}" for o in contrary)
-        remarks.append(f"the filter decides: {'failed' if passed else 'passed'} at {told}")
+        others_say = ", ".join(f"{row.value(o)} with {o.filter}" for o in contrary)
+        remarks.append(f"the filter decides: {'failed' if passed else 'passed'} at {others_say}")
     source, origin = _listed(h.source for h in row.held), _listed(h.origin for h in row.held)
     return Criterion(row.name, row.value(own), row.limit, passed, source, origin, "; ".join(remarks))
 

@@ -1,9 +1,9 @@
 """The energy balance of lines, pantographs and their coupling, from what was recorded of it.
 
-A part that keeps its balance tells what it is off by (``energy.drift``). Line and pantograph each tell what the strip
-has done against the contact force (``contact.work``), by the strip and the force that they themselves have used inside
-their steps: what these differ by is energy that the coupling has made up. Found by the names of the variables, so
-foreign FMUs that have such names are served alike.
+A part that keeps its balance reports its error (``energy.drift``). Line and pantograph each report the work of the
+strip against the contact force (``contact.work``), from the strip and the force that they themselves used inside their
+steps: the difference is energy that the coupling has added. Everything is found by the names of variables, so it works
+for foreign FMUs with such names too.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from master.system.contacts import Contact
 
 DRIFT: Final = "energy drift"
 #: Largest drift of a part, as a share of the energy that has passed through it. The balance of the trapezoidal rule
-#: is exact: it leaves rounding, 1e-11; an integrator with error control leaves less than 1e-7.
+#: is exact but for rounding, 1e-11; an integrator with error control leaves less than 1e-7.
 PART_LIMIT: Final = 1e-6
-#: Largest drift of a coupling, as a share of the energy exchanged. Inputs held over steps of 1 ms make 3 %, which
-#: raises the largest contact force by 1.7 N; 1 % stands for about half a newton.
+#: Largest drift of a coupling, as a share of the energy exchanged. Inputs held over steps of 1 ms cause 3 %, which
+#: raises the largest contact force by 1.7 N; 1 % corresponds to about half a newton.
 COUPLING_LIMIT: Final = 1e-2
 _DRIFT: Final = re.compile(r"(?P<component>.+)\.energy\.drift")
 
@@ -40,13 +40,13 @@ class EnergyBalance:
     what : str
         The component, or the pantograph's component and the line's, ``pantograph - catenary``.
     drift, largest : float
-        What it is off by at the end, and the largest magnitude of that [J].
+        Error at the end, and its largest magnitude [J].
     passed : float
-        Energy that has passed: through a component, or through a contact in either direction [J].
+        Energy that has passed through a component, or through a contact in either direction [J].
     limit : float
-        Share of it that the drift may have.
+        Largest admissible share of the drift in it.
     exceeded : float, optional
-        When it first had more [s].
+        When the drift first exceeded it [s].
     """
 
     what: str
@@ -69,14 +69,14 @@ class EnergyBalance:
 
 
 def find_balances(recordings: Sequence[Recording], contacts: Iterable[Contact]) -> tuple[EnergyBalance, ...]:
-    """Return the balances that are recorded: of components, then of contacts."""
+    """Return the recorded balances: of components, then of contacts."""
     parts = [b for r in recordings for b in _of_parts(r)]
     couplings = (_of_contact(recordings, contact) for contact in contacts)
     return (*parts, *(b for b in couplings if b is not None))
 
 
 def drift_events(balances: Iterable[EnergyBalance], end: float) -> Iterator[Event]:
-    """Yield an event for every balance that is off by more than its limit, from then to the end of the run [s]."""
+    """Yield an event for every balance whose drift exceeds its limit, from then to the end of the run [s]."""
     for b in balances:
         if b.exceeded is not None:
             yield Event(DRIFT, b.what, b.exceeded, end - b.exceeded, None, True)
@@ -90,7 +90,7 @@ def _of_parts(recording: Recording) -> Iterator[EnergyBalance]:
 
 
 def _passed(recording: Recording, component: str) -> FloatArray:
-    """Return the energy that has passed through a component by then [J], shape (n,)."""
+    """Return the energy that has passed through a component up to each time [J], shape (n,)."""
     total = np.zeros(len(recording.time))
     for name in (f"{component}.energy.{key}" for key in ("stored", "dissipated", "work")):
         if name in recording and len(total):
@@ -103,7 +103,7 @@ def _of_contact(recordings: Sequence[Recording], contact: Contact) -> EnergyBala
     recording = next((r for r in recordings if all(n in r for n in names)), None)
     if recording is None or not len(recording.time):
         return None
-    # From the first row on: a run may begin at a checkpoint, and one of the two anew.
+    # From the first row on: a run may begin at a checkpoint, and one of the two afresh.
     line, pantograph = (recording[n] - recording[n][0] for n in names)
     passed = _exchanged(recordings[0], contact, recording.time)
     if passed is None:
@@ -114,7 +114,7 @@ def _of_contact(recordings: Sequence[Recording], contact: Contact) -> EnergyBala
 
 
 def _exchanged(recording: Recording, contact: Contact, times: FloatArray) -> FloatArray | None:
-    """Return the sum of the magnitude of the work of the contact force by these times [J]; None if not recorded."""
+    """Return the accumulated magnitude of the work of the contact force up to these times [J]; None if not recorded."""
     velocity = strip_centre(recording, contact, "vz")
     if velocity is None or contact.force not in recording:
         return None

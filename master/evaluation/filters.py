@@ -1,12 +1,12 @@
 """The low-pass filter of the contact force, and which samples and places belong to the interval of interest.
 
-One filter serves every command [1]_. It works in the frequency domain on the whole record, continued on both sides by
+One filter serves every command [1]_. It works in the frequency domain on the whole record, extended on both sides by
 odd reflection; the interval is cut out afterwards, so that its ends are not the ends of a filter.
 
 References
 ----------
 .. [1] EN 50317 and EN 50318 ask for the force up to 20 Hz. The order 6 is recalled from them, not read; the phase is
-   not known. So both are settings, stated wherever a figure is.
+   unknown. Both are therefore settings, stated wherever a figure is.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ import numpy.typing as npt
 from master.arrays import BoolArray, FloatArray
 
 ComplexArray = npt.NDArray[np.complex128]
-#: Frequencies [Hz], shape (n,) -> what is left of each, shape (n,).
+#: Frequencies [Hz], shape (n,) -> the share of each that passes, shape (n,).
 Response = Callable[[FloatArray], FloatArray | ComplexArray]
 
 Kind = Literal["butterworth", "fft"]
 Phase = Literal["zero", "causal"]
 
-#: An open interval begins this long after the first contact [s]: the raising is over by then.
+#: An open interval begins this long after the first contact [s]: raising is over by then.
 SETTLING: Final = 1.0
-#: Time after the first contact in which any of the filters rings visibly [s]: two periods of 20 Hz.
+#: Time after the first contact during which any of the filters rings visibly [s]: two periods of 20 Hz.
 FILTER_REACH: Final = 0.1
-#: Time by which the record is continued on both sides before filtering [s].
+#: Time by which the record is extended on both sides before filtering [s].
 _PADDING: Final = 2.0
 #: Half the width of the edge of ``fft`` [Hz].
 _HALF_EDGE: Final = 0.25
@@ -52,12 +52,12 @@ class ForceFilter:
         ``butterworth``: magnitude 1 / sqrt(1 + (f / cutoff)^(2 order)), -3 dB at the cut-off. ``fft``: brick wall with
         a raised-cosine edge 0.5 Hz wide, which has neither order nor phase.
     order : int
-        Of the Butterworth filter.
+        Order of the Butterworth filter.
     cutoff : float
-        [Hz]
+        Cut-off frequency [Hz].
     phase : str
-        ``zero``: the magnitude alone. ``causal``: what a measuring chain does, with its delay at low frequencies taken
-        out of the positions.
+        ``zero``: the magnitude alone. ``causal``: what a measuring chain does, with its delay at low frequencies
+        removed from the positions.
     """
 
     kind: Kind = "butterworth"
@@ -74,7 +74,7 @@ class ForceFilter:
 
     @property
     def sentence(self) -> str:
-        """The filter in full, for whoever wants to repeat it."""
+        """The filter in full, so that it can be repeated."""
         if self.kind == "fft":
             edge = f"raised-cosine edge {self.cutoff - _HALF_EDGE:g} to {self.cutoff + _HALF_EDGE:g} Hz"
             what = f"fft: brick-wall low-pass at {self.cutoff:g} Hz, zero phase ({edge})"
@@ -85,7 +85,7 @@ class ForceFilter:
 
     @property
     def band(self) -> str:
-        """What it passes."""
+        """The band that it passes."""
         return f"0-{self.cutoff:g} Hz"
 
     def at(self, cutoff: float) -> ForceFilter:
@@ -106,12 +106,12 @@ class ForceFilter:
 
 _PHASES: Final = {"zero": "zero phase", "causal": "causal"}
 DEFAULT: Final = ForceFilter()
-#: The filter of results that do not say theirs: they were made before there was a choice.
+#: The filter of results that name none: they were made before there was a choice.
 BEFORE_CHOICE: Final = ForceFilter("fft")
 
 
 def low_pass(signal: FloatArray, step: float, chosen: ForceFilter) -> FloatArray:
-    """Return the part of a signal below the cut-off; constants and straight lines pass whole.
+    """Return the part of a signal below the cut-off; constants and straight lines pass unchanged.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def low_pass(signal: FloatArray, step: float, chosen: ForceFilter) -> FloatArray
     step : float
         Sampling step [s].
     chosen : ForceFilter
-        Where its cut-off is beyond half the sampling frequency the signal passes whole.
+        If its cut-off is above half the sampling frequency, the signal passes unchanged.
 
     Returns
     -------
@@ -134,8 +134,8 @@ def low_pass(signal: FloatArray, step: float, chosen: ForceFilter) -> FloatArray
 def band_pass(signal: FloatArray, step: float, low: float, high: float, chosen: ForceFilter) -> FloatArray:
     """Return the part of a signal between two frequencies [Hz], at zero phase; ``low = 0`` keeps the mean.
 
-    The high-pass is the one whose squared magnitude and that of the low-pass at ``low`` add up to 1, so that the
-    variances of neighbouring bands add up.
+    The squared magnitudes of the high-pass and of the low-pass at ``low`` add up to 1, so that the variances of
+    neighbouring bands add up.
     """
     edges = ForceFilter(chosen.kind, chosen.order)
     upper, lower = edges.at(high), edges.at(low)
@@ -153,10 +153,10 @@ def _passes_whole(signal: FloatArray, step: float, chosen: ForceFilter) -> bool:
 
 
 def _through(signal: FloatArray, step: float, response: Response, keeps_line: bool = True) -> FloatArray:
-    """Return a signal after a filter given by its response over the frequency [Hz]."""
+    """Return a signal filtered by a response over the frequency [Hz]."""
     pad = min(len(signal) - 1, round(_PADDING / step))
     padded = _odd_extension(signal, pad)
-    line = np.linspace(padded[0], padded[-1], len(padded))  # passes whole; without it the ends would be a jump
+    line = np.linspace(padded[0], padded[-1], len(padded))  # passes unchanged; without it the ends would be a jump
     frequency = np.asarray(np.fft.rfftfreq(len(padded), step), dtype=np.float64)
     filtered = np.fft.irfft(np.fft.rfft(padded - line) * response(frequency), len(padded))
     whole: FloatArray = filtered + line if keeps_line else filtered
@@ -180,7 +180,7 @@ def _magnitude(frequency: FloatArray, chosen: ForceFilter) -> FloatArray:
         share = np.clip((frequency - chosen.cutoff) / (2.0 * _HALF_EDGE) + 0.5, 0.0, 1.0)
         wall: FloatArray = 0.5 * (1.0 + np.cos(np.pi * share))
         return wall
-    # In logarithms, so that high orders do not overflow; 0 Hz passes whole.
+    # In logarithms, so that high orders do not overflow; 0 Hz passes unchanged.
     with np.errstate(divide="ignore"):
         power = 2.0 * chosen.order * np.log(frequency / chosen.cutoff)
     gain: FloatArray = np.exp(-0.5 * np.logaddexp(0.0, power))
@@ -189,13 +189,13 @@ def _magnitude(frequency: FloatArray, chosen: ForceFilter) -> FloatArray:
 
 def _high_pass(frequency: FloatArray, lower: ForceFilter) -> FloatArray:
     low = _magnitude(frequency, lower)
-    # The wall's two halves add up as they are: it is a part of the spectrum that is cut off, not a filter.
+    # The two halves of the wall add up as they are: a part of the spectrum is cut off, nothing is filtered.
     high: FloatArray = 1.0 - low if lower.kind == "fft" else np.sqrt(np.maximum(0.0, 1.0 - low**2))
     return high
 
 
 def _causal(ratio: FloatArray, order: int) -> ComplexArray:
-    """Return the response of the analogue Butterworth filter over f / cutoff, its delay at 0 Hz taken out.
+    """Return the response of the analogue Butterworth filter over f / cutoff, its delay at 0 Hz removed.
 
     Its poles are exp(i pi (2 k + order - 1) / (2 order)), k = 1 ... order.
     """
@@ -209,8 +209,8 @@ def _causal(ratio: FloatArray, order: int) -> ComplexArray:
 def settled(force: FloatArray, step: float) -> BoolArray:
     """Return where the filtered force means something, shape (n,).
 
-    A record that begins without contact has a jump where contact is made, and a filter of 20 Hz rings on both
-    sides of it. What lies before the first contact plus `FILTER_REACH` is left out.
+    A record that begins without contact has a jump where contact is made, and a 20 Hz filter rings on both sides of
+    it. Everything up to `FILTER_REACH` after the first contact is left out.
 
     Examples
     --------
@@ -226,8 +226,8 @@ def settled(force: FloatArray, step: float) -> BoolArray:
 def interval_mask(position: FloatArray, start: float | None, end: float | None) -> BoolArray:
     """Return which samples lie in the interval of interest, shape (n,).
 
-    Its end belongs to it, its beginning does not, so that samples stand for steps and intervals side by side share
-    none. A sample on a bound is told by less than recorded digits, so it counts as on the bound within a micrometre.
+    Its end belongs to it, its beginning does not, so that samples stand for steps and adjacent intervals share none.
+    Recorded digits do not resolve a sample on a bound, so it counts as on the bound within a micrometre.
     """
     inside = np.ones(len(position), dtype=np.bool_)
     if start is not None:
@@ -246,8 +246,8 @@ def evaluated(
 ) -> BoolArray:
     """Return which samples the figures are taken from, shape (n,): those in the interval of interest.
 
-    Where the interval is open on the side that the run enters by, it begins ``settling`` after the first contact: what
-    comes before is the raising, not the line.
+    Where the interval is open on the side from which the run enters, it begins ``settling`` after the first contact:
+    before that the pantograph is still being raised.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def evaluated(
     interval : tuple
         Its bounds along the track [m]; None where it is open.
     settling : float
-        [s]; 0 for a record that begins in the middle of a run.
+        Time after the first contact [s]; 0 for a record that begins in the middle of a run.
     """
     inside = interval_mask(position, *interval)
     entry = interval[0] if len(position) and position[-1] >= position[0] else interval[1]
@@ -268,16 +268,16 @@ def evaluated(
 
 
 def stands_in(x: float | None, interval: tuple[float | None, float | None], period: float = 0.0) -> bool:
-    """Return whether a support is in an interval of the track, its ends included; on a line that repeats, in some lap.
+    """Return whether a support is in an interval of the track, ends included; on a line that repeats, in some lap.
 
-    Within a metre of an end it is on it.
+    A support within a metre of an end stands on it.
 
     Parameters
     ----------
     x : float or None
-        The place, None if it is not known [m].
+        Position along the track [m]; None if it is unknown.
     interval : (float or None, float or None)
-        Its ends [m]; None where it has none.
+        Ends of the interval [m]; None where it has none.
     period : float
         Length after which the line repeats [m]; 0 if it does not.
 
@@ -296,7 +296,7 @@ def stands_in(x: float | None, interval: tuple[float | None, float | None], peri
 
 
 def _first_contact(force: FloatArray) -> int:
-    """Return the index of the first sample in contact, that of the end if there is none."""
+    """Return the index of the first sample in contact; the number of samples if there is none."""
     found = force > 0.0
     return int(np.argmax(found)) if found.any() else len(force)
 

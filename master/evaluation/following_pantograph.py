@@ -1,4 +1,4 @@
-"""Several pantographs under one line: who runs ahead, and what following costs."""
+"""Several pantographs under one line: which runs ahead, and the effect on the one that follows."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from master.recording.recording import Recording
 
 @dataclass(frozen=True)
 class FollowerEffect:
-    """A pantograph and the one just ahead of it: figures of the follower minus those of the one ahead.
+    """Figures of a pantograph minus those of the one just ahead of it.
 
     Attributes
     ----------
     leading, trailing : str
         Component names.
     distance : float
-        Between their strips at the start [m].
+        Distance between their strips at the start [m].
     mean, sigma, minimum, maximum : float
         Differences [N].
     """
@@ -35,7 +35,7 @@ class FollowerEffect:
 
     @property
     def sentence(self) -> str:
-        """The comparison in a line."""
+        """The comparison in one line."""
         return (
             f"{self.trailing} {self.distance:.0f} m behind {self.leading}: sigma {self.sigma:+.1f} N, "
             f"maximum {self.maximum:+.1f} N, minimum {self.minimum:+.1f} N"

@@ -1,8 +1,8 @@
-"""Whether a record covers the interval of interest: figures of a part of it are not those of the interval."""
+"""Whether a recording covers the interval of interest: figures of a part are not those of the interval."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -15,15 +15,15 @@ Interval = tuple[float | None, float | None]
 
 
 def shortfall(recording: Recording, contacts: Iterable[Contact], interval: Interval) -> str:
-    """Return what of the interval a record lacks, empty if every contact has passed all of it.
+    """Return what of the interval a recording lacks, empty if every contact has passed all of it.
 
     Parameters
     ----------
     recording : Recording
-        The one at every step.
+        The one of every step.
     contacts : iterable of Contact
     interval : tuple
-        Start and end [m]; None where it has none.
+        Start and end [m]; None where it is open.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def _place(recording: Recording, contact: Contact) -> FloatArray:
 
 def _lacking(x: FloatArray, pantograph: str, interval: Interval) -> str:
     start, end = interval
-    # A bound between two samples has been passed; one jump of a position is no stride.
+    # A bound between two samples has been passed; a single jump of the position is no stride.
     stride = float(np.median(np.abs(np.diff(x)))) if len(x) > 1 else 0.0
     first, last = float(x.min()), float(x.max())
     if end is not None and last + stride < end:
@@ -57,7 +57,15 @@ def _lacking(x: FloatArray, pantograph: str, interval: Interval) -> str:
     return ""
 
 
+def not_judgeable(recording: Recording, contacts: Sequence[Contact], interval: Interval) -> str:
+    """Return why a recording is not enough to judge the interval by, empty if it is."""
+    if reason := shortfall(recording, contacts, interval):
+        return reason
+    silent = never_touched(recording, contacts)
+    return f"'{silent}' never touches the wire" if silent else ""
+
+
 def never_touched(recording: Recording, contacts: Iterable[Contact]) -> str:
-    """Return the pantograph that no force was told in all of a record, empty if there is none."""
+    """Return the pantograph that never receives a contact force in a recording, empty if there is none."""
     silent = (c.pantograph for c in contacts if c.force in recording and not np.any(recording[c.force] > 0.0))
     return next(silent, "")

@@ -1,4 +1,4 @@
-"""The line's static geometry, the supports' uplift and what is slack, as the catenary FMU reports them."""
+"""Static geometry of the line, uplift of the supports and what is slack, as the catenary FMU reports them."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Uplift:
     support : int
         Number of the support.
     x : float, optional
-        Its position along the track [m], if the FMU says it.
+        Its position along the track [m], if the FMU gives it.
     section : int, optional
-        The section that it belongs to, if the line has several.
+        Its section, if the line has several.
     period : float
         Length after which the line repeats, and with it the support [m]; 0 if it does not.
     maximum : float
@@ -75,9 +75,9 @@ class Slackness:
     name : str
         ``dropper[n]`` or ``support[n]``.
     time : ndarray, shape (n,)
-        When it is recorded [s].
+        Times of the samples [s].
     slack : ndarray of bool, shape (n,)
-        Whether it is slack then.
+        Whether it is slack at these times.
     """
 
     component: str
@@ -101,7 +101,7 @@ def indexed(geometry: Mapping[str, float], kind: str, name: str) -> FloatArray:
 
 
 def aligned(geometry: Mapping[str, float], kind: str, names: Sequence[str]) -> dict[str, FloatArray]:
-    """Return values of supports or droppers that are to be put side by side, of those whose ``x`` is known.
+    """Return values of the supports or droppers whose ``x`` is known, side by side; NaN where one is missing.
 
     Examples
     --------
@@ -114,12 +114,12 @@ def aligned(geometry: Mapping[str, float], kind: str, names: Sequence[str]) -> d
 
 
 def period_of(geometry: Mapping[str, float]) -> float:
-    """Return the length after which a line repeats because it closes on itself [m]; 0 if it does not."""
+    """Return the length after which a line that closes on itself repeats [m]; 0 if it does not."""
     return max(0.0, geometry.get(PERIOD, 0.0))
 
 
 def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArray:
-    """Return by how much a line is to be moved along to be where it is met between two positions of the track [m].
+    """Return the shifts of a line along the track that put it between two positions [m].
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def laps(geometry: Mapping[str, float], limits: tuple[float, float]) -> FloatArr
 def _whole(first: float, last: float) -> FloatArray:
     """Return the whole numbers from the one at or below ``first`` to that at or below ``last``, shape (n,).
 
-    Where there are more than any run has laps, the positions mean nothing, and there are none.
+    If there are more than any run has laps, the positions are meaningless, and there are none.
     """
     if not last - first <= _MOST_LAPS:
         return np.zeros(0)
@@ -153,9 +153,9 @@ def _whole(first: float, last: float) -> FloatArray:
 
 
 def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -> FloatArray:
-    """Return where supports or droppers are met between two positions of the track [m], shape (n,).
+    """Return where supports or droppers are passed between two positions of the track [m], shape (n,).
 
-    On a line that closes on itself they are met once a lap.
+    On a line that closes on itself they are passed once per lap.
 
     Examples
     --------
@@ -169,18 +169,18 @@ def met(geometry: Mapping[str, float], kind: str, limits: tuple[float, float]) -
 def passages(
     x: float, interval: tuple[float | None, float | None], travelled: tuple[float, float], period: float = 0.0
 ) -> FloatArray:
-    """Return where a place is passed within an interval of the track, shape (n,) [m].
+    """Return where a point of the line is passed within an interval of the track, shape (n,) [m].
 
     Parameters
     ----------
     x : float
-        The place [m].
+        The point [m].
     interval : (float or None, float or None)
         Ends of the interval [m]; None where it has none.
     travelled : (float, float)
-        Between what positions the run goes [m]: on a line that repeats there is no lap beyond.
+        Positions between which the run goes [m]: on a line that repeats there is no lap beyond.
     period : float
-        Length after which the line repeats [m]; 0 if it does not: then the place is passed once.
+        Length after which the line repeats [m]; 0 if it does not: then the point is passed once.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def passages(
 
 
 def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:
-    """Return the static geometry of each section of a line; a line of one section as it is.
+    """Return the static geometry of each section of a line; that of a line of one section unchanged.
 
     Examples
     --------
@@ -217,10 +217,10 @@ def by_section(geometry: Mapping[str, float]) -> tuple[dict[str, float], ...]:
 
 
 def slackness(recordings: Iterable[Recording]) -> tuple[Slackness, ...]:
-    """Return when droppers and supports are slack, of which that is recorded.
+    """Return when those droppers and supports are slack for which this is recorded.
 
-    A line says it itself, by ``dropper[n].slack``, as a slack dropper whose damper goes on acting carries something all
-    the same. Of one that does not (a foreign line, results of an older version) what pulls by nothing is slack.
+    A line reports it itself, as ``dropper[n].slack``, because a slack dropper whose damper still acts carries a force
+    all the same. Where it does not (a foreign line, results of an older version), what carries no tension is slack.
 
     Examples
     --------
@@ -230,19 +230,19 @@ def slackness(recordings: Iterable[Recording]) -> tuple[Slackness, ...]:
     >>> [(s.name, s.slack.tolist()) for s in found]
     [('dropper[1]', [False, True, True]), ('dropper[2]', [False, False, True])]
     """
-    told: dict[tuple[str, str], Slackness] = {}
+    reported: dict[tuple[str, str], Slackness] = {}
     pulling: dict[tuple[str, str], Slackness] = {}
     for recording in recordings:
         for name, values in zip(recording.names, recording.values.T, strict=True) if len(recording.time) else ():
             match = _TENSIONED.fullmatch(name)
             if match is not None:
-                found, slack = (pulling, values <= 0.0) if match[3] == "force" else (told, values > 0.5)
+                found, slack = (pulling, values <= 0.0) if match[3] == "force" else (reported, values > 0.5)
                 found.setdefault((match[1], match[2]), Slackness(match[1], match[2], recording.time, slack))
-    return tuple((pulling | told).values())
+    return tuple((pulling | reported).values())
 
 
 def support_uplifts(recordings: tuple[Recording, ...], geometry: Geometry) -> tuple[Uplift, ...]:
-    """Return the largest uplift of every support that is recorded, in the order of the supports."""
+    """Return the largest uplift of every recorded support, in the order of the supports."""
     found = [
         _uplift(recording, name, geometry)
         for recording in recordings

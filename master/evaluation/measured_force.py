@@ -25,9 +25,9 @@ _FORCES: Final = ("f", "fc", "force", "contact force")
 _LENGTHS: Final = {"m": 1.0, "km": 1e3, "": 1.0}
 _DURATIONS: Final = {"s": 1.0, "ms": 1e-3, "": 1.0}
 _NEWTONS: Final = {"n": 1.0, "kn": 1e3, "": 1.0}
-#: Magnitude beyond which no time, place or force lies; sums and squares stay finite.
+#: Magnitude beyond which no time, position or force lies; sums and squares stay finite.
 _LARGEST: Final = 1e12
-#: Share of the interval of interest that counts as all of it: rows of a measurement seldom stand on its ends.
+#: Share of the interval of interest that counts as all of it: rows of a measurement seldom lie on its ends.
 _WHOLE: Final = 0.99
 _SPELLED: Final = {"m": "m", "km": "km", "s": "s", "ms": "ms", "n": "N", "kn": "kN"}
 
@@ -41,9 +41,9 @@ class Measurement:
     source : str
         File name.
     over_time : bool
-        Whether the abscissa is time [s]; otherwise track position [m].
+        Whether the abscissa is time [s] rather than track position [m].
     abscissa, force : ndarray, shape (n,)
-        Increasing abscissa and force [N].
+        Increasing abscissa, and force [N].
     """
 
     source: str
@@ -65,9 +65,9 @@ class MeasuredComparison:
     position, simulated, measured : ndarray, shape (n,)
         Track position [m] and forces [N] where both are known within the interval of interest.
     part : str
-        Which part of the interval of interest that is; empty if all of it.
+        Which part of the interval of interest that is; empty if it is all of it.
     coarse : str
-        That the measurement's rows are too far apart for the filter's band; empty if they are not.
+        A warning if the rows of the measurement are too far apart for the band of the filter; else empty.
     """
 
     source: str
@@ -80,7 +80,7 @@ class MeasuredComparison:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the figures do not say themselves."""
+        """What a reader has to know beyond the figures."""
         return tuple(filter(None, (self.part, self.coarse)))
 
     @property
@@ -110,13 +110,13 @@ def read_measured(path: Path) -> Measurement:
     """Read a CSV file with a header: one column of position or time, one of force; units in brackets.
 
     Positions may be in m or km, times in s or ms, forces in N or kN. Columns are separated by commas or
-    semicolons; further columns are left out.
+    semicolons; further columns are ignored.
 
     Raises
     ------
     MasterError
-        If it cannot be read, a column is missing, there twice or in another unit, a cell is no finite number, or
-        the abscissa does not increase.
+        If it cannot be read, a column is missing, present twice or in another unit, a cell is not a finite number,
+        or the abscissa does not increase.
     """
     rows = _rows(path)
     titles = [_title(t) for t in rows[0].cells] if rows else []
@@ -135,7 +135,7 @@ def read_measured(path: Path) -> Measurement:
 
 @dataclass(frozen=True)
 class _Row:
-    """A row that is not empty, with the line of the file that it ends in."""
+    """A row that is not empty, with the line of the file that it ends on."""
 
     line: int
     cells: list[str]
@@ -195,7 +195,7 @@ def _number(path: Path, row: _Row, index: int) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    # Python reads 1_000, and the digits of every script; in a table they are slips of the pen.
+    # Python accepts 1_000, and the digits of every script; in a table they are typing errors.
     if not abs(value) <= _LARGEST or "_" in text or not text.isascii():
         raise MasterError(f"{path}:{row.line}: '{one_line(text)}' in column {index + 1} is not a finite number")
     return value
@@ -214,9 +214,9 @@ def _checked(path: Path, over_time: bool, rows: Sequence[_Row], abscissa: FloatA
 
 
 def compare_measured(s: Signals, measurement: Measurement) -> MeasuredComparison:
-    """Put a measurement beside a simulated contact; both are low-passed with the run's filter.
+    """Compare a measurement with a simulated contact; both are low-passed with the filter of the run.
 
-    The measured force is brought to the simulation's instants, then filtered as the simulated one is.
+    The measured force is interpolated to the instants of the simulation, then filtered as the simulated one is.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def _part(s: Signals, both: BoolArray) -> str:
 
 
 def _coarse(s: Signals, measurement: Measurement, there: FloatArray, both: BoolArray) -> str:
-    """Return that neighbouring rows are too far apart, in what is compared, to tell the force up to the cut-off."""
+    """Return a warning if neighbouring rows are too far apart to resolve the force up to the cut-off."""
     rows = np.interp(measurement.abscissa, *_increasing(there[both], s.time[both]), left=np.nan, right=np.nan)
     times = np.concatenate(([s.time[both][0]], rows[np.isfinite(rows)], [s.time[both][-1]]))
     longest, needed = float(np.diff(times).max()), 0.5 / s.filter.cutoff

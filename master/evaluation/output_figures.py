@@ -1,4 +1,4 @@
-"""Figures of a run's outputs, whatever they mean: for runs without a pantograph, which have no figures of their own."""
+"""Figures of the outputs of runs without a pantograph, whatever the outputs mean."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from master.recording.recording import Recording
 
 @dataclass(frozen=True)
 class OutputFigures:
-    """What a recorded variable did.
+    """Figures of a recorded variable.
 
     Attributes
     ----------
     name, unit : str
     start, end, minimum, maximum, mean : float
-        Of its samples; NaN where it has none.
+        Figures of its samples; NaN where it has none.
     """
 
     name: str

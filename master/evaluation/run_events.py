@@ -1,7 +1,7 @@
 """What happened in a run and when: contact lost, wire at the end of the strip, droppers or supports slack.
 
-Found in what was recorded, by the names of the line's variables, so a foreign line's FMU that has such names is served
-alike. An event is as exact in time as its variable is recorded often.
+Events are found in the recordings by the names of the line's variables, so this works for the FMU of a foreign line
+with such names too. An event is as exact in time as the sampling of its variable.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from master.system.contacts import Contact
 LOST: Final = "contact lost"
 AT_END: Final = "wire beyond the strip's end"
 SLACK: Final = "slack"
-#: Most events that are listed; a line whose droppers chatter has no end of them.
+#: Most events that are listed: a line whose droppers chatter has any number of them.
 MOST_EVENTS: Final = 1000
 
 
@@ -41,7 +41,7 @@ class Event:
     position : float, optional
         Where along the track, at its beginning [m].
     is_open : bool
-        Whether it had not ended when the recording did.
+        Whether it was still going on when the recording ended.
     """
 
     kind: str
@@ -53,7 +53,7 @@ class Event:
 
 
 def find_events(recordings: Sequence[Recording], contacts: Iterable[Contact], geometry: Geometry) -> tuple[Event, ...]:
-    """Return the events of a run in the order of their beginnings."""
+    """Return the events of a run, ordered by when they begin."""
     found = [e for contact in contacts if len(recordings[0].time) for e in _of_contact(recordings[0], contact)]
     found += [e for each in slackness(recordings) for e in _of_slackness(each, geometry)]
     return tuple(sorted(found, key=lambda e: (e.time, e.kind, e.what)))
@@ -71,12 +71,12 @@ def _of_contact(recording: Recording, contact: Contact) -> Iterator[Event]:
 
 
 def _beyond_end(recording: Recording, contact: Contact) -> BoolArray:
-    """Return when the contact is farther from the strip's middle than its ends."""
+    """Return when the contact is farther from the strip's centre than its ends."""
     offset, middle = lateral_position(recording, contact), strip_centre(recording, contact, "y")
     if offset is None or middle is None:
         return np.zeros(len(recording.time), dtype=np.bool_)
     half = np.abs(recording[contact.end("A", "y")] - middle)
-    beyond: BoolArray = np.abs(offset) > half  # not without contact: NaN is not greater
+    beyond: BoolArray = np.abs(offset) > half  # never without contact: NaN compares as false
     return beyond
 
 
@@ -92,7 +92,7 @@ def _event(kind: str, what: str, times: FloatArray, first: int, last: int, where
 
 
 def _after_first(state: BoolArray) -> BoolArray:
-    """Return what is not before the state was first there: what never was cannot be lost.
+    """Return what is not before the state first held: what never was cannot be lost.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def _after_first(state: BoolArray) -> BoolArray:
 
 
 def _spells(state: BoolArray) -> list[tuple[int, int]]:
-    """Return first and last plus one of every stretch in which the state is there.
+    """Return first index and last index plus one of every stretch in which the state holds.
 
     Examples
     --------

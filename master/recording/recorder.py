@@ -12,13 +12,15 @@ from typing import Final
 
 from master.arrays import FloatArray
 from master.coupling.network import Network
-from master.errors import MasterError
+from master.errors import ForeignResultsError, MasterError
 from master.recording.recording import NUMBER_FORMAT, Recording, header, load
 from master.safety.safe_files import AppendOnlyFile, safe_cell
 
 #: Rows kept back before they are written, and the simulated time that they may span [s].
 ROWS_PER_FLUSH: Final = 250
 LONGEST_UNWRITTEN: Final = 1.0
+#: What a user can do about results that were changed by others.
+RERUN_ADVICE: Final = "while the run was in progress; run it again, into another folder (--out)"
 
 
 class RecordedValues:
@@ -106,25 +108,33 @@ class Recorder:
         """The file."""
         return self._file.path
 
-    @property
-    def rows(self) -> int:
-        """How many rows the file must have: those kept and those recorded."""
-        return self._rows
-
-    @property
-    def is_as_written(self) -> bool:
-        """Whether the file holds to the last byte what was kept and recorded."""
-        return self._file.is_as_written
-
     def sync(self) -> None:
         """Write what is waiting and wait until it is on the disk."""
         self._write()
         self._file.sync()
 
-    @property
-    def recording(self) -> Recording:
-        """What is in the file."""
-        return load(self._file.path)
+    def read_back(self, is_complete: bool = True) -> Recording:
+        """Return what is in the file.
+
+        Parameters
+        ----------
+        is_complete : bool
+            Whether the file must hold, to the last byte, what was kept and recorded.
+
+        Raises
+        ------
+        ForeignResultsError
+            If it is no longer the file that was written.
+        """
+        if not self.path.is_file():
+            raise ForeignResultsError(f"{self.path} was removed {RERUN_ADVICE}")
+        found = load(self.path)
+        if is_complete and len(found.time) != self._rows:
+            counts = f"has {len(found.time)} rows, {self._rows} were written"
+            raise ForeignResultsError(f"{self.path} {counts}: it was changed {RERUN_ADVICE}")
+        if is_complete and not self._file.is_as_written:
+            raise ForeignResultsError(f"{self.path} is not what was written: it was changed {RERUN_ADVICE}")
+        return found
 
     def _record(self, time: float) -> None:
         values = [time]

@@ -1,11 +1,11 @@
-"""Reports of two or more runs side by side; every contact of every run is a column."""
+"""The page that compares two or more runs; every contact of every run is a column."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -14,19 +14,20 @@ from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import Signals
 from master.report import html_markup
-from master.report.charts.run_charts import (
-    Axes,
-    Chart,
-    Curve,
+from master.report.charts.chart import Axis, Bars, Chart, Curve, stroke
+from master.report.charts.force_charts import (
+    DENSITY,
+    FREQUENCY,
+    SHARE,
+    TRACK,
     common_edges,
-    curve_trace,
-    force_title,
-    grouped_bars,
-    line_marks,
+    extent,
+    force_axis,
     shares,
-    spectrum_trace,
-    uplift_trace,
+    spectrum_curve,
 )
+from master.report.charts.line_charts import line_marks
+from master.report.charts.uplift_charts import support_bars
 from master.report.result_tables import figure_rows
 from master.report.run_inputs import differing_inputs, quality_rows
 from master.report.run_page import status_note
@@ -137,7 +138,7 @@ def _verdict(c: Column) -> str:
 
 
 def _filters(runs: Sequence[Results]) -> str:
-    """Return which filters the runs were evaluated with."""
+    """Return the filters with which the runs were evaluated."""
     return f"Filter: {html_markup.text('; '.join(dict.fromkeys(run.evaluation.filter.sentence for run in runs)))}."
 
 
@@ -158,7 +159,7 @@ def _difference(first: str, other: str) -> str:
 
 
 def comparison_charts(found: Sequence[Column]) -> list[Chart]:
-    """Return the curves of all columns, overlaid."""
+    """Return the charts in which the curves of all columns lie over one another."""
     charts = [_force_chart(found), _histogram(found), _spectrum(found), _bands(found)]
     if any(c.run.uplifts for c in found):
         charts.append(_uplift(found))
@@ -166,29 +167,25 @@ def comparison_charts(found: Sequence[Column]) -> list[Chart]:
 
 
 def _force_chart(found: Sequence[Column]) -> Chart:
-    traces = [
-        curve_trace(c.signals.position, c.signals.shown, Curve(i, c.name, 1.9 - 0.2 * min(i, 3)))
+    curves = (
+        Curve(c.name, c.signals.position, c.signals.shown, stroke(i, 1.9 - 0.2 * min(i, 3)))
         for i, c in enumerate(found)
-    ]
+    )
     first = found[0]
-    limits = (float(first.signals.position.min()), float(first.signals.position.max()))
-    traces += line_marks(first.run, first.assessment.contact.catenary, limits)
-    axes = Axes("track position of the contact [m]", force_title([c.signals for c in found]))
-    axes.extra = {"yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}}
-    note = f"Supports and droppers of {first.name}."
-    return Chart("force", "Contact force", {"data": traces, "layout": axes.layout()}, note, 440)
+    marks = line_marks(first.run, first.assessment.contact.catenary, extent([first.signals]))
+    y, note = force_axis([c.signals for c in found]), f"Supports and droppers of {first.name}."
+    return Chart("force", "Contact force", TRACK, y, (*curves, *marks), note, 440)
 
 
 def _histogram(found: Sequence[Column]) -> Chart:
     cuts = [c.signals.filtered[c.signals.inside] for c in found]
     edges = common_edges(cuts)
-    traces = [
-        curve_trace(*_staircase(edges, shares(cut, edges)), Curve(i, c.name))
+    curves = tuple(
+        Curve(c.name, *_staircase(edges, shares(cut, edges)), stroke(i))
         for i, (c, cut) in enumerate(zip(found, cuts, strict=True))
-    ]
-    axes = Axes(force_title([c.signals for c in found]), "share of time [%]")
-    note = "Interval of interest of each run."
-    return Chart("histogram", "Histogram", {"data": traces, "layout": axes.layout()}, note, 340)
+    )
+    x = force_axis([c.signals for c in found])
+    return Chart("histogram", "Histogram", x, SHARE, curves, "Interval of interest of each run.", 340)
 
 
 def _staircase(edges: FloatArray, heights: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -198,33 +195,31 @@ def _staircase(edges: FloatArray, heights: FloatArray) -> tuple[FloatArray, Floa
 
 def _spectrum(found: Sequence[Column]) -> Chart:
     chosen = [(i, c) for i, c in enumerate(found) if np.count_nonzero(c.signals.inside) > 16]
-    traces = [spectrum_trace(c.signals, Curve(i, c.name, 1.4)) for i, c in chosen]
-    layout = Axes("frequency [Hz]", "power spectral density [N\u00b2/Hz]").layout()
-    layout["xaxis"] |= {"type": "log", "tickvals": [0.5, 1, 2, 5, 10, 20, 50, 100]}
-    layout["yaxis"] |= {"type": "log", "exponentformat": "power"}
+    curves = tuple(spectrum_curve(c.signals, c.name, stroke(i, 1.4)) for i, c in chosen)
     note = "Force as computed, interval of interest of each run."
-    return Chart("spectrum", "Spectrum", {"data": traces, "layout": layout}, note, 380)
+    return Chart("spectrum", "Spectrum", FREQUENCY, DENSITY, curves, note)
 
 
 def _bands(found: Sequence[Column]) -> Chart:
-    names = ["whole", *(f"{b} Hz" for b in _BANDS)]
-    traces = []
-    for i, c in enumerate(found):
-        q = c.assessment.quality
-        traces.append({**grouped_bars(i, c.name), "x": names, "y": [q.sigma, *(q.sigma_bands[b] for b in _BANDS)]})
-    layout = {**Axes("band", "standard deviation [N]").layout(), "barmode": "group"}
-    return Chart("bands", "Standard deviation per band", {"data": traces, "layout": layout}, "", 320)
+    names = ("whole", *(f"{b} Hz" for b in _BANDS))
+    qualities = [(c.name, c.assessment.quality) for c in found]
+    bars = tuple(
+        Bars(name, names, np.array([q.sigma, *(q.sigma_bands[b] for b in _BANDS)]), i)
+        for i, (name, q) in enumerate(qualities)
+    )
+    y = Axis("standard deviation", "N")
+    return Chart("bands", "Standard deviation per band", Axis("band"), y, bars, height=320)
 
 
 def _uplift(found: Sequence[Column]) -> Chart:
     runs = {id(c.run): (i, c) for i, c in reversed(list(enumerate(found)))}
-    traces: list[dict[str, Any]] = []
+    bars = []
     for i, c in sorted(runs.values(), key=lambda entry: entry[0]):
         own = [u for u in c.run.uplifts if u.component == c.assessment.contact.catenary]
         if own:
-            traces.append({**uplift_trace(own, c.name, i), "width": None})
-    layout = {**Axes("track position of the support [m]", "largest uplift [mm]").layout(), "barmode": "group"}
-    return Chart("uplift", "Uplift at the supports", {"data": traces, "layout": layout}, "Whole run.", 340)
+            bars.append(replace(support_bars(own, c.name, i), width=None))
+    x, y = Axis("track position of the support", "m"), Axis("largest uplift", "mm")
+    return Chart("uplift", "Uplift at the supports", x, y, tuple(bars), "Whole run.", 340)
 
 
 def _input_section(runs: Sequence[Results]) -> list[str]:
@@ -240,5 +235,5 @@ def _quality_section(runs: Sequence[Results]) -> list[str]:
     tables = [dict(quality_rows(run.summary)) for run in runs]
     names = list(dict.fromkeys(name for table in tables for name in table))
     rows = [(name, *(table.get(name, "-") for table in tables)) for name in names]
-    heads = ["what", *run_names([run.folder for run in runs])]
+    heads = ["item", *run_names([run.folder for run in runs])]
     return ["<h2>Numerical quality</h2>", html_markup.table(heads, rows, numbers=False)]

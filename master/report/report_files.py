@@ -1,26 +1,29 @@
-"""What a run's folder is given to look at: ``report.html``, and every chart that goes to paper as PNG and SVG."""
+"""The files that a run's folder holds to be looked at: ``report.html``, and charts as PNG and SVG."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, Final
 
 from master.evaluation.measured_force import MeasuredComparison
-from master.report.charts import static_charts
-from master.report.charts.output_charts import has_contacts, output_plots
+from master.report.charts.run_charts import file_charts
+from master.report.charts.static_figure import static_figure
 from master.report.run_page import page
 from master.results import results_folder
 from master.results.run_results import Results
 from master.safety.safe_files import atomic_file, write_atomically
 
+#: Formats of the charts' files with their options: no date, so that equal runs leave equal files.
+_FORMATS: Final[dict[str, dict[str, Any]]] = {"svg": {"metadata": {"Date": None}}, "png": {"dpi": 130}}
+
 
 def write(done: Results, measured: MeasuredComparison | None = None) -> Path:
-    """Write the plots (PNG and SVG) and ``report.html`` into the run's folder; returns the report's path."""
+    """Write the charts' files and ``report.html`` into the run's folder, and return the report's path."""
     path = done.folder / results_folder.REPORT
     write_atomically(path, page(done, measured).encode())
-    figures = static_charts.all_plots(done) if has_contacts(done) else output_plots(done)
-    for name, figure in figures.items():
-        with atomic_file(done.folder / f"{name}.svg") as temporary:
-            figure.savefig(temporary, format="svg", metadata={"Date": None})
-        with atomic_file(done.folder / f"{name}.png") as temporary:
-            figure.savefig(temporary, format="png", dpi=130)
+    for name, charts in file_charts(done).items():
+        figure = static_figure(charts)
+        for ending, options in _FORMATS.items():
+            with atomic_file(done.folder / f"{name}.{ending}") as temporary:
+                figure.savefig(temporary, format=ending, **options)
     return path

@@ -1,8 +1,8 @@
 """What a run prints at its end, and the terminal as a place for text from others: shown, never obeyed.
 
 Names, titles and messages come from FMUs and files of unknown origin. A control sequence in one of them could move the
-cursor, colour a failed verdict green or set the clipboard; so every character that does not print is written out as
-its escape. Rich's own sequences, for colours, are made after that and stay.
+cursor, colour a failed verdict green or set the clipboard; so every character that does not print is written as its
+escape. Rich adds its own sequences, for colours, after that, and these stay.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from master.report.result_tables import (
 )
 from master.results.run_results import Results
 
-_WIDTH: Final = 80
+WIDTH: Final = 80
 
 
 class Terminal(Console):
-    """A console that shows the characters that do not print instead of sending them."""
+    """A console that shows characters that do not print instead of sending them."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Render, and write out what does not print."""
+        """Render, and write what does not print as escapes."""
         for segment in super().render(renderable, options):
             if segment.control:
                 yield segment
@@ -45,7 +45,7 @@ class Terminal(Console):
 
 
 def printable_json(text: str) -> str:
-    r"""Return JSON in which every character prints, and which says the same.
+    r"""Return JSON with the same contents in which every character prints.
 
     Examples
     --------
@@ -55,8 +55,9 @@ def printable_json(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text)
 
 
-def _show(done: Results) -> None:
-    console = Terminal(width=_WIDTH, highlight=False)
+def show_run(done: Results) -> None:
+    """Print figures, verdicts and what else a reader has to know of a run."""
+    console = Terminal(width=WIDTH, highlight=False)
     assessments = done.assessments()
     if assessments:
         heads = [a.contact.pantograph for a in assessments]
@@ -78,7 +79,7 @@ def _show(done: Results) -> None:
 
 
 def _show_verdict(console: Console, assessment: Assessment, settings: EvaluationSettings) -> None:
-    """Print the verdict of a contact, and what makes it less than certain."""
+    """Print the verdict of a contact, and what makes it uncertain."""
     if assessment.withheld:
         text = f"{assessment.contact.pantograph}: not judged: {assessment.withheld}"
         console.print(text, style="yellow", markup=False, soft_wrap=True)
@@ -95,7 +96,7 @@ def _closing_lines(done: Results) -> list[str]:
     performance = done.summary["performance"]
     lines = [
         f"wall time {performance['wall_time']:.2f} s, "
-        f"initialization {performance['initialisation_time']:.2f} s, "
+        f"initialisation {performance['initialisation_time']:.2f} s, "
         f"real-time factor {performance['real_time_factor']:.2f}, {performance['peak_memory']:.0f} MB",
     ]
     lines += [
@@ -103,7 +104,7 @@ def _closing_lines(done: Results) -> list[str]:
         for p in done.summary["interface_power"]
     ]
     lines += _energy_lines(done.summary["energy"])
-    if tolerance := _told_tolerance({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
+    if tolerance := tolerance_words({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
         lines.append(tolerance.removeprefix(", "))
     return [*lines, *_punctuality_lines(performance.get("real_time")), f"results in {done.folder}"]
 
@@ -117,7 +118,7 @@ def _energy_lines(found: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
-    """Return how a run kept up with the wall clock, in words."""
+    """Return in words how a run kept pace with the wall clock."""
     if found is None:
         return []
     jitter, late = found["start_jitter"], found["lateness"]
@@ -130,11 +131,13 @@ def _punctuality_lines(found: dict[str, Any] | None) -> list[str]:
     ]
 
 
-def _told_tolerance(told: Mapping[str, float | None]) -> str:
-    """Return in words which tolerance the FMUs are told, by their components' names; empty if none is."""
-    values = set(told.values())
+def tolerance_words(tolerances: Mapping[str, float | None]) -> str:
+    """Return in words the tolerances that the FMUs of components are given; empty if there are none."""
+    values = set(tolerances.values())
     if values <= {None}:
         return ""
     if len(values) == 1:
         return f", tolerance {values.pop():g} for all FMUs"
-    return ", tolerance " + ", ".join(f"{value:g} for {name}" for name, value in told.items() if value is not None)
+    return ", tolerance " + ", ".join(
+        f"{value:g} for {name}" for name, value in tolerances.items() if value is not None
+    )

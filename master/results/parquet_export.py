@@ -11,9 +11,9 @@ from master.safety.safe_files import atomic_file
 
 
 def write_parquet(folder: Path) -> tuple[Path, ...]:
-    """Write a ``.parquet`` file beside every time series of a run and its ``contact_force.csv``; returns their paths.
+    """Write a ``.parquet`` file beside every time series of a run and its ``contact_force.csv``; return their paths.
 
-    Titles are those of the CSV files, units in brackets; no index column.
+    The titles are those of the CSV files, with units in brackets; there is no index column.
 
     Raises
     ------

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
+import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from master.errors import MasterError, RequestError
+from master.evaluation.contact_signals import Signals, force_table
 from master.recording.checkpoint import NAME as CHECKPOINT
+from master.recording.continuation import Continuation
+from master.recording.recording import NUMBER_FORMAT
+from master.recording.static_geometry import Geometry
 from master.results import summary_schema
 from master.safety import folder_lock
-from master.safety.safe_files import PART, write_atomically
+from master.safety.safe_files import PART, safe_cell, write_atomically
 
 GENERATOR: Final = "openpanto master"
-#: Version of what a run leaves. 1, which says none: figures of a brick wall at 20 Hz; 2: as it stands here.
+#: Version of what a run leaves. 1, which names none: figures of a brick wall at 20 Hz; 2: the present one.
 FORMAT: Final = 2
 SUMMARY: Final = "summary.json"
 GEOMETRY: Final = "geometry.json"
@@ -24,15 +34,88 @@ FORCES: Final = "contact_force.csv"
 REPORT: Final = "report.html"
 _TABLES: Final = ("timeseries*.csv", "timeseries*.parquet", FORCES, "contact_force.parquet")
 _OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
-#: What a run, a study or a verification that was killed may leave half written, and what is no result.
+#: What a run, a study or a verification may leave half written if it is killed, and what is no result.
 _PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT)), f".*{PART}")
 _LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)
+#: Format of numbers that are to be read back to the last bit.
+_EXACT: Final = "%.17g"
 _NOT_OURS: Final = "exists and is {kind} of this tool; it is left alone, choose another with --out"
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The results folder of one run, claimed: its files, and which run it is.
+
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    run : str
+        Identity of the run.
+    """
+
+    path: Path
+    run: str
+
+    @property
+    def summary_file(self) -> Path:
+        """Path of ``summary.json``."""
+        return self.path / SUMMARY
+
+    @property
+    def checkpoint_file(self) -> Path:
+        """Path of the checkpoint."""
+        return self.path / CHECKPOINT
+
+    @property
+    def is_intact(self) -> bool:
+        """Whether the results that lie in the folder are still those of this run."""
+        with suppress(MasterError):
+            return identity(self.path) == self.run
+        return False
+
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
+        """Write ``summary.json``."""
+        write_json(self.summary_file, summary)
+
+    def write_geometry(self, geometry: Geometry) -> None:
+        """Write ``geometry.json``."""
+        write_json(self.path / GEOMETRY, geometry)
+
+
+@contextmanager
+def claimed_for_run(folder: Path, continuation: Continuation | None = None) -> Iterator[RunFolder]:
+    """Work alone in a results folder, emptied for a new run; or as it is, for the run that continues in it.
+
+    Parameters
+    ----------
+    folder : Path
+    continuation : Continuation, optional
+        Where the run continues from.
+
+    Raises
+    ------
+    FolderInUseError
+        If another process works in it.
+    RequestError
+        If another run's results lie in it than those of the run to be continued.
+    MasterError
+        If it exists and is something else, or cannot be written.
+    """
+    with claimed(folder):
+        if continuation is not None and continuation.is_same_run:
+            run = identity(folder)
+            if not run or run != continuation.checkpoint.run:
+                raise RequestError(f"{continuation.file} comes from another run than the results beside it")
+        else:
+            _empty(folder, None if continuation is None else Path(continuation.file))
+            run = uuid.uuid4().hex
+        yield RunFolder(folder, run)
 
 
 @contextmanager
 def claimed(folder: Path) -> Iterator[None]:
-    """Work alone in a results folder of ours, or a new one; nothing in it is changed yet.
+    """Work alone in a results folder of this tool, or a new one; nothing in it is changed yet.
 
     Raises
     ------
@@ -51,14 +134,14 @@ def claimed(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator[None]:
-    """Work alone in a folder, or one whose JSON file ``marker`` names its ``generator``; nothing is removed.
+    """Work alone in a new folder, or in one whose JSON file ``marker`` names its ``generator``; no results are removed.
 
     Raises
     ------
     FolderInUseError
         If another process works in it.
     MasterError
-        If it is there and is no ``kind`` of ours, or cannot be made.
+        If it exists and is no ``kind`` of this tool, or cannot be made.
     """
     if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
         raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
@@ -69,7 +152,7 @@ def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator
 
 @contextmanager
 def _alone_in(folder: Path, kind: str) -> Iterator[None]:
-    """Make a folder and lock it; it goes away again if the command line turns out to be wrong."""
+    """Make a folder and lock it; remove it again if the command line turns out to be wrong."""
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -83,19 +166,19 @@ def _alone_in(folder: Path, kind: str) -> Iterator[None]:
             yield
     except RequestError:
         if is_new:
-            with suppress(OSError):  # there is something in it
+            with suppress(OSError):  # it is not empty
                 folder.rmdir()
         raise
 
 
-def prepare(folder: Path, keep: Path | None = None) -> None:
-    """Empty a claimed folder of the results of an earlier run.
+def _empty(folder: Path, keep: Path | None) -> None:
+    """Remove the results of an earlier run from a claimed folder.
 
     Parameters
     ----------
     folder : Path
     keep : Path, optional
-        The checkpoint that a new run begins from, if it lies there.
+        The checkpoint that the new run begins from, if it lies there.
 
     Raises
     ------
@@ -120,30 +203,30 @@ def _remove(folder: Path, patterns: Sequence[str]) -> None:
 
 
 def _holds_nothing(folder: Path) -> bool:
-    """Whether a folder is not there, or holds nothing but what a run that was killed at once has left."""
+    """Whether a folder does not exist, or holds only what a run that was killed at once has left."""
     if not folder.is_dir():
         return not folder.exists()
     return all(any(path.match(p) for p in (*_PARTS, *_LOCKS)) for path in folder.iterdir())
 
 
 def is_ours(folder: Path) -> bool:
-    """Whether the folder is a result of this tool."""
+    """Whether the folder is a results folder of this tool."""
     return made_by(folder / SUMMARY, GENERATOR)
 
 
 def identity(folder: Path) -> str:
-    """Return which run it is whose results lie in a folder.
+    """Return the identity of the run whose results lie in a folder.
 
     Raises
     ------
     MasterError
-        If it is not a results folder of ours.
+        If it is not a results folder of this tool.
     """
     return str(_summary(folder).get("run", ""))
 
 
 def made_by(path: Path, generator: str) -> bool:
-    """Whether a JSON file says that it is from ``generator``."""
+    """Whether a JSON file names this ``generator``."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -152,13 +235,25 @@ def made_by(path: Path, generator: str) -> bool:
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write a JSON file in one go: readers see the old one or the new one, never half of it."""
+    """Write a JSON file atomically: readers see the old one or the new one, never half of it."""
     write_text(path, json.dumps(_finite(data), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in one go."""
+    """Write a text file atomically."""
     write_atomically(path, text.encode())
+
+
+def write_forces(folder: Path, signals: Sequence[Signals]) -> None:
+    """Write the filtered contact forces that the figures are made of, to the last bit."""
+    if not signals:
+        return
+    titles, columns = force_table(signals)
+    formats = [_EXACT if title.endswith(".filtered_force [N]") else NUMBER_FORMAT for title in titles]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(map(safe_cell, titles))
+    np.savetxt(text, np.column_stack(columns), fmt=formats, delimiter=",")
+    write_text(folder / FORCES, text.getvalue())
 
 
 def _summary(folder: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Two runs side by side."""
+"""The differences of two runs, contact by contact."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import Signals, contact_signals
 from master.results.run_results import Results
 
-#: Contacts this near to each other at equal times are at the same place [m].
+#: Contacts this near to each other at equal times are at the same position [m].
 SAME_PLACE: Final = 0.1
 
 
@@ -24,13 +24,13 @@ class RunDifference:
     Attributes
     ----------
     first, second : Assessment
-        Figures of each.
+        Figures of the two runs.
     rms : float, optional
-        Root mean square difference of the low-passed forces at equal times in the first run's interval [N].
+        Root mean square difference of the low-passed forces at equal times in the interval of the first run [N].
     largest : float, optional
-        Largest magnitude of that difference [N].
+        Largest magnitude of this difference [N].
     apart : float, optional
-        How far apart along the track the two are at most at these times [m].
+        Largest distance along the track between the two at these times [m].
     """
 
     first: Assessment
@@ -41,17 +41,17 @@ class RunDifference:
 
     @property
     def sentence(self) -> str:
-        """What the forces' difference is, or why there is none."""
+        """The difference of the forces in words, or why there is none."""
         if self.rms is None or self.largest is None:
             return "no difference of the forces: the second run has no time in common with the first one's interval"
         text = f"low-passed forces differ by {self.rms:.3g} N (rms), {self.largest:.3g} N (largest)"
         if self.apart is None or self.apart <= SAME_PLACE:
             return text
-        return f"{text}, at equal times, at which the two are up to {self.apart:.3g} m apart: not at the same places"
+        return f"{text}, at equal times, at which the two are up to {self.apart:.3g} m apart: not at the same positions"
 
 
 def compare(a: Results, b: Results) -> tuple[RunDifference, ...]:
-    """Compare the contacts that both runs have.
+    """Return the differences of the contacts that both runs have.
 
     Raises
     ------
@@ -67,34 +67,36 @@ def compare(a: Results, b: Results) -> tuple[RunDifference, ...]:
 
 
 def filter_note(runs: Sequence[Results]) -> str:
-    """Return a sentence if runs were evaluated with different filters, else nothing."""
-    told = [run.evaluation.filter.short for run in runs]
-    if len(set(told)) < 2:
+    """Return a sentence if runs were evaluated with different filters, else an empty one."""
+    filters = [run.evaluation.filter.short for run in runs]
+    if len(set(filters)) < 2:
         return ""
     return (
-        f"the filters differ ({_told(runs, told)}), so the figures do even for the same force; "
+        f"the filters differ ({_by_run(runs, filters)}), so the figures do even for the same force; "
         "differences of the forces are taken with the first one's"
     )
 
 
 def setting_notes(runs: Sequence[Results]) -> tuple[str, ...]:
-    """Return a sentence for each setting in which runs differ that are evaluated differently for it."""
+    """Return a sentence for each setting that runs are evaluated with and differ in."""
     intervals = [_interval_words(run.evaluation.interval) for run in runs]
     limits = [run.evaluation.limits for run in runs]
     found = [filter_note(runs)]
     if len(set(intervals)) > 1:
-        told = _told(runs, intervals)
+        listed = _by_run(runs, intervals)
         found.append(
-            f"the intervals of interest differ ({told}), so the figures are of other parts of the line; "
+            f"the intervals of interest differ ({listed}), so the figures are of different parts of the line; "
             "differences of the forces are taken in the first one's"
         )
     if len(set(limits)) > 1:
-        told = _told(runs, [choice.title for choice in limits])
-        found.append(f"the runs are judged by other limits ({told}), so a verdict may differ for the same figures")
+        listed = _by_run(runs, [choice.title for choice in limits])
+        found.append(
+            f"the runs are judged by different limits ({listed}), so a verdict may differ for the same figures"
+        )
     return tuple(filter(None, found))
 
 
-def _told(runs: Sequence[Results], texts: Sequence[str]) -> str:
+def _by_run(runs: Sequence[Results], texts: Sequence[str]) -> str:
     return "; ".join(f"{run.folder.name}: {text}" for run, text in zip(runs, texts, strict=True))
 
 
@@ -107,7 +109,7 @@ def _interval_words(interval: tuple[float | None, float | None]) -> str:
 def _difference(
     a: Results, b: Results, first: Assessment, second: Assessment
 ) -> tuple[float | None, float | None, float | None]:
-    """Return the differences of the forces, both low-passed with the first run's filter, and of the places."""
+    """Return the differences of the forces, both low-passed with the filter of the first run, and of the positions."""
     one, two = _signals(a, first), contact_signals(b.recordings[0], second.contact, a.evaluation)
     inside = one.inside & (one.time >= two.time[0]) & (one.time <= two.time[-1])
     if not inside.any():

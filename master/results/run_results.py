@@ -2,46 +2,41 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment, assess_contacts, interval_of
-from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals, force_table
+from master.evaluation.contact_signals import EvaluationSettings, Signals, all_signals
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits
 from master.evaluation.energy_balance import EnergyBalance, drift_events, find_balances
 from master.evaluation.filters import BEFORE_CHOICE, ForceFilter
 from master.evaluation.following_pantograph import FollowerEffect, follower_effects
 from master.evaluation.line_geometry import Uplift, support_uplifts
 from master.evaluation.run_events import Event, find_events
-from master.recording.recording import NUMBER_FORMAT, TIMESERIES, Recording, load
+from master.recording.recording import TIMESERIES, Recording, load
 from master.recording.static_geometry import Geometry
 from master.results import summary_schema
-from master.results.results_folder import FORCES, GEOMETRY, _summary, write_text
+from master.results.results_folder import GEOMETRY, _summary
 from master.safety import folder_lock
-from master.safety.safe_files import safe_cell
 from master.system.contacts import Contact
 
 
 @dataclass(frozen=True)
 class Results:
-    """A run as it lies in its folder.
+    """A run, read back from its folder.
 
     Attributes
     ----------
     folder : Path
-        Where.
+        The results folder.
     summary : dict
-        Contents of summary.json.
+        Contents of ``summary.json``.
     recordings : tuple of Recording
-        timeseries.csv first, then the coarser ones.
+        ``timeseries.csv`` first, then the coarser ones.
     geometry : dict
         Calculated parameters by component.
     """
@@ -54,7 +49,7 @@ class Results:
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts of the run."""
-        return tuple(Contact(**c) for c in self.summary.get("contacts", []))
+        return tuple(Contact.from_data(c) for c in self.summary.get("contacts", []))
 
     @property
     def interval(self) -> tuple[float | None, float | None]:
@@ -63,7 +58,7 @@ class Results:
 
     @property
     def evaluated_interval(self) -> tuple[float | None, float | None]:
-        """Where along the track the figures come from [m]; an open bound is that of the contact with most of it."""
+        """Where along the track the figures come from [m]; an open bound is the farthest of all contacts."""
         found = [interval_of(a.quality, self.interval) for a in self.assessments()]
         if not found or None not in self.interval:
             return self.interval
@@ -71,7 +66,7 @@ class Results:
 
     @cached_property
     def evaluation(self) -> EvaluationSettings:
-        """How the run is evaluated: by the filter that it was made with, in its interval, by its limits."""
+        """How the run is evaluated: with the filter that it was made with, in its interval, by its limits."""
         settings = self.summary.get("settings", {})
         chosen, limits = settings.get("interval", {}), dict(settings.get("limits", {}))
         supply = limits.pop("supply", "AC")
@@ -94,15 +89,15 @@ class Results:
 
     @property
     def not_judged(self) -> str:
-        """Why a run that is complete has no figures, empty if it has."""
+        """Why a complete run has no figures; empty if it has some."""
         return str(self.summary.get("not_judged", ""))
 
     def assessments(self) -> tuple[Assessment, ...]:
-        """Return figures and verdict of every contact that has samples in the interval; none if it was not passed."""
+        """Return figures and verdict of every contact with samples in the interval; none if it was not passed."""
         return () if self.not_judged else self.assessments_in(self.interval)
 
     def assessments_in(self, interval: tuple[float | None, float | None]) -> tuple[Assessment, ...]:
-        """Return figures and verdict of every contact that has samples in another interval [m]."""
+        """Return figures and verdict of every contact with samples in another interval [m]."""
         if interval not in self._assessed:
             chosen = replace(self.evaluation, interval=interval)
             found = assess_contacts(self.recordings, self.contacts, self.geometry, chosen)
@@ -112,12 +107,12 @@ class Results:
 
     @cached_property
     def _assessed(self) -> dict[tuple[float | None, float | None], tuple[Assessment, ...]]:
-        """What was assessed once, by interval: pages and tables ask again and again."""
+        """Assessments by interval: pages and tables ask for the same ones again and again."""
         return {}
 
     @property
     def verdict_withheld(self) -> str:
-        """Why figures are given without a verdict, empty if they are given with one."""
+        """Why figures are given without a verdict; empty if they have one."""
         status = str(self.summary.get("status") or "complete")
         if status != "complete":
             return f"the run {_ENDS.get(status, f'is {status}')}; these are its figures so far"
@@ -134,30 +129,30 @@ class Results:
 
     @property
     def balances(self) -> tuple[EnergyBalance, ...]:
-        """The energy balances that were recorded."""
+        """The recorded energy balances."""
         return find_balances(self.recordings, self.contacts)
 
     @property
     def follower_effects(self) -> tuple[FollowerEffect, ...]:
-        """Every pantograph beside the one ahead of it."""
+        """Every pantograph compared with the one ahead of it."""
         assessments = self.assessments()
         return follower_effects(self.recordings[0], assessments) if assessments else ()
 
 
 def read(folder: Path) -> Results:
-    """Read a run back from its folder.
+    """Return a run, read back from its folder.
 
     Raises
     ------
     MasterError
-        If it is not a results folder of ours, a file in it is damaged, or a run writes there.
+        If it is not a results folder of this tool, a file in it is damaged, or a run is writing there.
     """
     folder_lock.check_free(folder)
     done = _read(folder)
     folder_lock.check_free(folder)
     now = _summary(folder)
     if (now.get("run"), now.get("status")) != (done.summary.get("run"), done.summary.get("status")):
-        raise MasterError(f"{folder} was written anew while it was read; try again")
+        raise MasterError(f"{folder} was written while it was being read; try again")
     return done
 
 
@@ -169,27 +164,12 @@ def _read(folder: Path) -> Results:
     return Results(folder, summary, recordings, geometry)
 
 
-#: How runs end that are not complete.
+#: How incomplete runs ended.
 _ENDS: Final = {"running": "was not finished", "failed": "has failed", "interrupted": "was interrupted"}
 
 
-def write_forces(done: Results) -> None:
-    """Write the filtered contact forces, as the figures are made of them, to the last bit."""
-    if not done.signals:
-        return
-    titles, columns = force_table(done.signals)
-    formats = [_EXACT if title.endswith(".filtered_force [N]") else NUMBER_FORMAT for title in titles]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(map(safe_cell, titles))
-    np.savetxt(text, np.column_stack(columns), fmt=formats, delimiter=",")
-    write_text(done.folder / FORCES, text.getvalue())
-
-
-_EXACT: Final = "%.17g"
-
-
-def filter_of(told: Mapping[str, Any] | None) -> ForceFilter:
+def filter_of(settings: Mapping[str, Any] | None) -> ForceFilter:
     """Return the filter that a run was made with, from its settings."""
-    if told is None:
+    if settings is None:
         return BEFORE_CHOICE
-    return ForceFilter(**{name: value for name, value in told.items() if value is not None})
+    return ForceFilter(**{name: value for name, value in settings.items() if value is not None})

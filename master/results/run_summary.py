@@ -1,4 +1,4 @@
-"""What ``summary.json`` says of a run."""
+"""The contents of ``summary.json``: what a run was, how it ended, what it took, its figures."""
 
 from __future__ import annotations
 
@@ -6,18 +6,96 @@ import platform
 import re
 import sys
 from dataclasses import asdict
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from master.coupling.macro_steps import RunOutcome
+from master.coupling.stopwatch import Timing
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.filters import ForceFilter
 from master.evaluation.run_events import MOST_EVENTS
+from master.recording.continuation import Continuation
+from master.results.results_folder import FORMAT, GENERATOR
 from master.results.run_results import Results
+from master.system.components import Component, System, Variable
+
+
+def describe(system: System, run: str) -> dict[str, Any]:
+    """Return what is known of a run at its beginning: identity, settings, components and contacts."""
+    return {
+        "generator": GENERATOR,
+        "format": FORMAT,
+        "run": run,
+        "scenario": system.name,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "settings": {
+            "start": system.start,
+            "stop": system.stop,
+            "step": system.step,
+            **system.settings.model_dump(mode="json"),
+        },
+        "components": [_component(c) for c in system.components],
+        "contacts": [c.as_data() for c in system.contacts],
+    }
+
+
+def _component(component: Component) -> dict[str, Any]:
+    fmu = component.fmu
+    return {
+        "name": component.name,
+        "fmu": fmu.path.name,
+        "guid": fmu.guid,
+        "sha256": fmu.sha256,
+        "tool": fmu.tool,
+        "parameters": component.parameters,
+        "tolerance": component.tolerance,
+        "inputs": [_input(component, v) for v in fmu.variables.values() if v.causality == "parameter"],
+    }
+
+
+def _input(component: Component, variable: Variable) -> dict[str, Any]:
+    return {
+        "name": variable.name,
+        "value": component.parameters.get(variable.name, variable.start),
+        "unit": variable.unit,
+        "description": variable.description,
+        "changed": variable.name in component.parameters,
+    }
+
+
+def ending(outcome: RunOutcome) -> dict[str, Any]:
+    """Return how a run ended."""
+    return {
+        "status": outcome.status,
+        "reason": str(outcome.error) if outcome.error else "",
+        "steps": outcome.steps,
+        "time_reached": outcome.time,
+    }
+
+
+def origin(continuation: Continuation | None) -> dict[str, Any]:
+    """Return where a run continued from, if it did."""
+    if continuation is None:
+        return {}
+    c = continuation
+    return {"resumed": {"file": c.file, "time": c.checkpoint.time, "renewed": list(c.renewed)}}
+
+
+def performance(timing: Timing, simulated: float) -> dict[str, Any]:
+    """Return what a run of this much simulated time [s] took."""
+    return {
+        "initialisation_time": timing.initialisation,
+        "wall_time": timing.stepping,
+        "real_time_factor": simulated / timing.stepping if timing.stepping > 0 else 0.0,
+        "peak_memory": peak_memory(),
+    }
 
 
 def figures(done: Results) -> dict[str, Any]:
-    """Return the figures, verdicts, events and energy balances for summary.json."""
+    """Return figures, verdicts, events and energy balances."""
     events = done.events
     return {
         "filter": done.evaluation.filter.sentence,
@@ -34,7 +112,7 @@ def figures(done: Results) -> dict[str, Any]:
 def _assessed(a: Assessment) -> dict[str, Any]:
     return {
         **asdict(a.quality),
-        "depends_on_filter": bool(a.quality.told),
+        "depends_on_filter": bool(a.quality.filter_dependent),
         "uplift": None if a.uplift is None else asdict(a.uplift),
         "supports": a.supports,
         "slack_droppers": a.slack,
@@ -49,13 +127,13 @@ def _assessed(a: Assessment) -> dict[str, Any]:
 
 
 def filter_data(chosen: ForceFilter) -> dict[str, Any]:
-    """Return a filter as a summary's settings have it."""
+    """Return a filter as it stands in the settings of a summary."""
     known = asdict(chosen)
     return known if chosen.kind == "butterworth" else {**known, "order": None, "phase": None}
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what computed."""
+    """Return the versions of the software that computed."""
     found = {"python": platform.python_version()}
     for name in ("openpanto", "fmpy", "numpy"):
         try:
@@ -66,9 +144,9 @@ def versions() -> dict[str, str]:
 
 
 def peak_memory() -> float:
-    """Return the largest memory that the process has occupied so far [MB]."""
+    """Return the peak memory of the process so far [MB]."""
     status = Path("/proc/self/status")
-    if status.is_file():  # Linux counts in its resource usage what the program took that has started this one
+    if status.is_file():  # the resource usage of Linux includes what the program that started this one took
         found = re.search(r"^VmHWM:\s*(\d+) kB$", status.read_text(encoding="ascii", errors="replace"), re.MULTILINE)
         if found is not None:
             return int(found[1]) / 1024.0

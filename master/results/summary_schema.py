@@ -1,4 +1,4 @@
-"""The JSON files of a results folder, read back: data of the shape they are used in, or a message."""
+"""The JSON files of a results folder, read back: either in the shape in which they are used, or a message."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from master.evaluation.en50367_limits import OwnLimits, Supply
 
 
 class _Loose(BaseModel):
-    """Only what is computed with is checked; the rest is shown as it is."""
+    """Checks only what is computed with; the rest is shown as it is."""
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
 
@@ -97,7 +97,7 @@ class _Caution(_Loose):
 
 
 class _Power(_Loose):
-    # Numbers that were not finite stand there as null.
+    # Numbers that were not finite are written as null.
     contact: int
     energy: float | None
     transferred: float | None

@@ -28,7 +28,15 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 def pack(header: Mapping[str, Any], arrays: Arrays) -> bytes:
-    """Return a header, which JSON can hold, and arrays as bytes."""
+    """Return a header, which JSON can hold, and arrays as bytes.
+
+    Raises
+    ------
+    ValueError
+        If an array holds Python objects.
+    """
+    for name, array in arrays.items():
+        _check_plain(name, array.dtype)
     listed = [{"name": n, "dtype": a.dtype.str, "shape": list(a.shape)} for n, a in arrays.items()]
     text = json.dumps({"header": header, "arrays": listed}, allow_nan=False).encode()
     body = b"".join((MAGIC, _LENGTH.pack(len(text)), text, *(a.tobytes() for a in arrays.values())))
@@ -54,8 +62,12 @@ def unpack(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     arrays = {}
     for entry in held["arrays"]:
         dtype, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])
-        if dtype.kind not in _PLAIN:
-            raise ValueError(f"holds an array of {dtype}, which is not one of plain numbers")
+        _check_plain(entry["name"], dtype)
         start, end = end, end + dtype.itemsize * int(np.prod(shape, dtype=np.int64))
         arrays[entry["name"]] = np.frombuffer(body[start:end], dtype).reshape(shape).copy()
     return held["header"], arrays
+
+
+def _check_plain(name: str, dtype: np.dtype[Any]) -> None:
+    if dtype.kind not in _PLAIN:
+        raise ValueError(f"holds the array '{name}' of {dtype}, not of plain numbers")

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from master.system.components import Component, System
-from master.system.contacts import find_contacts
 from master.system.pantograph_motion import final_position, pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
@@ -43,7 +42,7 @@ def empty_cells(system: System, names: Sequence[str]) -> str:
 
     A pantograph without values takes no part in a variant; without its line nothing is left to run.
     """
-    lines = {c.catenary for c in find_contacts(system.connections)}
+    lines = {c.catenary for c in system.contacts}
     found = [name for name in names if any(name.startswith(f"{line}.") for line in lines)]
     return f"the table has no value for {', '.join(found)}: write one into every row" if found else ""
 

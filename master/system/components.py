@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -13,6 +14,7 @@ from master.ssp.run_settings import RunSettings
 from master.ssp.ssp_units import Unit
 from master.ssp.ssv import Value
 from master.system.connections import Connection
+from master.system.contacts import Contact, find_contacts
 
 #: Share of a step by which the stop time may miss a whole number of steps for want of digits.
 _ROUNDING: Final = 1e-6
@@ -133,6 +135,11 @@ class System:
     settings: RunSettings
     warnings: tuple[str, ...] = ()
     may_stop_early: bool = False
+
+    @cached_property
+    def contacts(self) -> tuple[Contact, ...]:
+        """Where pantographs meet the wire, in the order of the catenary's ports."""
+        return find_contacts(self.connections)
 
     @property
     def discrete(self) -> frozenset[str]:

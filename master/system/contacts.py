@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final
 
 from master.system.connections import Connection
 
 _END: Final = re.compile(r"[AB]\.v?[xyz]")
+#: Keys of a contact in ``summary.json`` that differ from its attributes.
+_KEYS: Final = {"force_input": "told"}
 _FORCE: Final = re.compile(r"(?:pantograph\[(\d+)\]\.)?contact\.force")
 
 
@@ -25,18 +27,22 @@ class Contact:
         Component names.
     prefix : str
         Of the catenary's variables of this contact, e.g. ``catenary.pantograph[1].contact``.
-    told : str
-        Name of the input that the pantograph is told the force by.
+    force_input : str
+        Name of the pantograph's input for the force; ``contact.force`` if not given.
     ends : dict
-        Names of the outputs that the catenary is told the strip's ends from, by ``A.x`` ... ``B.vz``.
+        Names of the outputs that give the catenary the strip's ends, by ``A.x`` ... ``B.vz``.
     """
 
     index: int
     catenary: str
     pantograph: str
     prefix: str
-    told: str = field(default="", compare=False)
+    force_input: str = field(default="", compare=False)
     ends: dict[str, str] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.force_input:
+            object.__setattr__(self, "force_input", f"{self.pantograph}.contact.force")
 
     @property
     def force(self) -> str:
@@ -51,14 +57,19 @@ class Contact:
         """Name of a coordinate (x, y, z, vx, vy, vz) of the strip's end A or B."""
         return self.ends.get(f"{end}.{axis}", f"{self.pantograph}.{end}.{axis}")
 
-    @property
-    def force_input(self) -> str:
-        """Name of the input that the pantograph is told the force by."""
-        return self.told or f"{self.pantograph}.contact.force"
+    def as_data(self) -> dict[str, Any]:
+        """Return the contact as ``summary.json`` has it, where the input for the force is called ``told``."""
+        return {_KEYS.get(name, name): value for name, value in asdict(self).items()}
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Contact:
+        """Return the contact that `as_data` was called on."""
+        names = {key: name for name, key in _KEYS.items()}
+        return cls(**{names.get(key, key): value for key, value in data.items()})
 
 
 def find_contacts(connections: Iterable[Connection]) -> tuple[Contact, ...]:
-    """Return the contacts: a ``contact.force`` told to an input of that name, or to whoever the strip comes from."""
+    """Return the contacts: where a ``contact.force`` leads to an input of that name, or to the strip's component."""
     known = tuple(connections)
     found: dict[str, Contact] = {}
     for c in known:
@@ -75,6 +86,6 @@ def find_contacts(connections: Iterable[Connection]) -> tuple[Contact, ...]:
 
 
 def _strip(connections: Iterable[Connection], catenary: str, port: str) -> dict[str, Connection]:
-    """Return the connections that tell a port of a catenary its strip, by ``A.x`` ... ``B.vz``."""
+    """Return the connections that give a port of a catenary its strip, by ``A.x`` ... ``B.vz``."""
     ends = {c.input.removeprefix(port): c for c in connections if c.target == catenary and c.input.startswith(port)}
     return {key: c for key, c in ends.items() if _END.fullmatch(key)}

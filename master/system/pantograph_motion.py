@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from master.system.components import Component, System
-from master.system.contacts import find_contacts
 
 
 def parameter_value(component: Component, name: str) -> float | None:
@@ -22,7 +21,7 @@ def parameter_value(component: Component, name: str) -> float | None:
 
 def pantographs(system: System) -> tuple[Component, ...]:
     """Return the components that are told a contact force, each once."""
-    names = dict.fromkeys(c.pantograph for c in find_contacts(system.connections))
+    names = dict.fromkeys(c.pantograph for c in system.contacts)
     return tuple(system.component(name) for name in names)
 
 

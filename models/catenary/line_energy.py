@@ -17,12 +17,12 @@ _Press = tuple[int, float, float]
 
 
 class LineBalance:
-    """Steps a line and adds up the work of the contact forces on it and what its dampers take.
+    """Steps a line and adds up the work of the contact forces on it and what its dampers dissipate.
 
-    Droppers are stored as if they carried compression, too; the forces that take it off them again belong to what the
-    line stores, not to the work done on it. So are they damped; what takes that off them belongs to what is dissipated.
-    A dropper that is slack before its spring is loses what that still holds, and one that pulls before its spring is
-    taut is a damper.
+    The energy in droppers is counted as if they carried compression, too; the forces that cancel it belong to what the
+    line stores, not to the work done on it. Their damping is counted likewise; what cancels it belongs to the
+    dissipation. A dropper that goes slack before its spring does loses what the spring still holds, and one that pulls
+    before its spring is taut acts as a damper.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class LineBalance:
         self._presses = _presses(strips, contacts)
         modes = model.modes
         self._modal, self._attached = np.zeros(len(modes.eigenvalue)), np.zeros(len(modes.attached))
-        self._stretch, self._damping = Product(model.B), _Damping(model)
+        self._stretch, self._damping = Product(model.dropper_law.B), _Damping(model)
 
     @property
     def contact_work(self) -> FloatArray:
@@ -96,8 +96,8 @@ class LineBalance:
         return total
 
     def _compensation(self, instants: Sequence[tuple[IntArray, FloatArray]]) -> float:
-        """Return the work over a step of what slack droppers lack to their elastic force."""
-        rest = self._model.rest_compensation
+        """Return the work over a step of the forces that slack droppers lack to their elastic ones."""
+        rest = self._model.dropper_law.rest_compensation
         if not rest.any() and not any(slack.size for slack, _ in instants):
             return 0.0
         stretch = np.zeros(len(rest))
@@ -108,11 +108,11 @@ class LineBalance:
     def _released(self, state: CatenaryState) -> FloatArray:
         """Return what slack takes off the droppers besides their springs' compression [N], shape (n_droppers,)."""
         model = self._model
-        released = np.zeros(len(model.slack_delay))
-        if model.slack_delay.any():
+        released = np.zeros(len(model.dropper_law.slack_delay))
+        if model.dropper_law.slack_delay.any():
             released[state.slack] = state.compensation
-            released -= model.unilateral * np.maximum(-model.spring_force(state), 0.0)
-            released[model.slack_delay == 0.0] = 0.0
+            released -= model.dropper_law.unilateral * np.maximum(-model.spring_force(state), 0.0)
+            released[model.dropper_law.slack_delay == 0.0] = 0.0
         return released
 
     def _undamped(self, *instants: FloatArray) -> float:

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from models.arrays import BoolArray, FloatArray, IntArray, Snapshot
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
+from models.catenary.contact_and_slack.dropper_law import DropperLaw
 from models.catenary.contact_and_slack.local_problem import (
     ContactCandidate,
     LocalForces,
@@ -20,8 +21,9 @@ from models.catenary.contact_and_slack.local_problem import (
 from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.linear_motion.compliance import Compliance
-from models.catenary.linear_motion.interval_modes import IntervalModes, interval_modes, slower_than
+from models.catenary.linear_motion.interval_modes import IntervalModes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
+from models.catenary.linear_motion.mode_finding import interval_modes
 from models.catenary.linear_motion.sparse_products import Product, inner
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS
@@ -123,7 +125,7 @@ class StripMotion:
 
 @dataclass(frozen=True)
 class _Step:
-    """What belongs to one step size; ``pull`` finds what a change of the attachments in it adds to droppers' pulls."""
+    """What belongs to one step size; ``pull`` gives what a change of the attachments adds to the droppers' pulls."""
 
     engine: StepEngine
     pull: Product
@@ -150,49 +152,26 @@ class CatenaryModel:
         self.definition = definition
         self.mesh: CatenaryMesh = build_mesh(definition)
         self.static: StaticState = find_form(definition, self.mesh)
-        droppers = self.static.droppers
-        self.dropper_stiffness = droppers.stiffness
-        #: What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
-        self.rest_compensation = self.static.dropper_force - self.static.elastic_force
-        self.unilateral = 1.0 - droppers.compression_ratio
-        self.slack_delay = droppers.slack_delay
         attached = attachments(self.mesh)
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
         self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.shape.points)
         #: Coordinates of the line.
         with self._solvable("move in modes of its intervals"):
             self.modes = self._modes([part for parts in by_wire for part in parts])
-        #: Rows of the droppers' elongations over the attachments' displacements, which are in global axes.
-        self.B = droppers.rows[:, self.modes.attached].tocsr()
-        self._rest_load = self.B.T @ self.rest_compensation
-        #: Elastic forces of the droppers from the attachments' displacements; those of their dampers from velocities.
-        self._tighten = Product(sp.diags(self.dropper_stiffness) @ self.B)
-        alpha = definition.damping.of("dropper").alpha
-        self._damp = Product(alpha * sp.diags(self.dropper_stiffness) @ self.B)
-        #: Their pulls at the end of a step from the attachments' motion at its beginning; `_Step.pull` finds the rest.
-        self._pull = self._pulls()
-        #: What each of them pulls at.
-        self._stretch = [(row.indices, row.data) for row in self.B]
+        self.dropper_law = self._dropper_law()
         self.wires = tuple(self._wires(by_wire))
         self.uplift_places = self.modes.place[self.mesh.support_nodes * NODE_DOFS + 2]
         self._law = CONTACT_LAWS[definition.contact.law]
         self._radii = definition.contact.wire_radius + definition.contact.strip_radius
         self._steps: dict[float, _Step] = {}
 
-    def _pulls(self) -> Product:
-        """Return k (x - w v), w the delay of the slack: v turns to a1 dx - v in a step."""
-        k = self.dropper_stiffness
-        by_velocity = sp.csr_matrix(sp.diags(-k * self.slack_delay) @ self.B)
-        by_velocity.eliminate_zeros()
-        return Product(sp.hstack([sp.diags(k) @ self.B, by_velocity]))
-
     def initial_state(self, pantographs: int = 1) -> CatenaryState:
         """Return the line at rest in its static shape."""
-        shape = pantographs, len(self.wires)
+        shape, lacking = (pantographs, len(self.wires)), self.dropper_law.rest_compensation
         return CatenaryState(
             motion=LineMotion.at_rest(self.modes),
-            slack=np.flatnonzero(self.rest_compensation),
-            compensation=self.rest_compensation[self.rest_compensation > 0.0],
+            slack=np.flatnonzero(lacking),
+            compensation=lacking[lacking > 0.0],
             element=np.full(shape, -1),
             impact_velocity=np.zeros(shape),
             loaded=_NOWHERE,
@@ -200,9 +179,9 @@ class CatenaryModel:
         )
 
     def rehearse(self, step: float, strips: FloatArray) -> None:
-        """Take a step with a line at rest that is thrown away, so that the first real one need not lay anything out.
+        """Take a trial step of a line at rest, so that the first real one finds everything laid out.
 
-        Factorisation, compiled code and the responses about the strips are there afterwards: a paced run must not wait.
+        Factorisation, compiled code and responses near the strips exist afterwards: a paced run must not wait for them.
 
         Parameters
         ----------
@@ -210,7 +189,7 @@ class CatenaryModel:
             Time step [s].
         strips : ndarray, shape (n_pantographs, 2, 2, 3)
         """
-        with suppress(LocalSolutionError):  # the real step will tell, if it finds the same
+        with suppress(LocalSolutionError):  # the real step will raise it, if it recurs
             self.step(self.initial_state(len(strips)), step, StripMotion(strips, np.zeros(len(strips))))
 
     def step(self, state: CatenaryState, step: float, motion: StripMotion) -> ContactResult:
@@ -309,30 +288,18 @@ class CatenaryModel:
         return self._in_lap(result, strips)
 
     def dropper_force(self, state: CatenaryState) -> FloatArray:
-        """Return what every dropper carries under its law [N], shape (n_droppers,), its damper's part included.
-
-        By the law "tension" that is nothing where it is slack; by "elastic_only" what the damper, which knows no slack
-        there, pulls or pushes. `dropper_slack` says which ones are slack.
-        """
-        released, damper = self.spring_force(state), np.zeros(len(self.dropper_stiffness))
-        self._damp.add(state.motion.attached[1], damper)
-        together = self.slack_delay > 0.0  # spring and damper are released as one
-        released[together] += damper[together]
-        slack = state.slack
-        released[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, released[slack] + state.compensation)
-        return released + np.where(together, 0.0, damper)
+        """Return what every dropper carries under its law [N], shape (n_droppers,); see `DropperLaw.force`."""
+        return self.dropper_law.force(state.motion.attached, state.slack, state.compensation)
 
     def dropper_slack(self, state: CatenaryState) -> BoolArray:
         """Return which droppers are slack, shape (n_droppers,): by the law "elastic_only" those whose spring is."""
-        slack = np.zeros(len(self.dropper_stiffness), dtype=np.bool_)
+        slack = np.zeros(len(self.dropper_law.stiffness), dtype=np.bool_)
         slack[state.slack] = True
         return slack
 
     def spring_force(self, state: CatenaryState) -> FloatArray:
         """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""
-        force = self.static.elastic_force.copy()
-        self._tighten.add(state.motion.attached[0], force)
-        return force
+        return self.dropper_law.spring_force(state.motion.attached[0])
 
     def uplift(self, state: CatenaryState) -> FloatArray:
         """Return the rise of the contact wire at the supports [m], shape (n_supports,)."""
@@ -352,7 +319,7 @@ class CatenaryModel:
         return np.asarray(plan_rotation(self._angles) @ nodal).reshape(-1, NODE_DOFS)[self.mesh.owner]
 
     def set_velocity(self, state: CatenaryState, velocity: FloatArray) -> None:
-        """Give the nodes velocities.
+        """Set the velocities of the nodes.
 
         Parameters
         ----------
@@ -367,11 +334,11 @@ class CatenaryModel:
 
     def _modes(self, parts: Sequence[Interval]) -> IntervalModes:
         """Return the line's coordinates and matrices, droppers included."""
-        matrices, stretch, Q = self.static.shape.matrices, self.static.droppers.rows, plan_rotation(self._angles)
-        droppers = stretch.T @ sp.diags(self.dropper_stiffness) @ stretch
+        matrices, droppers, Q = self.static.shape.matrices, self.static.droppers, plan_rotation(self._angles)
+        springs = droppers.rows.T @ sp.diags(droppers.stiffness) @ droppers.rows
         damping = self.definition.damping
-        C = matrices.C + damping.of("dropper").alpha * droppers
-        stiffness = matrices.K + droppers
+        C = matrices.C + damping.of("dropper").alpha * springs
+        stiffness = matrices.K + springs
         if self.definition.dynamics.geometric_stiffness:
             # Not in C: alpha times it would be a damping that nothing has.
             stiffness = stiffness + self.static.pendulum_stiffness()
@@ -384,13 +351,26 @@ class CatenaryModel:
 
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:
-        """Say in words that matrices are not positive definite: their parts are too different, or it buckles."""
+        """Explain matrices that are not positive definite: parts of the line differ too much, or it buckles."""
         try:
             yield
         except np.linalg.LinAlgError as error:
             raise EquilibriumError(
                 f"line '{self.definition.name}' cannot {doing}: {error}; check masses, tensions and stiffnesses"
             ) from error
+
+    def _dropper_law(self) -> DropperLaw:
+        static = self.static
+        droppers = static.droppers
+        return DropperLaw(
+            B=droppers.rows[:, self.modes.attached].tocsr(),  # the attachments' displacements are in global axes
+            stiffness=droppers.stiffness,
+            alpha=self.definition.damping.of("dropper").alpha,
+            unilateral=1.0 - droppers.compression_ratio,
+            slack_delay=droppers.slack_delay,
+            elastic_force=static.elastic_force,
+            force=static.dropper_force,
+        )
 
     def _wires(self, by_wire: Sequence[Sequence[Interval]]) -> Iterator[ContactWire]:
         spans = iter(self.modes.spans)
@@ -414,34 +394,28 @@ class CatenaryModel:
         with self._solvable(f"make steps of {step:g} s"):
             matrices = StepMatrices(self.modes, newmark)
             engine = make_engine(matrices)
-        by_change = self.dropper_stiffness * (1.0 + newmark.a1 * self.slack_delay)
-        compliance = Compliance(matrices.factor, self.B, by_change)
+        law = self.dropper_law
+        by_change = law.by_change(newmark)
+        compliance = Compliance(matrices.factor, law.B, by_change)
         local = LocalProblem(
-            unilateral=self.unilateral,
+            unilateral=law.unilateral,
             dropper_columns=compliance.dropper_columns,
             velocity_factor=newmark.a1,
             law=self._law,
             parameters=self.definition.contact,
         )
         responses = ResponseCache(engine.response, compliance, len(self.wires))
-        return _Step(engine, Product(sp.diags(by_change) @ self.B), local, responses)
+        return _Step(engine, Product(sp.diags(by_change) @ law.B), local, responses)
 
     def _begin(self, now: _Step, state: CatenaryState) -> FloatArray:
-        """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N].
-
-        What a dropper that is slack at rest lacks is part of the static state, so it acts at both ends of the step.
-        """
-        pressed = 2.0 * self._rest_load
-        for j, force in zip(state.slack.tolist(), state.compensation.tolist(), strict=True):
-            places, stretch = self._stretch[j]
-            pressed[places] -= force * stretch
+        """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N]."""
         applied = []
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
             response = now.responses.of(self.wires[s].interval(element))
             applied.append(AppliedForce(response, element, xi, force))
+        pressed = self.dropper_law.known_load(state.slack, state.compensation)
         now.engine.begin(state.motion, pressed, applied)
-        pull = self.static.elastic_force.copy()
-        self._pull.add(state.motion.attached.ravel(), pull)
+        pull = self.dropper_law.pull(state.motion.attached)
         now.pull.add(now.engine.attached, pull)
         return pull
 
@@ -469,7 +443,7 @@ class CatenaryModel:
         return z_a + share * (z_b - z_a) - (height - self._radii), v_a + share * (v_b - v_a) - rate
 
     def _strip_compliance(self, contacts: Sequence[ContactCandidate], motion: StripMotion) -> FloatArray:
-        """Two contacts of one strip share its retreat."""
+        """Return how far strips give way to the contacts' forces [m/N]; two contacts of one strip share its retreat."""
         if len(contacts) == 1:
             return motion.compliance[contacts[0].pantograph].reshape(1, 1)
         owners = [c.pantograph for c in contacts]
@@ -488,7 +462,7 @@ class CatenaryModel:
             engine.attached[column.rows] -= compensation * column.values[:, 0]
 
     def _note(self, state: CatenaryState, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
-        """Note the forces at the end of the step; the next one begins with them."""
+        """Record the forces at the end of the step; the next one begins with them."""
         state.slack, state.compensation = forces.slack, forces.compensation
         state.impact_velocity[...] = 0.0
         for contact, velocity, closed in zip(contacts, forces.velocity, forces.closed, strict=True):

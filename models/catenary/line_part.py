@@ -18,7 +18,7 @@ from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import StripExtrapolation
 from models.numerics.newmark import steps_within
 
-#: Force under which a line's elasticity is told [N].
+#: Force for which a line's elasticity is given [N].
 _PUSH = 100.0
 
 
@@ -64,7 +64,7 @@ class LineGeometry:
 
 
 class CatenaryPart:
-    """An overhead contact line that is told where strips are and tells the contact forces.
+    """An overhead contact line: receives where strips are, returns the contact forces.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class CatenaryPart:
 
     @property
     def model(self) -> CatenaryModel:
-        """Return the line, built (form finding, matrices) when first asked for.
+        """Return the line, built (form finding, matrices) when first needed.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class CatenaryPart:
         return start_warning(wires_at_rest(self.model), strips, self.contact_force)
 
     def initialise(self, time: float, strips: FloatArray) -> None:
-        """Put the line to rest at ``time`` and find the contacts of the strips with it.
+        """Bring the line to rest at ``time`` and find the contacts of the strips with it.
 
         Parameters
         ----------
@@ -248,7 +248,7 @@ class CatenaryPart:
         return result | {name: getattr(self, name).copy() for name in outputs}
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Take over a snapshot."""
+        """Restore a snapshot."""
         self.time = float(snapshot["time"][0])
         self.state.restore({n.removeprefix("line."): v for n, v in snapshot.items() if n.startswith("line.")})
         for p, extrapolation in enumerate(self._strips):

@@ -255,7 +255,7 @@ def _print(run_of: Evaluated, factor: float) -> None:
     rows.append(("largest uplift of the interval's supports [mm]", "-" if uplift is None else f"{1e3 * uplift:.1f}"))
     print_table(f"Contact force, {run_of.filter.band}, {q.start:.0f} ... {q.end:.0f} m", ("quantity", "value"), rows)
     print(f"filter: {run_of.filter.sentence}")
-    for other in q.told:
+    for other in q.filter_dependent:
         extremes = f"maximum {other.maximum:.1f} N, minimum {other.minimum:.1f} N"
         print(f"the extremes depend on the filter: {extremes} with {other.filter}")
     peak = run_of.sampled.force.max()

@@ -150,8 +150,8 @@ class CoupledModel:
             section_force=np.zeros((rows, P, len(line.wires))),
             strip_height=np.zeros((rows, P)),
             uplift=np.zeros((rows, len(line.uplift_places))),
-            dropper_force=np.zeros((rows, len(line.dropper_stiffness))),
-            dropper_slack=np.zeros((rows, len(line.dropper_stiffness)), dtype=np.bool_),
+            dropper_force=np.zeros((rows, len(line.dropper_law.stiffness))),
+            dropper_slack=np.zeros((rows, len(line.dropper_law.stiffness)), dtype=np.bool_),
         )
 
 

@@ -33,18 +33,18 @@ SWITCH: Final = "OPENPANTO_KERNEL"
 _LOG: Final = logging.getLogger("openpanto")
 #: Length of the checksum before the content of a file [bytes].
 _DIGEST: Final = hashlib.sha256().digest_size
-#: Folders that a warning has named in this process.
+#: Warnings given in this process.
 _named: set[str] = set()
 
 
 class KernelError(RuntimeError):
-    """The compiled kernels were asked for and are not to be had."""
+    """The compiled kernels were asked for and are not available."""
 
 
 def load_kernels(name: str, source: bytes) -> ModuleType:
     """Return a module of numba kernels, made from ``source`` the first time in a process.
 
-    FMUs are unpacked somewhere new every time, and numba knows its files again by the path of the source, so the
+    FMUs are unpacked somewhere new every time, and numba recognises its files by the path of the source, so the
     module is loaded from a copy in the user's cache, named by its content.
 
     Parameters
@@ -57,7 +57,7 @@ def load_kernels(name: str, source: bytes) -> ModuleType:
     Raises
     ------
     ImportError
-        If numba is not installed, or there is no folder at all that takes the source.
+        If numba is not installed, or no folder can hold the source.
     """
     if importlib.util.find_spec("numba") is None:
         raise ImportError("numba is not installed; pip install numba")
@@ -79,12 +79,12 @@ def _load(name: str, path: Path) -> ModuleType:
 
 
 def _kept_source(source: bytes, folder: str) -> Path:
-    """Return a copy of the source in the user's cache, or in a folder that goes with this process.
+    """Return a copy of the source in the user's cache, or in a folder that is deleted with this process.
 
     Raises
     ------
     ImportError
-        If neither takes it.
+        If neither can be written to.
     """
     try:
         home = _cache_folder()
@@ -103,7 +103,7 @@ def _kept_source(source: bytes, folder: str) -> Path:
         copy = Path(temporary) / "kernels.py"
         _write(copy, source)
     except OSError as error:
-        raise ImportError(f"no folder takes what the kernels are compiled from: {error}") from error
+        raise ImportError(f"no folder can hold what the kernels are compiled from: {error}") from error
     return copy
 
 
@@ -121,7 +121,7 @@ def _write(copy: Path, source: bytes) -> None:
 
 
 def _cache_folder() -> Path:
-    """Return where this user's programs keep what they can make again.
+    """Return the folder in which this user's programs keep what they can make again.
 
     A relative XDG_CACHE_HOME is to be ignored (XDG Base Directory Specification).
     """
@@ -152,7 +152,7 @@ def _check_owner(folder: Path) -> None:
 
 
 def _warn(text: str) -> None:
-    """Say something once in a process."""
+    """Log a warning once per process."""
     if text not in _named:
         _named.add(text)
         _LOG.warning("warning: %s", text)
@@ -168,7 +168,7 @@ def _guard(module: ModuleType, folder: Path) -> None:
 
 
 def _leave_out_if_foreign(cache: Any) -> None:
-    """Keep nothing where others may write; numba has places of its own, and an environment variable for more."""
+    """Keep nothing where others may write; numba has further places, and an environment variable for more."""
     try:
         _check_owner(Path(cache.cache_path))
     except OSError as error:
@@ -182,7 +182,7 @@ class _GuardedCache:
     Parameters
     ----------
     cache : numba cache
-        What it asks.
+        The one that does the work.
     folder : Path
         Named in warnings.
     """
@@ -230,7 +230,7 @@ class _GuardedCache:
 def _checked_files(files: Any) -> Any:
     """Return numba's files of a kernel, each behind the checksum of its content.
 
-    Files of numba's own form stay what they are: they have other names, and are not read.
+    Files in numba's format are left alone: they have other names and are not read.
     """
     base: Any = type(files)
 
@@ -271,10 +271,10 @@ def _checked(path: Path) -> bytes:
     Raises
     ------
     ValueError
-        If it does not fit.
+        If the checksum does not match.
     """
     raw = path.read_bytes()
     content = raw[_DIGEST:]
     if hashlib.sha256(content).digest() != raw[:_DIGEST]:
-        raise ValueError(f"{path.name} does not fit its checksum")
+        raise ValueError(f"{path.name} does not match its checksum")
     return content

@@ -18,7 +18,7 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-from fmus.builder.fmu_build import ROOTS, Recipe
+from fmus.builder.recipe import ROOTS, Recipe
 from models.library.catalogue import line_path
 
 TOY = Path(__file__).parent / "toy"

@@ -1,4 +1,4 @@
-"""Make instances of an FMU one after another, in a process of its own: ``many_instances.py FMU COUNT WARM-UP``.
+"""Make instances of an FMU one after another, in a separate process: ``many_instances.py FMU COUNT WARM-UP``.
 
 Prints a JSON object: what an instance after the warm-up has left behind [kB], and what there is at the end of entries
 in ``sys.path``, of open files and of mapped pieces of files, beside what there was after the warm-up.

@@ -1,4 +1,4 @@
-"""Running the packed scenario in other tools, each in a process of its own."""
+"""Running the packed scenario in other tools, each in a separate process."""
 
 from __future__ import annotations
 

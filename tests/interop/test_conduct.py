@@ -41,12 +41,12 @@ def _load(part, location=None):
 
 
 def _ask(program, *orders, **environment):
-    """Return what the host told, line by line; every order was obeyed, and the host ended by itself."""
+    """Return what the host printed, line by line; every order was obeyed, and the host ended by itself."""
     done = run_host(program, "\n".join(orders) + "\n", **{"OPENPANTO_PYTHON": sys.executable, **environment})
     assert done.returncode == 0, done.stderr[-2000:]
     lines = done.stdout.splitlines()
-    told = [line.rpartition(" ")[0] for line in lines if line.rpartition(" ")[2].isdigit()]
-    assert [o.partition(" ")[0] for o in orders] == [t for t in told if " " not in t]
+    printed = [line.rpartition(" ")[0] for line in lines if line.rpartition(" ")[2].isdigit()]
+    assert [o.partition(" ")[0] for o in orders] == [t for t in printed if " " not in t]
     return lines, done.stderr
 
 
@@ -64,19 +64,19 @@ def test_a_reset_finds_a_relative_place_from_another_folder(obedient, part):
 
 def test_a_reset_after_the_fmu_was_moved_away_is_refused_in_words(obedient, part):
     away = "rename " + order(part.folder, part.folder.with_name("away"))
-    lines, told = _ask(obedient, _load(part), "start", away, "reset", "step 0", "free")
+    lines, printed = _ask(obedient, _load(part), "start", away, "reset", "step 0", "free")
     assert lines[:3] == ["load 0", "start 0", "rename 0"]
     assert lines[3].startswith("it cannot be reset: the FMU's resources in")
     assert lines[4:] == ["reset 3", "step 0", "free 0"]  # the instance is as it was
-    assert lines[3] in told
+    assert lines[3] in printed
 
 
 def test_a_state_that_the_host_has_no_room_for_is_refused(obedient, part):
-    lines, told = _ask(obedient, _load(part), "start", "save", "serialise 0", "serialise 1")
+    lines, printed = _ask(obedient, _load(part), "start", "save", "serialise 0", "serialise 1")
     assert lines[3] == "serialise 0"
     assert "the host has room for" in lines[4]
     assert lines[5] == "serialise 3"
-    assert lines[4] in told
+    assert lines[4] in printed
 
 
 @pytest.mark.parametrize(
@@ -88,10 +88,10 @@ def test_a_state_that_the_host_has_no_room_for_is_refused(obedient, part):
     ],
 )
 def test_a_call_that_cannot_be_served_is_a_sentence(obedient, part, call, text):
-    lines, told = _ask(obedient, _load(part), "start", call)
+    lines, printed = _ask(obedient, _load(part), "start", call)
     assert text in lines[2]
     assert lines[3] == f"{call.partition(' ')[0]} 3"
-    assert text in told
+    assert text in printed
 
 
 def test_a_python_that_does_not_know_its_own_place_is_named_by_the_command(obedient, part, tmp_path):
@@ -126,7 +126,7 @@ def test_links_to_the_libraries_are_followed(obedient, part, tmp_path, where):
 
 
 def test_several_fmus_start_python_once_in_threads_at_the_same_time(tmp_path):
-    """Each brings a loader of its own: what locks out the others has to be one for the process."""
+    """Each brings its own loader: what locks out the others has to be one for the process."""
     host = _compiled("together", tmp_path)
     parts = [unpack(build(toy_recipe(name=f"Toy{n}"), tmp_path), tmp_path / "unpacked") for n in range(4)]
     words = [str(word) for p in parts for word in (p.library, p.guid, p.folder / "resources")]

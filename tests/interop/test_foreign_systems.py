@@ -52,8 +52,8 @@ def whole_numbers():
 
 def open_input():
     """An input that nothing feeds, with a value of the scenario, and one with that of its FMU."""
-    told = values(("u", 'Real value="4"'), ("k", 'Real value="3"'))
-    return system(component("told", U, Y, bindings=told) + component("own", U, Y)), ("told::y::Real", "own::y::Real")
+    given = values(("u", 'Real value="4"'), ("k", 'Real value="3"'))
+    return system(component("given", U, Y, bindings=given) + component("own", U, Y)), ("given::y::Real", "own::y::Real")
 
 
 @pytest.mark.parametrize("tool", ["ecos", "libcosim"])

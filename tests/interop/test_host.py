@@ -14,9 +14,10 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from fmus.loader.loader_build import INNER_SUFFIX
-from master.run import loaded
+from master.run import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 from tests.interop.support import STEP
@@ -105,7 +106,7 @@ def plan(system, unpacked):
 @pytest.fixture(scope="module")
 def in_python(system):
     """The numbers that the host is to find, from FMPy."""
-    with loaded(system) as network:
+    with connected_fmus(system) as network:
         for slave in network.slaves:
             slave.start(0.0, STEPS * STEP)
         for _ in range(EXCHANGES):
@@ -132,8 +133,8 @@ def run_host(host, orders, **environment):
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "LD_"))}
     clean |= {"OMP_NUM_THREADS": "1", "PATH": "/usr/bin:/bin", **environment}
     done = subprocess.run(host, input=os.fsencode(orders), env=clean, capture_output=True, check=False)
-    told = done.stderr.decode("utf-8", "backslashreplace")
-    return subprocess.CompletedProcess(done.args, done.returncode, done.stdout.decode(), told)
+    said = done.stderr.decode("utf-8", "backslashreplace")
+    return subprocess.CompletedProcess(done.args, done.returncode, done.stdout.decode(), said)
 
 
 def numbers(done):

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from master.fmu.extraction import ExtractedFmu
 from master.fmu.fmu_description import read_fmu
 from master.fmu.instance import Instance
@@ -37,7 +38,7 @@ def many(fmu, count, warm_up, folder):
 @only_linux
 @pytest.mark.slow
 def test_a_thousand_pantographs(tmp_path):
-    """290 kB each, were the library loaded anew every time; 7 kB, were the class made anew."""
+    """Each would cost 290 kB if the library were loaded again every time, 7 kB if the class were made again."""
     (tmp_path / "unpacked").mkdir()
     # A thousand before it counts: Python's memory grows in pieces, whose share of few instances would be large.
     found = many(build(recipe("Pantograph_CX"), tmp_path), 2000, 1000, tmp_path / "unpacked")
@@ -78,7 +79,7 @@ def test_an_unpacked_fmu_serves_one_instance_at_a_time(pantograph):
         instance.close()
 
 
-def test_a_file_that_has_changed_is_unpacked_anew(pantograph):
+def test_a_file_that_has_changed_is_unpacked_again(pantograph):
     component = Component("part", pantograph, {}, (), ())
     first = Instance(component)
     first.close()

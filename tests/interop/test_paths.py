@@ -12,7 +12,8 @@ from urllib.parse import quote
 
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from tests.effort import count
 from tests.fmus.support import short_line_recipe
 from tests.interop.test_host import linux, order, run_host, unpack
@@ -171,10 +172,10 @@ def _spoil(part, how):
         script.write_text("def (:\n")
         return "the FMU cannot be loaded: "
     if how == "a module is missing":
-        next(resources.glob("openpanto_*/models/part.py")).unlink()
+        next(resources.glob("openpanto_*/models/definition_files/parameter.py")).unlink()
         return "the FMU is incomplete: No module named"
     if how == "a module is cut":
-        path = next(resources.glob("openpanto_*/fmus/adapter.py"))
+        path = next(resources.glob("openpanto_*/fmus/slave/adapter.py"))
         path.write_bytes(path.read_bytes()[:3000])
         return "the FMU cannot be loaded: "
     if how == "no definition":
@@ -263,7 +264,7 @@ def test_an_initialisation_that_fails_is_an_error(host, pair, tmp_path):
 
 
 def _refused(done, text):
-    """The host said that there is no instance, told why once through its logger, and ended by itself."""
+    """The host said that there is no instance, gave the reason once through its logger, and ended by itself."""
     assert done.returncode == 0, done.stderr
     assert done.stdout == "NULL\nNULL\n"  # tried twice
     logged = [line for line in done.stderr.splitlines() if line.startswith("[part, status 3]")]

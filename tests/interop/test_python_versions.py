@@ -66,13 +66,13 @@ def test_a_definition_has_one_guid_and_its_licence_wherever_the_package_lies(whe
         shutil.copy(ROOT / "models" / "library" / "lines" / "C270.toml", what)
     fmus = []
     for place in (ROOT, installed):
-        told = _python(sys.executable, "-m", "fmus", "fingerprint", what, cwd=elsewhere, path=place).stdout
+        said = _python(sys.executable, "-m", "fmus", "fingerprint", what, cwd=elsewhere, path=place).stdout
         built = _python(sys.executable, "-m", "fmus", "build", what, "--out", place.name, cwd=elsewhere, path=place)
-        fmus.append((told.strip(), (elsewhere / built.stdout.strip()).read_bytes()))
+        fmus.append((said.strip(), (elsewhere / built.stdout.strip()).read_bytes()))
         with zipfile.ZipFile(elsewhere / built.stdout.strip()) as file:
             for name, text in (("openpanto", b"MIT License"), ("pythonfmu", b"MIT License")):
                 assert text in file.read(f"documentation/licenses/{name}.txt")
-            assert told.strip() in file.read("modelDescription.xml").decode()
+            assert said.strip() in file.read("modelDescription.xml").decode()
     assert fmus[0][0] == fmus[1][0]
 
 

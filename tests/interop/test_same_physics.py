@@ -12,7 +12,7 @@ from master.evaluation.energy_balance import DRIFT
 from master.recording import checkpoint
 from master.recording.continuation import Continuation
 from master.recording.recording import load
-from master.run import Manner, run
+from master.run import RunOptions, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.ssp.archive import extract
@@ -50,7 +50,7 @@ def change(scenario, *pairs, file="SystemStructure.ssd"):
 def go(scenario, folder, stop=STOP, step=None, scheme=None, parameters=(), **way):
     overrides = Overrides(stop, step, scheme, dict(parameters), may_stop_early=True)
     with open_scenario(scenario, overrides, build=False) as opened:
-        return run(opened.system, folder, manner=Manner(**way))
+        return run(opened.system, folder, options=RunOptions(**way))
 
 
 def force(done):

@@ -13,7 +13,6 @@ from master.commands.main import main
 from master.recording.recording import load
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
-from master.system.contacts import find_contacts
 from tests.interop.support import ROOT
 
 PAGE = (ROOT / "docs" / "third-party-pantograph.md").read_text(encoding="utf-8")
@@ -59,7 +58,7 @@ def test_it_presses_against_the_wire_as_its_uplift_says(scenario, tmp_path, caps
 
 def test_its_force_is_judged_though_its_names_are_its_own(scenario):
     with open_scenario(scenario, build=False) as opened:
-        (contact,) = find_contacts(opened.system.connections)
+        (contact,) = opened.system.contacts
     assert contact.pantograph == "pantograph"
     assert contact.force_input == "pantograph.push"
     assert contact.end("A", "x") == "pantograph.left_x"

@@ -28,7 +28,7 @@ def pulls(model, elongation, rate):
     """Return what droppers would pull if they could push [N]: spring and damper where these go slack together."""
     alpha = model.definition.damping.of("dropper").alpha
     together = np.array([_dropper(model, hanger).slack_law == "tension" for hanger in model.mesh.is_hanger])
-    return model.static.elastic_force + model.dropper_stiffness * (elongation + together * alpha * rate)
+    return model.static.elastic_force + model.dropper_law.stiffness * (elongation + together * alpha * rate)
 
 
 def _dropper(model, is_hanger):
@@ -44,7 +44,7 @@ class NodalLine:
         index = np.full(mesh.fixed.size, -1)
         index[self.free] = np.arange(len(self.free))
         self.B = static.droppers.rows[:, self.free].tocsr()
-        droppers = self.B.T @ sp.diags(model.dropper_stiffness) @ self.B
+        droppers = self.B.T @ sp.diags(model.dropper_law.stiffness) @ self.B
         pendulums = model.definition.dynamics.geometric_stiffness * pendulum_stiffness(model)
         matrices = (static.shape.matrices.K + pendulums, static.shape.matrices.M, static.shape.matrices.C)
         K, M, C = (matrix.tocsr()[self.free][:, self.free] for matrix in matrices)

@@ -28,7 +28,7 @@ def test_what_is_changed_is_not_read(tmp_path_factory, whole, change):
     if data == whole:
         assert _checked(path) == whole[32:]
         return
-    with pytest.raises(ValueError, match="does not fit its checksum"):
+    with pytest.raises(ValueError, match="does not match its checksum"):
         _checked(path)
 
 

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from master.commands.main import main as master
 from models.commands.physics_main import main as models
 from tests.robustness.support import TRIED, ask, assert_lines

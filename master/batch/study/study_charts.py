@@ -1,40 +1,34 @@
-"""Charts of a study, as dictionaries that plotly.js draws."""
+"""Charts of a study: figures of its variants side by side, forces, changes of wire and histories."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
+
+import numpy as np
 
 from master.arrays import BoolArray, FloatArray
 from master.batch.study.family import Interval
-from master.batch.study.study_evaluation import Entry, section_forces
-from master.batch.study.study_outcome import Done, Outcome
+from master.batch.study.study_evaluation import StudyEntry, section_forces
+from master.batch.study.study_outcome import StudyOutcome, VariantResult
 from master.evaluation.contact_positions import track_position
 from master.evaluation.contact_signals import contact_signals
 from master.evaluation.filters import settled
 from master.recording.static_geometry import Geometry
-from master.report.charts.run_charts import (
-    Axes,
-    Chart,
-    Curve,
-    common_edges,
-    curve_trace,
-    grouped_bars,
-    line_marks,
-    shares,
-)
+from master.report.charts.chart import Axis, Bars, Chart, Curve, stroke
+from master.report.charts.force_charts import SHARE, TRACK, force_bars
+from master.report.charts.line_charts import line_marks
 from master.results.run_results import Results
 
-#: How far to both sides of a change of wires the forces are drawn [m].
+#: How far before and after a change of wires the forces are drawn [m].
 _MARGIN: Final = 15.0
-_FORCE: Final = "contact force, low-passed [N]"
+_FORCE: Final = Axis("contact force, low-passed", "N")
 _STATISTICS: Final = ("maximum", "minimum", "amplitude", "mean", "sigma", "statistical_minimum")
-_MARKS: Final = {"yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}}
 
 
-def interval_charts(outcome: Outcome, interval: Interval, found: Sequence[Entry]) -> list[Chart]:
-    """Return statistics by role, then forces and histograms of every variant of several pantographs."""
+def interval_charts(outcome: StudyOutcome, interval: Interval, found: Sequence[StudyEntry]) -> list[Chart]:
+    """Return statistics by place in the train, then forces and histograms of variants with several pantographs."""
     number = outcome.family.settings.interval.index(interval) + 1
     made = [_statistics(number, role, own) for role, own in _roles(found).items()]
     for i, done in enumerate(outcome.done):
@@ -44,59 +38,50 @@ def interval_charts(outcome: Outcome, interval: Interval, found: Sequence[Entry]
     return made
 
 
-def _roles(found: Sequence[Entry]) -> dict[str, list[Entry]]:
-    """Return, for every place in the train, its entries with those of single pantographs before them."""
+def _roles(found: Sequence[StudyEntry]) -> dict[str, list[StudyEntry]]:
+    """Return the entries by place in the train, each with those of single pantographs before them."""
     several = [e for e in found if sum(o.variant == e.variant for o in found) > 1]
     singles = [e for e in found if e not in several]
     roles = list(dict.fromkeys(e.pantograph for e in several)) or ["single"]
     return {role: [*singles, *(e for e in several if e.pantograph == role)] for role in roles}
 
 
-def _statistics(number: int, role: str, found: Sequence[Entry]) -> Chart:
-    names = [s.replace("_", " ") for s in _STATISTICS]
-    traces = [
-        {**grouped_bars(i, e.variant), "x": names, "y": [getattr(e.assessment.quality, s) for s in _STATISTICS]}
+def _statistics(number: int, role: str, found: Sequence[StudyEntry]) -> Chart:
+    names = tuple(s.replace("_", " ") for s in _STATISTICS)
+    bars = tuple(
+        Bars(e.variant, names, np.array([getattr(e.assessment.quality, s) for s in _STATISTICS]), i)
         for i, e in enumerate(found)
-    ]
-    layout = {**Axes("", _FORCE).layout(), "barmode": "group"}
-    return Chart(f"statistics_{number}_{role}", f"Statistics, {role}", {"data": traces, "layout": layout}, "", 380)
+    )
+    return Chart(f"statistics_{number}_{role}", f"Statistics, {role}", Axis("figure"), _FORCE, bars)
 
 
-def _filtered(done: Results, e: Entry) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return track position, low-passed force and what of it lies in the entry's interval."""
+def _filtered(done: Results, e: StudyEntry) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return track position, low-passed force and which samples lie in the interval of the entry."""
     settings = replace(done.evaluation, interval=(e.interval.start, e.interval.end))
     s = contact_signals(done.recordings[0], e.assessment.contact, settings)
     return s.position, s.filtered, s.inside & settled(s.raw, s.step)
 
 
-def _forces(key: str, done: Results, own: Sequence[Entry]) -> Chart:
-    traces = []
+def _forces(key: str, done: Results, own: Sequence[StudyEntry]) -> Chart:
+    curves = []
     for i, e in enumerate(own):
         position, force, inside = _filtered(done, e)
-        traces.append(curve_trace(position[inside], force[inside], Curve(i, e.pantograph)))
+        curves.append(Curve(e.pantograph, position[inside], force[inside], stroke(i)))
     limits = (own[0].interval.start, own[0].interval.end)
-    traces += line_marks(done, own[0].assessment.contact.catenary, limits)
-    axes = Axes("track position of the contact [m]", _FORCE, extra=dict(_MARKS))
-    title = f"Contact force, {own[0].variant}"
-    return Chart(f"force_{key}", title, {"data": traces, "layout": axes.layout()}, "", 340)
+    marks = line_marks(done, own[0].assessment.contact.catenary, limits)
+    return Chart(f"force_{key}", f"Contact force, {own[0].variant}", TRACK, _FORCE, (*curves, *marks), height=340)
 
 
-def _histogram(key: str, done: Results, own: Sequence[Entry]) -> Chart:
+def _histogram(key: str, done: Results, own: Sequence[StudyEntry]) -> Chart:
     cuts = []
     for e in own:
         _, force, inside = _filtered(done, e)
-        cuts.append(force[inside])
-    edges = common_edges(cuts)
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    traces = [
-        {**grouped_bars(i, e.pantograph), "x": middles.tolist(), "y": shares(cut, edges).tolist()}
-        for i, (e, cut) in enumerate(zip(own, cuts, strict=True))
-    ]
-    layout = {**Axes(_FORCE, "share of time [%]").layout(), "barmode": "group"}
-    return Chart(f"histogram_{key}", f"Histogram, {own[0].variant}", {"data": traces, "layout": layout}, "", 300)
+        cuts.append((e.pantograph, force[inside]))
+    title = f"Histogram, {own[0].variant}"
+    return Chart(f"histogram_{key}", title, _FORCE, SHARE, force_bars(cuts), height=300)
 
 
-def sharing_charts(outcome: Outcome) -> list[Chart]:
+def sharing_charts(outcome: StudyOutcome) -> list[Chart]:
     """Return the contact force wire by wire of strips between two wires, for the variants that the family names."""
     wanted = outcome.family.settings.sharing
     made: dict[str, Chart] = {}
@@ -110,48 +95,46 @@ def sharing_charts(outcome: Outcome) -> list[Chart]:
     return list(made.values())
 
 
-def _sharing(key: str, done: Results, e: Entry) -> Chart:
+def _sharing(key: str, done: Results, e: StudyEntry) -> Chart:
     recording, contact = done.recordings[0], e.assessment.contact
     forces, position = section_forces(recording, contact), track_position(recording, contact)
     assert forces is not None
     assert e.sharing is not None
     near = (position >= e.sharing.start - _MARGIN) & (position <= e.sharing.end + _MARGIN)
-    traces = [
-        curve_trace(position[near], forces[near, s], Curve(s, f"section {s + 1}")) for s in range(forces.shape[1])
-    ]
-    total = Curve(forces.shape[1], "total", 1.2)
-    traces.append(curve_trace(position[near], forces[near].sum(axis=1), total))
-    axes = Axes("track position of the contact [m]", "contact force, as computed [N]")
+    count = forces.shape[1]
+    curves = [Curve(f"section {s + 1}", position[near], forces[near, s], stroke(s)) for s in range(count)]
+    curves.append(Curve("total", position[near], forces[near].sum(axis=1), stroke(count, 1.2)))
     title = f"From wire to wire, {e.variant}, {e.pantograph}"
-    return Chart(key, title, {"data": traces, "layout": axes.layout()}, "", 340)
+    return Chart(key, title, TRACK, Axis("contact force, as computed", "N"), tuple(curves), height=340)
 
 
-def history_charts(outcome: Outcome) -> list[Chart]:
-    """Return uplift and dropper force at one place over time, for the variants that the family names."""
+def history_charts(outcome: StudyOutcome) -> list[Chart]:
+    """Return uplift and dropper force at one position over time, for the variants that the family names."""
     wanted = outcome.family.settings.histories
     if wanted is None:
         return []
     chosen = [d for d in outcome.done if d.name in wanted.variants]
-    made = (
-        _history(chosen, wanted.position, _Kind("support", "uplift", "Uplift at the support", "uplift [mm]", 1e3)),
-        _history(chosen, wanted.position, _Kind("dropper", "force", "Force in the dropper", "dropper force [N]")),
+    kinds = (
+        _Kind("support", "uplift", "Uplift at the support", Axis("uplift", "mm"), 1e3),
+        _Kind("dropper", "force", "Force in the dropper", Axis("dropper force", "N")),
     )
+    made = (_history(chosen, wanted.position, kind) for kind in kinds)
     return [c for c in made if c is not None]
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """What a history shows: thing, variable, title, label and scale of the axis."""
+    """What a history shows: thing, variable, title, axis, and the factor to the unit of the axis."""
 
     thing: str
     variable: str
     title: str
-    label: str
+    axis: Axis
     scale: float = 1.0
 
 
-def _history(chosen: Sequence[Done], position: float, kind: _Kind) -> Chart | None:
-    traces: list[dict[str, Any]] = []
+def _history(chosen: Sequence[VariantResult], position: float, kind: _Kind) -> Chart | None:
+    curves = []
     where = None
     for i, done in enumerate(chosen):
         found = _nearest(done.results.geometry, kind.thing, position)
@@ -160,18 +143,15 @@ def _history(chosen: Sequence[Done], position: float, kind: _Kind) -> Chart | No
         if found is None or recording is None:
             continue
         where = found[1]
-        values = kind.scale * recording[name]
-        traces.append(curve_trace(recording.time, values, Curve(i, done.name, 1.5)))
+        curves.append(Curve(done.name, recording.time, kind.scale * recording[name], stroke(i, 1.5)))
     if where is None:
         return None
-    axes = Axes("time [s]", kind.label)
-    return Chart(
-        f"history_{kind.thing}", f"{kind.title} at {where:.1f} m", {"data": traces, "layout": axes.layout()}, "", 340
-    )
+    title = f"{kind.title} at {where:.1f} m"
+    return Chart(f"history_{kind.thing}", title, Axis("time", "s"), kind.axis, tuple(curves), height=340)
 
 
 def _nearest(geometry: Geometry, kind: str, position: float) -> tuple[str, float] | None:
-    """Return the full name and place of the support or dropper that is nearest to a position."""
+    """Return full name and position of the support or dropper nearest to a position."""
     found = [
         (f"{component}.{name.removesuffix('.x')}", x)
         for component, values in geometry.items()

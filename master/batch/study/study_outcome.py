@@ -1,4 +1,4 @@
-"""What a study has found so far, and as rows for tables and files."""
+"""The results of a study so far, and as rows of tables and files."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import Any, Final
 
+from master.batch.batch_session import BatchState
 from master.batch.study.family import Family, Interval, Variant
-from master.batch.study.study_evaluation import Entry, entries
+from master.batch.study.study_evaluation import StudyEntry, entries
 from master.results.run_results import Results
 from master.safety.safe_files import safe_cell
 
-GENERATOR: Final = "openpanto study"
-#: Version of ``study.json`` and ``study.csv``; 1 says none.
+#: Version of ``study.json`` and ``study.csv``; files without one are of version 1.
 FORMAT: Final = 2
-#: Columns of the figures: title, unit, how to get it, decimals.
-FIGURES: Final[tuple[tuple[str, str, Callable[[Entry], float | None], int], ...]] = (
+#: Columns of the figures: title, unit, how to read it, decimals.
+FIGURES: Final[tuple[tuple[str, str, Callable[[StudyEntry], float | None], int], ...]] = (
     ("mean", "N", lambda e: e.assessment.quality.mean, 1),
     ("sigma", "N", lambda e: e.assessment.quality.sigma, 1),
     ("sigma / mean", "1", lambda e: e.assessment.quality.sigma_share, 3),
@@ -33,7 +33,7 @@ FIGURES: Final[tuple[tuple[str, str, Callable[[Entry], float | None], int], ...]
 
 
 @dataclass(frozen=True)
-class Done:
+class VariantResult:
     """A variant that was run.
 
     Attributes
@@ -47,30 +47,23 @@ class Done:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """A study so far.
+class StudyOutcome(BatchState):
+    """The state of a study.
 
     Attributes
     ----------
     family : Family
-    date : str
-    versions : dict
-    status : str
-        running, interrupted or complete.
-    done : tuple of Done
+    done : tuple of VariantResult
         In the order of the table.
     failures : dict
-        Why variants failed, by name.
+        Reasons why variants failed, by name.
     """
 
     family: Family
-    date: str
-    versions: Mapping[str, str]
-    status: str = "running"
-    done: tuple[Done, ...] = ()
+    done: tuple[VariantResult, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
 
-    def entries(self, interval: Interval) -> tuple[Entry, ...]:
+    def entries(self, interval: Interval) -> tuple[StudyEntry, ...]:
         """Return the figures of all pantographs of all variants in an interval."""
         return tuple(e for d in self.done for e in entries(d.name, d.results, interval))
 
@@ -80,8 +73,8 @@ def shown(value: float | None, decimals: int) -> str:
     return "-" if value is None else f"{value:.{decimals}f}"
 
 
-def verdict(entry: Entry) -> str:
-    """Return the verdict on the limits in a few words."""
+def verdict(entry: StudyEntry) -> str:
+    """Return the verdict in a few words."""
     if entry.assessment.withheld:
         return "not judged"
     criteria = entry.assessment.criteria
@@ -92,34 +85,36 @@ def verdict(entry: Entry) -> str:
     return f"passes, at the limit: {', '.join(at_limit)}" if at_limit else "passes"
 
 
-def filters(outcome: Outcome) -> tuple[str, ...]:
-    """Return with what the forces of the variants were low-passed: one filter, several if runs had other settings."""
+def filters(outcome: StudyOutcome) -> tuple[str, ...]:
+    """Return the filters that low-passed the forces: one, or several if the settings of the runs differ."""
     return tuple(dict.fromkeys(d.results.evaluation.filter.sentence for d in outcome.done))
 
 
-def judged_by(found: Sequence[Done]) -> str:
-    """Return by which limits the variants are judged."""
+def judged_by(found: Sequence[VariantResult]) -> str:
+    """Return the limits by which the variants are judged."""
     return "; ".join(dict.fromkeys(d.results.evaluation.limits.title for d in found)) or "EN 50367"
 
 
-def filter_remarks(found: Sequence[Entry]) -> list[str]:
-    """Return whose extremes depend on the filter, with what they would be, and which verdicts do."""
+def filter_remarks(found: Sequence[StudyEntry]) -> list[str]:
+    """Return remarks on extremes and verdicts that depend on the filter, with the figures of other filters."""
     remarks = []
     for e in found:
         who = f"{e.variant}, {e.pantograph}"
-        told = "; ".join(f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.told)
-        remarks += [f"{who}: {told}"] if told else []
+        others = "; ".join(
+            f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.filter_dependent
+        )
+        remarks += [f"{who}: {others}"] if others else []
         remarks += [f"{who}: {c.name}: {c.remark}" for c in e.assessment.criteria if c.remark and not c.is_at_limit]
         remarks += [f"{who}: {warning}" for warning in e.assessment.warnings]
     return remarks
 
 
-def differences(found: Sequence[Entry]) -> list[tuple[str, str, str, tuple[float, float, float]]]:
-    """Return what stands beside what: sigma, maximum and minimum of one less those of the other [N].
+def differences(found: Sequence[StudyEntry]) -> list[tuple[str, str, str, tuple[float, float, float]]]:
+    """Return differences between pantographs: sigma, maximum and minimum of one minus those of the other [N].
 
-    Every follower is compared with the pantograph ahead, and everyone of several with a variant of a single pantograph
-    of the same name ending (``single, low damping`` for ``31 m, low damping``), if there is just one. Variants of one
-    pantograph each differ in what was swept: what another one of them has less or more means nothing here.
+    Each follower is compared with the pantograph ahead, and each of several with the variant of a single pantograph
+    whose name ends alike (``single, low damping`` for ``31 m, low damping``), if there is just one. Variants with one
+    pantograph each are not compared: they differ in the parameter that was swept.
     """
     alone = [e for e in found if _is_single(e, found)]
     kinds = [_kind(e.variant) for e in alone]
@@ -133,7 +128,7 @@ def differences(found: Sequence[Entry]) -> list[tuple[str, str, str, tuple[float
     return rows
 
 
-def _is_single(entry: Entry, found: Sequence[Entry]) -> bool:
+def _is_single(entry: StudyEntry, found: Sequence[StudyEntry]) -> bool:
     return sum(e.variant == entry.variant for e in found) == 1
 
 
@@ -141,13 +136,13 @@ def _kind(variant: str) -> str:
     return variant.partition(",")[2].strip()
 
 
-def _beside(one: Entry, other: Entry, name: str) -> tuple[str, str, str, tuple[float, float, float]]:
+def _beside(one: StudyEntry, other: StudyEntry, name: str) -> tuple[str, str, str, tuple[float, float, float]]:
     a, b = one.assessment.quality, other.assessment.quality
     change = (a.sigma - b.sigma, a.maximum - b.maximum, a.minimum - b.minimum)
     return one.variant, one.pantograph, name, change
 
 
-def as_csv(outcome: Outcome) -> str:
+def as_csv(outcome: StudyOutcome) -> str:
     """Return every figure of the study as a table."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -160,29 +155,29 @@ def as_csv(outcome: Outcome) -> str:
         for e in outcome.entries(interval):
             values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
             named = map(safe_cell, (e.variant, interval.name, e.pantograph))
-            told = _values_of(outcome.family, e.variant)
-            own = [told.get(name, "") for name in swept]
+            given = _values_of(outcome.family, e.variant)
+            own = [given.get(name, "") for name in swept]
             cells = [*values, verdict(e), filtered[e.variant], *_sharing_cells(e), *own]
             writer.writerow([*named, *cells])
     return text.getvalue()
 
 
 def _swept(variants: Sequence[Variant]) -> list[str]:
-    """Return the columns of the table of variants that hold a value somewhere, in their order."""
-    return list(dict.fromkeys(name for v in variants for name in _told(v)))
+    """Return the columns of the table of variants that hold any value, in their order."""
+    return list(dict.fromkeys(name for v in variants for name in _values(v)))
 
 
 def _values_of(family: Family, name: str) -> dict[str, str]:
-    """Return what a variant was given, as its table has it."""
-    return next((_told(v) for v in family.variants if v.name == name), {})
+    """Return the values of a variant as written in its table."""
+    return next((_values(v) for v in family.variants if v.name == name), {})
 
 
-def _told(variant: Variant) -> dict[str, str]:
+def _values(variant: Variant) -> dict[str, str]:
     times = {"stop": variant.stop, "step": variant.step}
     return {**variant.values, **{name: f"{value:g}" for name, value in times.items() if value is not None}}
 
 
-def _sharing_cells(e: Entry) -> list[str]:
+def _sharing_cells(e: StudyEntry) -> list[str]:
     s = e.sharing
     if s is None:
         return [""] * 5
@@ -190,10 +185,9 @@ def _sharing_cells(e: Entry) -> list[str]:
     return [*(f"{v:.6g}" for v in numbers), " ".join(map(str, s.losses))]
 
 
-def as_data(outcome: Outcome) -> dict[str, Any]:
+def as_data(outcome: StudyOutcome) -> dict[str, Any]:
     """Return the contents of ``study.json``."""
     return {
-        "generator": GENERATOR,
         "format": FORMAT,
         "filter": list(filters(outcome)),
         "judged_by": judged_by(outcome.done),
@@ -211,7 +205,7 @@ def as_data(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _entry_data(e: Entry) -> dict[str, Any]:
+def _entry_data(e: StudyEntry) -> dict[str, Any]:
     figures = {f"{title} [{unit}]": get(e) for title, unit, get, _ in FIGURES}
     return {
         "variant": e.variant,

@@ -1,14 +1,14 @@
-"""A study as a page: one HTML file that needs nothing else."""
+"""The page of a study: a single HTML file that needs no other."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from master.batch.study import study_charts
-from master.batch.study.study_evaluation import Entry
+from master.batch.study.study_evaluation import StudyEntry
 from master.batch.study.study_outcome import (
     FIGURES,
-    Outcome,
+    StudyOutcome,
     differences,
     filter_remarks,
     filters,
@@ -17,16 +17,16 @@ from master.batch.study.study_outcome import (
     verdict,
 )
 from master.report import html_markup
-from master.report.charts.run_charts import Chart
+from master.report.charts.chart import Chart
 from master.report.run_page import INTERVAL_NOTE
 
 _STATUS = {
-    "running": "Not finished: still running, or killed. What follows is what was computed.",
-    "interrupted": "Interrupted. What follows is what was computed.",
+    "running": "Not finished: the study is still running or was killed. The results so far follow.",
+    "interrupted": "Interrupted. The results so far follow.",
 }
 
 
-def page(outcome: Outcome) -> str:
+def page(outcome: StudyOutcome) -> str:
     """Return the whole page."""
     settings = outcome.family.settings
     drawn: list[Chart] = []
@@ -44,21 +44,16 @@ def page(outcome: Outcome) -> str:
         body.append(f"<h2>{html_markup.text(title)}</h2>")
         if found:
             body += _tables(found, judged_by(outcome.done))
-            body += _place(study_charts.interval_charts(outcome, interval, found), drawn)
+            body += html_markup.placed(study_charts.interval_charts(outcome, interval, found), drawn)
     body += _sharing(outcome)
-    body += _place(study_charts.sharing_charts(outcome), drawn)
+    body += html_markup.placed(study_charts.sharing_charts(outcome), drawn)
     if histories := study_charts.history_charts(outcome):
-        body += ["<h2>Histories</h2>", *_place(histories, drawn)]
+        body += ["<h2>Histories</h2>", *html_markup.placed(histories, drawn)]
     body += [f"<p class='note'>Contact forces: {html_markup.text(f)}.</p>" for f in filters(outcome)]
     return html_markup.document(outcome.family.name, body, drawn)
 
 
-def _place(made: Sequence[Chart], drawn: list[Chart]) -> list[str]:
-    drawn += made
-    return [html_markup.chart(c) for c in made]
-
-
-def _tables(found: Sequence[Entry], title: str) -> list[str]:
+def _tables(found: Sequence[StudyEntry], title: str) -> list[str]:
     heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), title]
     rows = [
         [f"{e.variant}, {e.pantograph}", *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found
@@ -68,16 +63,23 @@ def _tables(found: Sequence[Entry], title: str) -> list[str]:
     parts += [f"<p class='note'>{html_markup.text(r)}</p>" for r in filter_remarks(found)]
     if beside := differences(found):
         lines = [[f"{v}, {p}", other, *(f"{d:+.1f}" for d in change)] for v, p, other, change in beside]
-        heads = ["variant, pantograph", "less", "sigma [N]", "maximum [N]", "minimum [N]"]
-        parts += ["<h3>Leading and trailing, one and two</h3>", html_markup.table(heads, lines)]
+        heads = ["variant, pantograph", "compared with", "sigma [N]", "maximum [N]", "minimum [N]"]
+        parts += ["<h3>Differences between pantographs</h3>", html_markup.table(heads, lines)]
     return parts
 
 
-def _sharing(outcome: Outcome) -> list[str]:
+def _sharing(outcome: StudyOutcome) -> list[str]:
     found = [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing is not None]
     if not found:
         return []
-    heads = ["variant, pantograph", "both wires from [m]", "to [m]", "[s]", "losses per wire", "least total force [N]"]
+    heads = [
+        "variant, pantograph",
+        "both wires touched from [m]",
+        "to [m]",
+        "for [s]",
+        "losses per wire",
+        "lowest total force [N]",
+    ]
     rows = [
         [
             f"{e.variant}, {e.pantograph}",

@@ -1,24 +1,25 @@
-"""A study: variants one after the other, and what is left of them on disk after each."""
+"""A study: its variants are run one after the other, and its files written after each."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from master.batch.batch_session import BatchFiles, Runner, work_off
 from master.batch.study.family import VARIANTS, Family, Variant, folder_name
-from master.batch.study.study_outcome import GENERATOR, Done, Outcome, as_csv, as_data
+from master.batch.study.study_outcome import StudyOutcome, VariantResult, as_csv, as_data
 from master.batch.study.study_page import page
-from master.batch.study.variants import Runner, finished
+from master.batch.study.variants import finished, opened_variant
 from master.errors import InterruptedRunError, MasterError, Problem, RequestError, ScenarioError
-from master.results import results_folder, run_summary
-from master.safety.supervision import unfinished
+from master.results import results_folder
+from master.results.run_results import Results
 
 JSON: Final = "study.json"
 CSV: Final = "study.csv"
 PAGE: Final = "study.html"
+FILES: Final = BatchFiles("study", "openpanto study", JSON, as_data, {CSV: as_csv, PAGE: page})
 
 
 def study(
@@ -27,66 +28,75 @@ def study(
     folder: Path,
     runner: Runner,
     again: bool = False,
-    show: Callable[[Done], None] = lambda _: None,
-) -> Outcome:
-    """Run variants; page, table and JSON in ``folder`` are written anew after each.
+    show: Callable[[VariantResult], None] = lambda _: None,
+) -> StudyOutcome:
+    """Run the variants of a study; page, table and JSON file are written after each.
 
-    A variant that an earlier study in the same folder has finished, with the same FMUs and values, is not run again;
-    those that were not chosen are reported if they are there.
+    A variant that an earlier study in the same folder finished, with the same FMUs and values, is not run again;
+    those that were not chosen are reported if their results are there.
 
     Parameters
     ----------
     family : Family
     chosen : sequence of Variant
-        What is run.
+        The variants to run.
     folder : Path
-        Made, or taken over if it is an earlier study's.
+        Created, or taken over from an earlier study.
     runner : Runner
         Makes the runs.
     again : bool
         Whether finished variants are run again.
     show : callable
-        Is given every variant that has been run.
+        Called with each variant that was run.
 
     Raises
     ------
     InterruptedRunError, KeyboardInterrupt
-        If the user stops it; the finished variants are in the page then.
+        If the user stops it; the page then has the finished variants.
     ScenarioError
-        If a variant cannot be run as it is written; nothing was run then.
+        If a variant cannot be run as it is written; nothing is run then.
     MasterError
         If the folder holds something else.
     """
     check(family, chosen, runner)
-    with results_folder.taken_over(folder, JSON, GENERATOR, "study"), unfinished(folder / JSON):
-        return _study(family, chosen, folder, runner, again, show)
+
+    def finish(state: StudyOutcome, variant: Variant) -> StudyOutcome:
+        is_chosen, place = variant in chosen, folder / folder_name(variant.name)
+        if not is_chosen and not results_folder.is_ours(place):
+            return state
+        try:
+            found = _results(state.family, variant, runner, place, (is_chosen, not (again and is_chosen)))
+        except InterruptedRunError:
+            raise
+        except MasterError as error:
+            return replace(state, failures={**state.failures, variant.name: str(error)})
+        if found is None:
+            return state
+        done = VariantResult(variant.name, found)
+        if is_chosen:
+            show(done)
+        return replace(state, done=(*state.done, done))
+
+    return work_off(StudyOutcome(family), family.variants, finish, FILES, folder)
 
 
-def _study(
-    family: Family, chosen: Sequence[Variant], folder: Path, runner: Runner, again: bool, show: Callable[[Done], None]
-) -> Outcome:
-    state = Outcome(family, datetime.now(UTC).isoformat(timespec="seconds"), run_summary.versions())
-    write(state, folder)
-    try:
-        for variant in family.variants:
-            place = folder / folder_name(variant.name)
-            wanted = variant in chosen
-            state = _with_variant(state, variant, runner, _Task(place, wanted, not (again and wanted), show))
-            write(state, folder)
-    except (InterruptedRunError, KeyboardInterrupt):
-        write(replace(state, status="interrupted"), folder)
-        raise
-    state = replace(state, status="complete")
-    write(state, folder)
-    return state
+def _results(family: Family, variant: Variant, runner: Runner, folder: Path, may: tuple[bool, bool]) -> Results | None:
+    """Return the results of an earlier run of a variant if it may be reused, else of a new one if it may be run."""
+    may_run, may_reuse = may
+    with opened_variant(family, variant, runner) as system:
+        found = finished(folder, system) if may_reuse else None
+        if found is None and may_run:
+            runner.tell(f"{system.name}, {system.start:g} s to {system.stop:g} s")
+            found = runner.run(system, folder)
+    return found
 
 
 def check(family: Family, chosen: Sequence[Variant], runner: Runner) -> None:
-    """Open every variant that is to be run, and close it again; raises `ScenarioError` with all that is wrong."""
+    """Open and close every variant that is to be run; raise `ScenarioError` with all mistakes."""
     problems: list[Problem] = []
     for variant in chosen:
         try:
-            with runner.opened(family, variant):
+            with opened_variant(family, variant, runner):
                 pass
         except ScenarioError as error:
             found = (Problem(VARIANTS, 0, p.rule, f"variant '{variant.name}': {p}") for p in error.problems)
@@ -95,41 +105,3 @@ def check(family: Family, chosen: Sequence[Variant], runner: Runner) -> None:
             problems.append(Problem(VARIANTS, 0, "variants", f"variant '{variant.name}': {error}"))
     if problems:
         raise ScenarioError(problems)
-
-
-def write(state: Outcome, folder: Path) -> None:
-    """Write what there is so far."""
-    results_folder.write_json(folder / JSON, as_data(state))
-    results_folder.write_text(folder / CSV, as_csv(state))
-    results_folder.write_text(folder / PAGE, page(state))
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What is to become of a variant: where it lies, whether it is run, whether an earlier run counts."""
-
-    folder: Path
-    wanted: bool
-    reuse: bool
-    show: Callable[[Done], None]
-
-
-def _with_variant(state: Outcome, variant: Variant, runner: Runner, task: _Task) -> Outcome:
-    if not task.wanted and not results_folder.is_ours(task.folder):
-        return state
-    try:
-        with runner.opened(state.family, variant) as system:
-            found = finished(task.folder, system) if task.reuse else None
-            if found is None and task.wanted:
-                runner.tell(f"{system.name}, {system.start:g} s to {system.stop:g} s")
-                found = runner.run(system, task.folder)
-    except InterruptedRunError:
-        raise
-    except MasterError as error:
-        return replace(state, failures={**state.failures, variant.name: str(error)})
-    if found is None:
-        return state
-    done = Done(variant.name, found)
-    if task.wanted:
-        task.show(done)
-    return replace(state, done=(*state.done, done))

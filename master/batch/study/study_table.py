@@ -1,26 +1,27 @@
-"""A study on the terminal, 80 columns wide."""
+"""The tables of a study for a terminal 80 columns wide."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, Literal
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from master.batch.study.family import Family, Interval
-from master.batch.study.study_evaluation import Entry
-from master.batch.study.study_outcome import Outcome, differences, filter_remarks, filters, judged_by, shown
+from master.batch.study.study_evaluation import StudyEntry
+from master.batch.study.study_outcome import StudyOutcome, differences, filter_remarks, filters, judged_by, shown
+from master.report.result_tables import ruled_table
 
-_WIDTH: Final = 80
+#: Heads of the columns that hold words.
+_TEXTS: Final = ("variant", "compared with", "study", "variants", "title")
 _SIGMA: Final = "\u03c3"
 _FIGURE_HEADS: Final = (*("variant", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),)
 
 
-def show(console: Console, outcome: Outcome) -> None:
-    """Print a study: figures and differences for each interval, then the changes of wire, then what failed."""
+def show(console: Console, outcome: StudyOutcome) -> None:
+    """Print a study: figures and differences for each interval, changes of wire, and what failed."""
     for interval in outcome.family.settings.interval:
         found = outcome.entries(interval)
         if found:
@@ -37,10 +38,11 @@ def show(console: Console, outcome: Outcome) -> None:
         console.print(f"variant '{name}' failed: {text}", style="red", markup=False, soft_wrap=True)
 
 
-def figures_table(interval: Interval, found: Sequence[Entry], outcome: Outcome) -> Table:
-    """Return the statistics of all pantographs; yellow where a limit is not kept."""
+def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: StudyOutcome) -> Table:
+    """Return the statistics of all pantographs; rows are yellow where a limit is not met."""
     where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
-    table = _table(f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
+    title = f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]"
+    table = _table(title, _FIGURE_HEADS, _failing(found, judged_by(outcome.done)))
     for e in found:
         q = e.assessment.quality
         numbers = (q.mean, q.sigma, q.sigma_share, q.maximum, q.minimum, q.statistical_minimum)
@@ -49,20 +51,19 @@ def figures_table(interval: Interval, found: Sequence[Entry], outcome: Outcome) 
         slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
         style = "" if e.assessment.passed else "yellow"
         table.add_row(_name(e), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
-    table.caption, table.caption_justify = escape(_failing(found, judged_by(outcome.done))), "left"
     return table
 
 
-def _name(e: Entry) -> str:
+def _name(e: StudyEntry) -> str:
     return escape(_name_of(e))
 
 
-def _name_of(e: Entry) -> str:
+def _name_of(e: StudyEntry) -> str:
     return f"{e.variant}, {e.pantograph}"
 
 
-def _failing(found: Sequence[Entry], title: str) -> str:
-    """Return which limits are not kept, and by whom."""
+def _failing(found: Sequence[StudyEntry], title: str) -> str:
+    """Return which limits are not met, and by which pantographs."""
     failing: dict[str, list[str]] = {}
     for e in found:
         for criterion in e.assessment.criteria:
@@ -78,15 +79,18 @@ def _failing(found: Sequence[Entry], title: str) -> str:
 
 
 def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, float]]]) -> Table:
-    """Return what stands beside what."""
-    table = _table("less the one ahead, and less the single one [N]", ("variant", "less", _SIGMA, "max", "min"))
+    """Return the differences between pantographs."""
+    table = _table(
+        "differences from the pantograph ahead and from the single one [N]",
+        ("variant", "compared with", _SIGMA, "max", "min"),
+    )
     for variant, pantograph, other, change in rows:
         table.add_row(escape(f"{variant}, {pantograph}"), escape(other), *(f"{d:+.1f}" for d in change))
     return table
 
 
-def sharing_table(found: Sequence[Entry]) -> Table:
-    """Return how the strips pass from wire to wire."""
+def sharing_table(found: Sequence[StudyEntry]) -> Table:
+    """Return the passages of the strips from wire to wire."""
     heads = ("variant", "from m", "to m", "s", "losses per wire", "least total N")
     table = _table("From wire to wire: both touched", heads)
     for e in found:
@@ -97,23 +101,19 @@ def sharing_table(found: Sequence[Entry]) -> Table:
 
 
 def list_table(families: Sequence[Family]) -> Table:
-    """Return families with their variants."""
-    table = _table("", ("study", "variants", "what"))
+    """Return the studies with their variants."""
+    table = _table("", ("study", "variants", "title"))
     for family in families:
         names = "\n".join(v.name for v in family.variants)
         table.add_row(escape(family.name), escape(names), escape(family.settings.title))
     return table
 
 
-def _table(title: str, heads: Sequence[str]) -> Table:
-    table = Table(
-        title=escape(title) if title else None, title_justify="left", width=_WIDTH - 1, box=SIMPLE_HEAD, pad_edge=False
-    )
-    texts = ("variant", "less", "study", "variants", "what")
+def _table(title: str, heads: Sequence[str], caption: str = "") -> Table:
+    table = ruled_table(title, caption)
     for head in heads:
-        is_text = head in texts
-        table.add_column(
-            head, justify="left" if is_text else "right", no_wrap=not is_text, ratio=1 if head == "variant" else None
-        )
+        is_text = head in _TEXTS
+        justify: Literal["left", "right"] = "left" if is_text else "right"
+        table.add_column(head, justify=justify, no_wrap=not is_text, ratio=1 if head == "variant" else None)
     table.padding = (0, 0)
     return table

@@ -1,81 +1,42 @@
-"""From a family's table to runnable systems, and their runs."""
+"""The systems of a family's variants, their earlier results and their calibration."""
 
 from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from master.batch.batch_session import Runner
 from master.batch.calibration import CalibrationResult, find_values
 from master.batch.study.family import Calibration, Family, Interval, Variant
-from master.coupling.fmu_warnings import FmuWarningObserver
-from master.coupling.macro_steps import Observer
 from master.errors import MasterError, RequestError
 from master.results import results_folder, run_results
 from master.results.run_results import Results
-from master.run import run
-from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides, find_parameter
 from master.system.components import System
-from master.system.step_rounding import adjustments
-
-#: Makes the observers of one run, and takes them away after it.
-ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
 @contextmanager
-def unwatched(_: System) -> Iterator[Sequence[Observer]]:
-    """Watch nothing."""
-    yield ()
+def opened_variant(family: Family, variant: Variant, runner: Runner) -> Iterator[System]:
+    """Yield the system of a variant; its FMUs may lie in a folder that is gone afterwards.
 
-
-@dataclass(frozen=True)
-class Runner:
-    """How runs are made.
-
-    Attributes
-    ----------
-    watching : callable
-        System -> context manager that gives its observers (progress).
-    tell : callable
-        Is told what takes time, and what FMUs warn of.
-    build : bool
-        Whether missing or stale FMUs are built.
+    Raises
+    ------
+    ScenarioError, RequestError
+        If scenario and table do not go together.
     """
-
-    watching: ObserverFactory = unwatched
-    tell: Callable[[str], None] = lambda _: None
-    build: bool = True
-
-    def run(self, system: System, folder: Path) -> Results:
-        """Run one system."""
-        for text in adjustments(system):
-            self.tell(f"{system.name}: warning: {text}")
-        cautions = FmuWarningObserver(lambda caution: self.tell(f"{system.name}: {caution}"))
-        with self.watching(system) as observers:
-            return run(system, folder, [cautions, *observers])
-
-    @contextmanager
-    def opened(self, family: Family, variant: Variant) -> Iterator[System]:
-        """Give the system of a variant; its FMUs may be in a folder that is gone afterwards.
-
-        Raises
-        ------
-        ScenarioError, RequestError
-            If scenario and table do not go together.
-        """
-        v = variant
-        overrides = Overrides(v.stop, v.step, parameters=v.values, absent=v.absent, empty=v.empty)
-        with open_scenario(family.folder, overrides, self.tell, self.build) as scenario:
-            yield replace(scenario.system, name=f"{family.name}: {variant.name}")
+    v = variant
+    overrides = Overrides(v.stop, v.step, parameters=v.values, absent=v.absent, empty=v.empty)
+    with runner.opened(family.folder, overrides) as system:
+        yield replace(system, name=f"{family.name}: {variant.name}")
 
 
 def finished(folder: Path, system: System) -> Results | None:
-    """Return the results in a folder if they are those of just this system, complete."""
+    """Return the results in a folder if they are complete and of this very system, else None."""
     if not results_folder.is_ours(folder):
         return None
     found = run_results.read(folder)
@@ -83,7 +44,7 @@ def finished(folder: Path, system: System) -> Results | None:
 
 
 def _is_of(summary: dict[str, Any], system: System) -> bool:
-    """Whether a run had the same FMUs, values, times and settings."""
+    """Return whether a run had the same FMUs, values, times and settings."""
     components = [[c.name, c.fmu.sha256, c.parameters] for c in system.components]
     times = {"start": system.start, "stop": system.stop, "step": system.step}
     wanted = [components, {**times, **system.settings.model_dump(mode="json")}]
@@ -92,18 +53,18 @@ def _is_of(summary: dict[str, Any], system: System) -> bool:
 
 
 def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, CalibrationResult]:
-    """Find the pantographs' parameters that give each the wanted mean force, by ``component.parameter``.
+    """Find the parameters, by ``component.parameter``, with which each pantograph has the target mean force.
 
     Raises
     ------
     MasterError
-        If the family says nothing about calibration, or it does not succeed.
+        If the family has no calibration, or it does not succeed.
     """
     wanted = family.settings.calibration
     if wanted is None:
         raise RequestError(f"study '{family.name}' has no [calibration]")
     interval = next(i for i in family.settings.interval if i.name == wanted.interval)
-    with runner.opened(family, variant) as system:
+    with opened_variant(family, variant, runner) as system:
         names = _calibrated(system, wanted)
         starts = [float(variant.values.get(name, _start_value(system, name))) for name in names]
 

@@ -1,1 +1,1 @@
-"""Verification: cases written as data, run, and judged row by row against references."""
+"""Verification: cases are written as data, run, and judged row by row against references."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from master.evaluation.measured_force import MeasuredComparison
-from master.report.charts.run_charts import Axes, Chart, Curve, curve_trace
+from master.report.charts.chart import Axis, Chart, Curve, stroke
+from master.report.charts.force_charts import TRACK
 
 
 def comparison_rows(c: MeasuredComparison) -> list[tuple[str, ...]]:
@@ -27,9 +28,9 @@ def comparison_rows(c: MeasuredComparison) -> list[tuple[str, ...]]:
 
 def comparison_chart(c: MeasuredComparison) -> Chart:
     """Return both forces over track position."""
-    traces = [
-        curve_trace(c.position, c.simulated, Curve(0, f"simulated, {c.pantograph}", 2.2)),
-        curve_trace(c.position, c.measured, Curve(1, "measured", 1.6)),
-    ]
-    layout = Axes("track position of the contact [m]", "contact force, low-passed [N]").layout()
-    return Chart("measured_force", "Contact force, measured and simulated", {"data": traces, "layout": layout})
+    curves = (
+        Curve(f"simulated, {c.pantograph}", c.position, c.simulated, stroke(0, 2.2)),
+        Curve("measured", c.position, c.measured, stroke(1, 1.6)),
+    )
+    y = Axis("contact force, low-passed", "N")
+    return Chart("measured_force", "Contact force, measured and simulated", TRACK, y, curves)

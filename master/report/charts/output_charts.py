@@ -1,28 +1,27 @@
-"""What is shown of a run without a pantograph: its outputs, as a table and over time, those of one unit together."""
+"""The outputs of a run without a pantograph, as a table and over time; those of one unit share a chart."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from matplotlib.figure import Figure as PlotFigure
 from rich.table import Table
 
 from master.evaluation.output_figures import output_figures
 from master.recording.recording import Recording
-from master.report.charts.run_charts import Axes, Chart, Curve, curve_trace
+from master.report.charts.chart import Axis, Chart, Curve, stroke
 from master.report.result_tables import plain_table
 from master.results.run_results import Results
 
-#: Curves in one chart, and rows of the table on a terminal.
+#: Largest number of curves in a chart, and of rows in the table on a terminal.
 _MOST_CURVES = 8
 _MOST_ROWS = 40
-#: Longest name of an output that the terminal's table shows whole.
+#: Longest name of an output that the table on a terminal shows in full.
 _LONGEST = 30
-HEADS = ("output", "start", "end", "least", "greatest", "mean")
+HEADS = ("output", "start", "end", "minimum", "maximum", "mean")
 
 
 def has_contacts(results: Results) -> bool:
-    """Whether the run is one of pantograph and line; if not, its outputs are what there is to show."""
+    """Return whether the run couples pantograph and line; if not, only its outputs can be shown."""
     return bool(results.contacts)
 
 
@@ -36,7 +35,7 @@ def output_rows(results: Results) -> list[tuple[str, ...]]:
 
 
 def outputs_table(results: Results) -> Table:
-    """Return the table for a terminal of 80 columns."""
+    """Return the table of outputs for a terminal 80 columns wide."""
     rows = [(_short(row[0]), *row[1:]) for row in output_rows(results)]
     table = plain_table(HEADS, rows[:_MOST_ROWS])
     more = len(rows) - _MOST_ROWS
@@ -51,28 +50,10 @@ def output_charts(results: Results) -> list[Chart]:
     """Return a chart over time for the variables of each unit, more than one if there are many."""
     charts = []
     for number, (unit, names, recording) in enumerate(_groups(results), start=1):
-        traces = [curve_trace(recording.time, recording[name], Curve(i, name)) for i, name in enumerate(names)]
-        figure = {"data": traces, "layout": Axes("time [s]", _axis(unit)).layout()}
-        charts.append(Chart(f"outputs{number}", ", ".join(names) if len(names) < 3 else _title(unit), figure))
+        curves = tuple(Curve(name, recording.time, recording[name], stroke(i)) for i, name in enumerate(names))
+        title = ", ".join(names) if len(names) < 3 else _title(unit)
+        charts.append(Chart(f"outputs{number}", title, Axis("time", "s"), Axis("value", unit), curves))
     return charts
-
-
-def output_plots(results: Results) -> dict[str, PlotFigure]:
-    """Return the same as Matplotlib figures, by file name without ending."""
-    return {f"outputs{i}": figure for i, figure in enumerate(_plots(results), start=1)}
-
-
-def _plots(results: Results) -> Iterator[PlotFigure]:
-    for unit, names, recording in _groups(results):
-        figure = PlotFigure(figsize=(9.0, 3.6), layout="constrained")
-        axes = figure.add_subplot()
-        for name in names:
-            axes.plot(recording.time, recording[name], linewidth=1.1, label=name)
-        axes.set_xlabel("time [s]")
-        axes.set_ylabel(_axis(unit))
-        axes.grid(axis="y", color="#e3e5e8", linewidth=0.6)
-        axes.legend(frameon=False, fontsize=8)
-        yield figure
 
 
 def _groups(results: Results) -> Iterator[tuple[str, list[str], Recording]]:
@@ -85,10 +66,6 @@ def _groups(results: Results) -> Iterator[tuple[str, list[str], Recording]]:
         for unit, names in by_unit.items():
             for first in range(0, len(names), _MOST_CURVES):
                 yield unit, names[first : first + _MOST_CURVES], recording
-
-
-def _axis(unit: str) -> str:
-    return f"value [{unit}]" if unit else "value"
 
 
 def _title(unit: str) -> str:

@@ -35,11 +35,11 @@ class WireInterval:
     modes : slice
         Its modes.
     count, size : int
-        How many these are; how many local coordinates, m.
+        Number of these; number of local coordinates, m.
     sides : (ndarray, ndarray)
         Places of its two attachments' displacements.
     ends : ndarray, shape (e,)
-        The same, one after the other.
+        The same in one array.
     plan : ndarray, shape (2 k + 4, m)
         Displacement in plan, x and y, of its k + 2 nodes.
     plan_static : ndarray, shape (2 k + 4,)

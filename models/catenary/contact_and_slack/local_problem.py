@@ -182,7 +182,7 @@ class LocalProblem:
     def _single_contact(
         self, free_force: FloatArray, contact: ContactCandidate, strip_compliance: float
     ) -> LocalForces | None:
-        """Return the solution for one contact if it leaves no dropper slack, which is what most steps are."""
+        """Return the solution for one contact if it leaves no dropper slack, as in most steps."""
         point, slope_of_velocity = contact.point, self.velocity_factor
         compliance = strip_compliance + point.compliance
         force = 0.0

@@ -1,4 +1,4 @@
-"""Solving for the attachments: one factorisation a step size, whole solutions and solutions near a load.
+"""Solving for the attachments: one factorisation per step size, whole solutions and solutions near a load.
 
 The displacements of the attachments are numbered along the track, so their matrix is a band. That of a line which
 closes on itself is a cyclic band: the last few rows reach the first few as well. Without its last rows, the border, it
@@ -70,8 +70,8 @@ class Banded:
         on a window is exact once what it leaves outside is below rounding.
         """
         if not self._reach:
-            # How far a response reaches is a matter of the factor: told by its middle, not by what was asked before,
-            # so that the same question has the same answer to the last bit whatever came before it.
+            # How far a response reaches depends on the factor alone. It is measured at the middle, not taken from
+            # earlier calls, so that the same question has the same answer to the last bit whatever came before it.
             middle = self.factor.shape[1] // 2
             begin, values = self._near(middle, np.ones((1, 1)), _FIRST_REACH)
             self._reach = max(middle - begin, begin + len(values) - middle) + 2 * self.factor.shape[0]

@@ -1,4 +1,4 @@
-"""What attachments give way by under local loads: columns of a factor's inverse, where they are not zero."""
+"""How far attachments give way under local loads: columns of a factor's inverse, where they are not zero."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class Compliance:
 
 
 class DropperColumns(Sequence[Columns]):
-    """Response to a unit force in each dropper, solved when first asked for: few droppers ever slacken."""
+    """Response to a unit force in each dropper, solved when first needed: few droppers ever slacken."""
 
     def __init__(self, compliance: Compliance) -> None:
         self._compliance = compliance

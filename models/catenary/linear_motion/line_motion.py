@@ -11,13 +11,13 @@ from models.catenary.linear_motion.interval_modes import IntervalModes
 
 
 class Packed(Protocol):
-    """The modal part of a motion in the order that a stepper works in."""
+    """The modal part of a motion in the order that a step engine works in."""
 
     def unpack(self, modal: FloatArray, momentum: FloatArray) -> None:
         """Put it into the arrays of a `LineMotion`."""
 
     def prepared(self) -> FloatArray:
-        """Return what the stepper has found for the next step already: its step size, then its own affair."""
+        """Return what the engine has already found for the next step: its step size, then whatever it needs."""
 
 
 class LineMotion:
@@ -37,7 +37,7 @@ class LineMotion:
     attached : ndarray
         As above.
     packed : Packed or None
-        The modal part, while a stepper keeps it in an order of its own.
+        The modal part, while a step engine keeps it in its own order.
     """
 
     def __init__(self, modal: FloatArray, momentum: FloatArray, attached: FloatArray) -> None:
@@ -53,23 +53,23 @@ class LineMotion:
 
     @property
     def modal(self) -> FloatArray:
-        """Return modal amplitudes and their rates as they are now; to change them take `plain`."""
+        """Return modal amplitudes and their rates as they are now; to change them, use `plain`."""
         self._unpack()
         return self._modal
 
     @property
     def momentum(self) -> FloatArray:
-        """Return the momentum as it is now; to change it take `plain`."""
+        """Return the momentum as it is now; to change it, use `plain`."""
         self._unpack()
         return self._momentum
 
     @property
     def prepared(self) -> FloatArray:
-        """Return what a stepper has found for the next step already; empty if nothing."""
+        """Return what a step engine has already found for the next step; empty if nothing."""
         return self._prepared if self.packed is None else self.packed.prepared()
 
     def plain(self) -> tuple[FloatArray, FloatArray]:
-        """Return the arrays of the modal part and of the momentum, which may be changed: no stepper keeps others."""
+        """Return the arrays of the modal part and of the momentum for changing them: no engine keeps others by then."""
         if self.packed is not None:
             self._unpack()
             self.packed = None
@@ -87,7 +87,7 @@ class LineMotion:
         }
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Take over the arrays of a snapshot."""
+        """Restore the arrays from a snapshot."""
         modal, momentum, attached, prepared = (
             np.array(snapshot[name], dtype=np.float64) for name in ("modal", "momentum", "attached", "prepared")
         )

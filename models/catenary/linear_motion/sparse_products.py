@@ -1,4 +1,4 @@
-"""Products with sparse matrices that are computed again and again."""
+"""Products with sparse matrices that are computed in every step."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _Routine = Callable[..., None]
 
 
 class Multiplier:
-    """A sparse matrix that is multiplied with vectors, without allocating anything.
+    """A sparse matrix that is multiplied by vectors without allocating anything.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Product(Multiplier):
 
 
 class BlockProduct(Multiplier):
-    """A matrix of dense blocks of one size: without an index for every entry.
+    """A matrix of dense blocks of one size, which needs no index for every entry.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class BlockProduct(Multiplier):
 
 
 class TransposedProduct(Multiplier):
-    """The transpose of a matrix that has a `Product`, without a second copy of it: there is less to read in a step.
+    """The transpose of a matrix that has a `Product`, without a second copy of it, so that a step has less to read.
 
     Parameters
     ----------

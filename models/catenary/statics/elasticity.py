@@ -261,16 +261,16 @@ class _StaticResponse:
         self._model = model
         factor = factorised(model.modes.K)
         self._solve = factor.solve
-        columns = Compliance(factor, model.B, model.dropper_stiffness).dropper_columns
+        columns = Compliance(factor, model.dropper_law.B, model.dropper_law.stiffness).dropper_columns
         self._columns = columns
         self._local = LocalProblem(
-            unilateral=model.unilateral,
+            unilateral=model.dropper_law.unilateral,
             dropper_columns=columns,
             velocity_factor=0.0,
             law=CONTACT_LAWS[model.definition.contact.law],
             parameters=model.definition.contact,
         )
-        self._rest = model.B.T @ model.rest_compensation
+        self._rest = model.dropper_law.B.T @ model.dropper_law.rest_compensation
 
     def uplift(self, wire: ContactWire, x: float, force: float) -> float:
         """Return the rise of a contact wire under a vertical force on it [m]."""
@@ -281,7 +281,7 @@ class _StaticResponse:
         load = self._rest.copy()
         load[interval.ends] += force * ends
         displacement = self._solve(load)
-        elastic = model.static.elastic_force + model.dropper_stiffness * (model.B @ displacement)
+        elastic = model.static.elastic_force + model.dropper_law.stiffness * (model.dropper_law.B @ displacement)
         found = self._local.solve(elastic, (), np.zeros((0, 0)), np.flatnonzero(elastic < 0.0))
         for j, compensation in zip(found.slack, found.compensation, strict=True):
             column = self._columns[int(j)]

@@ -1,8 +1,8 @@
 """The two halves of a line's step in one pass each, for numba.
 
-The same arithmetic as `numpy_engine.NumpyEngine`, but nothing is read twice and no intermediate array is
-written: how much is read and written sets the pace.
-Indices are unsigned, which spares the compiler the question whether they count from the end.
+The same arithmetic as `numpy_engine.NumpyEngine`, but nothing is read twice and no intermediate array
+is written: how much is read and written sets the pace.
+Indices are unsigned, which spares the compiler the check whether they count from the end.
 What belongs together is handed over together, as a tuple or as one array (`unpacked`).
 
 This module imports nothing of the project and is not divided: it is compiled from a copy in the user's cache
@@ -376,12 +376,12 @@ def meet(record, strip, element, a1, table, solution, attached, result):
     if not 0.0 <= share <= 1.0:
         return NOWHERE
     xi = min(max(xi, 0.0), 1.0)
-    result[0], result[1] = xi, share
-    result[2] = lift(interval, element, xi, row)
-    result[3], result[4] = 0.0, 0.0
+    height = lift(interval, element, xi, row)
+    rise = rate = 0.0
     for m in range(row.size):
-        result[3] += row[m] * local[0, m]
-        result[4] += row[m] * local[1, m]
+        rise += row[m] * local[0, m]
+        rate += row[m] * local[1, m]
+    result[0], result[1], result[2], result[3], result[4] = xi, share, height, rise, rate
     result[5] = give(interval, table, row, load)
     return element
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from fmus.__main__ import main
-from fmus.builder.fmu_build import REPOSITORY, BuildError, archive, build, fingerprint
+from fmus.builder.fmu_build import archive, build
+from fmus.builder.recipe import REPOSITORY, BuildError
 from tests.fmus.support import Instance, toy_recipe, toy_variant
 
 _BUILD_ELSEWHERE = """
@@ -43,22 +44,6 @@ def test_same_bytes_from_another_folder_process_and_hash_seed(toy_fmu, tmp_path,
         check=True,
     )
     assert (tmp_path / "out" / "Toy.fmu").read_bytes() == toy_fmu.read_bytes()
-
-
-def test_fingerprint_is_the_guid(instantiate):
-    assert instantiate().description.guid == fingerprint(toy_recipe())
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "file"),
-    [
-        ("GAIN = 1.0", "GAIN = 2.0", "law.py"),
-        ("choice: round", "Table 2", "toy.toml"),
-        ("not used", "of no use", "slave.py"),
-    ],
-)
-def test_any_change_of_sources_changes_the_fingerprint(tmp_path, old, new, file):
-    assert fingerprint(toy_recipe(toy_variant(tmp_path, old, new, file))) != fingerprint(toy_recipe())
 
 
 def test_two_builds_in_one_process_do_not_mix(toy_fmu, tmp_path, instantiate):
@@ -130,27 +115,14 @@ def test_what_cannot_be_built_is_said(tmp_path, old, new, file, text):
     assert not list((tmp_path / "out").glob("*"))
 
 
-def test_unknown_name_lists_the_known_ones(tmp_path, capsys):
-    assert main(["build", "Catenary_LN2", "Catenary_Nowhere", "--out", str(tmp_path)]) == 1
-    told = capsys.readouterr().err
-    assert told.startswith("error: There is no FMU 'Catenary_Nowhere'; known are")
-    assert "Catenary_LN2" in told
-    assert not list(tmp_path.iterdir())
-
-
-def test_list_names_every_definition(capsys):
-    assert main(["list"]) == 0
-    assert "Catenary_LN2" in capsys.readouterr().out.split()
-
-
 def test_what_is_wrong_in_a_file_of_ones_own_is_said_once_and_of_that_file(tmp_path, capfd):
     path = tmp_path / "Mine.TOML"
     path.write_text('type = "lumped"\n')
     assert main(["build", str(path), "--out", str(tmp_path / "out")]) == 1
-    told = capfd.readouterr().err
-    assert told.startswith(f"error: Pantograph_Mine cannot be built: {path}: stage: ")
-    assert told.count("stage: ") == 1
-    assert "definition.toml" not in told
+    said = capfd.readouterr().err
+    assert said.startswith(f"error: Pantograph_Mine cannot be built: {path}: stage: ")
+    assert said.count("stage: ") == 1
+    assert "definition.toml" not in said
 
 
 def test_a_reader_that_has_had_enough_is_no_error():

@@ -10,9 +10,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from fmus.builder.fmu_build import archive, recipe
+from fmus.builder.fmu_build import archive
 from fmus.builder.fmu_page import rows
-from fmus.builder.icon import SIZE, icon
+from fmus.builder.recipe import gather, recipe
 from fmus.slave.ports import Signal
 from tests.fmus.support import toy_recipe
 
@@ -68,16 +68,17 @@ def test_definition_requirements_and_licences_are_there(fmu):
 def test_icon_is_a_png_of_its_size(fmu):
     data = fmu.read("model.png")
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
-    assert struct.unpack(">II", data[16:24]) == (SIZE, SIZE)
+    assert struct.unpack(">II", data[16:24]) == (96, 96)
     start = data.index(b"IDAT") + 4
     length = struct.unpack(">I", data[start - 8 : start - 4])[0]
     raw = zlib.decompress(data[start : start + length])
-    assert len(raw) == SIZE * (SIZE + 1)
+    assert len(raw) == 96 * (96 + 1)
     assert 0.05 < 1.0 - sum(raw) / (255.0 * len(raw)) < 0.5
 
 
 def test_kinds_have_icons_of_their_own():
-    assert len({icon("catenary"), icon("pantograph"), icon("toy")}) == 3
+    recipes = (recipe("Catenary_LN2"), recipe("Pantograph_CX"), toy_recipe())
+    assert len({gather(wanted).icon for wanted in recipes}) == 3
 
 
 def test_page_of_an_adapter_that_says_nothing():

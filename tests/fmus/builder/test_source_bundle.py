@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.builder.fmu_build import ROOTS, build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import ROOTS, recipe
 from fmus.builder.source_bundle import BundleError, Module, check_rewritten, collect, rewrite
 
 HERE = {"models": Path(), "fmus": Path()}

@@ -14,7 +14,8 @@ import fmpy
 import pytest
 
 from fmus.builder import fmu_build as builder
-from fmus.builder.fmu_build import archive, build, fingerprint, recipe
+from fmus.builder.fmu_build import archive, build
+from fmus.builder.recipe import fingerprint, recipe
 from fmus.loader import loader_build
 from fmus.loader.fmu_opening import forget, problem
 from tests.fmus.support import toy_recipe
@@ -48,7 +49,7 @@ def test_the_guid_covers_the_sources_and_not_the_compiled_bytes(monkeypatch):
     assert b"other" in archive(toy_recipe())
     assert fingerprint(toy_recipe()) == before
     changed = {**loader_build.sources(), "loader.c": b"int main(void) {}"}
-    monkeypatch.setattr("fmus.builder.fmu_build.sources", lambda: changed)
+    monkeypatch.setattr("fmus.builder.recipe.sources", lambda: changed)
     assert fingerprint(toy_recipe()) != before
 
 

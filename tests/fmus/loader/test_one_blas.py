@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from fmus.loader.installation import own
+from fmus.loader.python_installation import own
 from fmus.loader.shared_libraries import BlasError, collect_libraries
 
 pytestmark = pytest.mark.skipif(
@@ -38,7 +38,7 @@ for kind in "fdFD":
     found += [np.sort_complex(np.linalg.eigvals(a)), np.linalg.eigvalsh(positive), np.linalg.svd(tall)[1]]
     found += [np.linalg.lstsq(tall, tall[:, :2] * 2, rcond=None)[0], np.linalg.lstsq(tall, tall, rcond=None)[2]]
     found += [np.linalg.solve(many, many + 1), np.linalg.det(many), np.linalg.eigvalsh(many)]
-    # Strides below zero, which numpy tells LAPACK and BLAS in ways of its own.
+    # Strides below zero, which numpy passes to LAPACK and BLAS in its own ways.
     found += [np.linalg.solve(a[::-1], b[::-1]), np.linalg.det(a[:, ::-1]), np.linalg.inv(a[::-2, ::-2].T)]
     found += [np.dot(b[::-1, 0], b[:, 1]), a[::-1] @ b[::-1], a.T[::-1] @ b[:, ::-1]]
     results |= {f"{kind}{i}": np.asarray(x) for i, x in enumerate(found)}

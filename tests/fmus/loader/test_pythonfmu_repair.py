@@ -9,7 +9,7 @@ import zipfile
 
 import pytest
 
-from fmus.builder.fmu_build import PYTHONFMU, REPOSITORY
+from fmus.builder.recipe import PYTHONFMU, REPOSITORY
 from fmus.loader.pythonfmu_repair import repaired
 
 LIBRARY = PYTHONFMU / "resources" / "binaries" / "linux64" / "libpythonfmu-export.so"

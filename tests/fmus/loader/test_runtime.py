@@ -15,14 +15,15 @@ import pytest
 import scipy
 
 from fmus.__main__ import main
-from fmus.builder.fmu_build import BuildError, build
-from fmus.builder.standalone import write_runtime
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import BuildError
+from fmus.builder.standalone_fmu import write_runtime
 from fmus.loader import fmu_opening, loader_build
-from fmus.loader.elf import ElfError, is_aligned, needed, soname
-from fmus.loader.installation import InstallationError, installed_at, own
-from fmus.loader.licences import licences
+from fmus.loader.elf_library import ElfError, is_aligned, needed, soname
 from fmus.loader.loader_build import with_windows_loader
+from fmus.loader.python_installation import InstallationError, installed_at, own
 from fmus.loader.runtime import Runtime
+from fmus.loader.runtime_licences import licences
 from fmus.loader.shared_libraries import collect_libraries
 from tests.fmus.support import Instance, toy_recipe
 
@@ -131,7 +132,7 @@ def test_libraries_come_with_those_that_they_need_in_order(tmp_path):
 @linux
 def test_no_library_goes_without_its_licence(tmp_path):
     put(tmp_path, "libnobody.so.1")
-    with pytest.raises(InstallationError, match=r"the licence of .*libnobody\.so\.1 is not to be found"):
+    with pytest.raises(InstallationError, match=r"the licence of .*libnobody\.so\.1 cannot be found"):
         licences(own(), {"lib/libnobody.so.1": tmp_path / "libnobody.so.1"})
 
 

@@ -219,7 +219,7 @@ def failed_step(instance, time=0.0, step=1e-3):
     return instance.errors[-1]
 
 
-def test_failure_in_a_step_is_told_and_survived(instantiate, capfd):
+def test_failure_in_a_step_is_reported_and_survived(instantiate, capfd):
     instance = instantiate(name="line")
     instance.initialise()
     instance["force"] = 2e6
@@ -231,7 +231,7 @@ def test_failure_in_a_step_is_told_and_survived(instantiate, capfd):
     assert "slipped" in failed_step(instance)
     for _ in range(5):
         failed_step(instance)
-    assert len(instance.errors) == 2  # told when it happened and once more, not at every step
+    assert len(instance.errors) == 2  # reported when it happened and once more, not at every step
     instance.slave.reset()
     instance.initialise()
     instance.step(0.0)
@@ -377,9 +377,9 @@ def test_damaged_definition_makes_no_instance(toy_fmu, tmp_path, capfd):
     path.write_text(path.read_text().replace("mass =", "mess =").replace('"kg"', '"5%"'))
     with pytest.raises(Exception, match="instantiate"):
         Instance(toy_fmu, unzipped=folder)
-    told = capfd.readouterr().err
-    assert "mass: is missing" in told
-    assert "mess: unknown key" in told
+    said = capfd.readouterr().err
+    assert "mass: is missing" in said
+    assert "mess: unknown key" in said
 
 
 def test_reading_does_not_change_what_is_computed(instantiate):

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from models.catenary.definition.line_reading import load
 from models.catenary.line_part import CatenaryPart
 from tests.fmus.support import Instance, names_of, refused, run, short_line_recipe

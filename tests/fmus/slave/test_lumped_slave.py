@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from tests.fmus.support import Instance, names_of
 
 

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from fmus.slave.saved_state import StateError, pack, unpack
+from fmus.slave.saved_state import SavedState, StateError, pack, unpack
+from master.safety import array_container
 
 ARRAYS = st.dictionaries(
     st.text(min_size=1, max_size=8),
@@ -52,3 +53,26 @@ def test_foreign_or_cut_bytes_are_refused(data):
 def test_python_objects_are_refused():
     with pytest.raises(StateError, match="'bad'"):
         pack({}, {"bad": np.array([object()])})
+
+
+def test_the_master_reads_the_state_of_an_fmu(instantiate):
+    instance = instantiate()
+    instance.initialise(force=2.0)
+    instance.run(3)
+    header, arrays = array_container.unpack(instance.slave.serializeFMUstate(instance.slave.getFMUstate()))
+    assert (header["model"], header["phase"]) == ("Toy", "stepping")
+    assert arrays["time"] == 3e-3
+    assert arrays["values"][instance.references["force"]] == instance["force"]
+    assert arrays["part.x"].tolist() == instance.get(["mass[1].z", "mass[2].z"])
+
+
+@given(ARRAYS)
+def test_both_packages_write_one_layout(arrays):
+    data = array_container.pack({"model": "toy ü"}, {name: np.asarray(array) for name, array in arrays.items()})
+    header, back = unpack(data)
+    assert header == {"model": "toy ü"}
+    assert {name: (a.dtype, a.shape, a.tobytes()) for name, a in back.items()} == {
+        name: (a.dtype, a.shape, a.tobytes()) for name, a in arrays.items()
+    }
+    with pytest.raises(StateError, match="not a saved state"):
+        SavedState.from_bytes(data)

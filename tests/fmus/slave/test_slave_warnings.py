@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fmus.builder.fmu_build import build, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import recipe
 from models.catenary.line_advice import slack_warning
 from models.catenary.line_part import CatenaryPart
 from models.library.catalogue import line_names, load_line

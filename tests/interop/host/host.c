@@ -49,7 +49,7 @@ typedef struct {
 typedef struct { int fmu; fmi2ValueReference reference; double value; } Parameter;
 typedef struct { int from; fmi2ValueReference output; int to; fmi2ValueReference input; } Wire;
 typedef struct { int fmu; fmi2ValueReference reference; } Place;
-typedef struct { fmi2Component part[8]; double told[MOST]; } System;
+typedef struct { fmi2Component part[8]; double value[MOST]; } System;
 
 static Fmu fmus[8];
 static Parameter parameters[MOST];
@@ -155,12 +155,12 @@ static void set_parameters(System *s, int fmu) {
 
 static void gather(System *s) {
     for (int i = 0; i < wire_count; i++)
-        check(fmus[wires[i].from].get(s->part[wires[i].from], &wires[i].output, 1, &s->told[i]), "reading an output");
+        check(fmus[wires[i].from].get(s->part[wires[i].from], &wires[i].output, 1, &s->value[i]), "reading an output");
 }
 
 static void tell(System *s) {
     for (int i = 0; i < wire_count; i++)
-        check(fmus[wires[i].to].set(s->part[wires[i].to], &wires[i].input, 1, &s->told[i]), "setting an input");
+        check(fmus[wires[i].to].set(s->part[wires[i].to], &wires[i].input, 1, &s->value[i]), "setting an input");
 }
 
 static void begin(System *s, enum phase when) {

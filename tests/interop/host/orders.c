@@ -1,4 +1,4 @@
-/* A host that does what it is told on standard input, one order a line, and tells the status of each.
+/* A host that obeys orders on standard input, one per line, and reports the status of each.
  *
  * It reads its orders as it goes: what it has not read yet lies in a buffer of the C library, which is its own.
  */

@@ -1,4 +1,4 @@
-/* A host that makes instances of several FMUs at the same time, each in a thread of its own.
+/* A host that makes instances of several FMUs at the same time, each in its own thread.
  *
  * Arguments: LIBRARY GUID RESOURCES of each. Ends with 0 if every instance was made, and initialised.
  */

@@ -1,6 +1,6 @@
 """What the tools' runners share: their command line and the file they leave.
 
-A runner is started as ``python RUNNER ARCHIVE STOP STEP OUT``, in a process of its own: a crash of the tool, or of the
+A runner is started as ``python RUNNER ARCHIVE STOP STEP OUT``, in a separate process: a crash of the tool, or of the
 FMUs in it, then ends that process only. It writes a row per step, the time at the step's end and the contact force,
 and prints the wall time of initialization and of stepping as JSON.
 """

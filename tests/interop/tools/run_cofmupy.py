@@ -1,4 +1,4 @@
-"""Run the FMUs of a packed scenario in CoFmuPy, which reads a configuration of its own instead of SSP."""
+"""Run the FMUs of a packed scenario in CoFmuPy, which reads its own configuration instead of SSP."""
 
 import contextlib
 import io
@@ -9,7 +9,7 @@ import common
 from cofmupy import Coordinator, wrappers
 
 from master.coupling.coupling_schemes import initialise
-from master.run import loaded
+from master.run import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 
@@ -29,7 +29,7 @@ wrappers.read_model_description = read_with_number
 
 def start_inputs(system):
     """Consistent inputs at the start: CoFmuPy exchanges nothing before the first step."""
-    with loaded(system) as network:
+    with connected_fmus(system) as network:
         initialise(network, system.start, system.stop)
         network.gather()
         return dict(zip(network.input_names, network.inputs.tolist(), strict=True))

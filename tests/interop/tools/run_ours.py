@@ -6,7 +6,7 @@ import common
 
 from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
-from master.run import loaded
+from master.run import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 
@@ -32,7 +32,7 @@ collector = Collector()
 overrides = Overrides(count * step, step, "jacobi", may_stop_early=True)
 with open_scenario(Path(archive), overrides, build=False) as scenario:
     watch = common.Watch()
-    with loaded(scenario.system) as network:
+    with connected_fmus(scenario.system) as network:
         outcome = simulate(network, Jacobi(), TimeGrid(0.0, step, count), [collector])
 if outcome.error:
     raise SystemExit(str(outcome.error))

@@ -93,7 +93,7 @@ def test_only_the_value_and_its_comment_change(tmp_path):
 def test_a_parameter_that_is_not_there_is_told(tmp_path):
     path = tmp_path / "p.ssv"
     path.write_text(TEXT)
-    with pytest.raises(MasterError, match="stands there 0 times"):
+    with pytest.raises(MasterError, match="occurs 0 times"):
         store_value(path, "mass", 1.0, "x")
     assert path.read_text() == TEXT
 

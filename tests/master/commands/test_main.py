@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from master.commands import main as cli
+from master.commands import scenario_commands
 from master.commands.main import main
 from master.results import run_results
 
@@ -118,7 +118,7 @@ def test_a_standalone_archive_holds_one_python_beside_the_fmus(toy, in_folder, m
         (folder / "runtime.txt").write_text("format=1\n")
         (folder / "lib" / "libpython.so").write_bytes(b"library")
 
-    monkeypatch.setattr(cli, "write_runtime", write)
+    monkeypatch.setattr(scenario_commands, "write_runtime", write)
     assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 0
     with zipfile.ZipFile("packed.ssp") as file:
         assert file.read("resources/runtime/lib/libpython.so") == b"library"
@@ -130,7 +130,7 @@ def test_why_an_archive_cannot_be_standalone_is_said(toy, in_folder, monkeypatch
     def write(folder):
         raise ValueError("the Python in /usr has no shared library")
 
-    monkeypatch.setattr(cli, "write_runtime", write)
+    monkeypatch.setattr(scenario_commands, "write_runtime", write)
     assert main(["pack", str(toy), "--out", "packed.ssp", "--no-build", "--standalone"]) == 1
     assert "cannot be standalone: the Python in /usr has no shared library" in capsys.readouterr().err
     assert not (in_folder / "packed.ssp").exists()
@@ -270,7 +270,7 @@ def test_report_with_a_measurement_a_film_and_parquet(toy, in_folder, capsys):
     assert main(["report", "a", "--measured", "m.csv", "--film", "film.gif", "--parquet"]) == 0
     out = capsys.readouterr().out
     assert "correlation" in out
-    assert "Measured beside simulated" in (in_folder / "a/report.html").read_text()
+    assert "Measured and simulated" in (in_folder / "a/report.html").read_text()
     assert (in_folder / "film.gif").stat().st_size > 1000
     assert main(["report", "a", "--measured", "m.csv", "--contact", "7"]) == 1
     assert "no contact 7" in capsys.readouterr().err
@@ -304,7 +304,7 @@ def test_compare_writes_a_report_of_several_runs(toy, in_folder, capsys):
 def test_a_failed_run_leaves_a_report_marked_incomplete(toy, in_folder, capsys):
     assert main([str(toy), "--out", "a", "--set", "catenary.fail_at=0.5", "--quiet", "--no-build"]) == 1
     page = (in_folder / "a/report.html").read_text()
-    assert "<b>Incomplete.</b> This run is failed at t = 0.5 s of 1 s." in page
+    assert "<b>Incomplete.</b> This run failed at t = 0.5 s of 1 s." in page
     assert "the wire broke" in page
     assert "id='chart-force_catenary_1'" in page
     assert main([str(toy), "--out", "b", "--set", "catenary.fail_at=0.5", "--quiet", "--no-build", "--no-report"]) == 1

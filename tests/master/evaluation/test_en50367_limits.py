@@ -119,6 +119,6 @@ def test_extremes_that_another_filter_moves_by_more_than_five_percent_are_told()
     """An impact of 30 ms: the wall rings, the smooth filter hardly does."""
     force = 150.0 + 400.0 * np.exp(-(((TIME - 4.0) / 0.01) ** 2))
     figures = assess(force, 80.0 * TIME, STEP, DEFAULT, (80.0, 560.0))
-    assert {f.filter for f in figures.told} == {f.short for f in DEFAULT.others}
-    assert quality(150.0).told == ()
+    assert {f.filter for f in figures.filter_dependent} == {f.short for f in DEFAULT.others}
+    assert quality(150.0).filter_dependent == ()
     assert len(quality(150.0).others) == 2

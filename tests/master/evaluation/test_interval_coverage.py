@@ -1,14 +1,13 @@
 """A run is judged where it has passed its interval of interest, and only there."""
 
 import json
-from dataclasses import asdict
 
 import numpy as np
 import pytest
 
+from master.batch.batch_session import Runner
 from master.batch.study.family import load_family
 from master.batch.study.study_session import study
-from master.batch.study.variants import Runner
 from master.commands.main import main
 from master.errors import RequestError
 from master.evaluation.en50367_limits import LimitChoice
@@ -138,7 +137,7 @@ def test_an_energy_that_does_not_balance_withholds_the_verdict_not_the_figures(t
         columns = np.column_stack((force, x, x, x, speed, speed, work, share * work))
         units = ("N", "m", "m", "m", "m/s", "m/s", "J", "J")
         run = Recording(time, (*names, *works), units, columns)
-        contact = asdict(Contact(1, "line", "train", "line.p.contact"))
+        contact = Contact(1, "line", "train", "line.p.contact").as_data()
         summary = {"status": "complete", "contacts": [contact], "settings": {"interval": {"start": 10.0, "end": 90.0}}}
         done = Results(tmp_path, summary, (run,), {})
         (found,) = done.assessments()

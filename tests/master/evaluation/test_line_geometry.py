@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from master.evaluation.filters import stands_in
-from master.evaluation.line_geometry import laps, met, support_uplifts
+from master.evaluation.line_geometry import indexed, laps, met, support_uplifts
 from master.recording.recording import Recording
 
 RING = {"period": 100.0, "support[1].x": 0.0, "support[2].x": 50.0}
@@ -55,3 +55,19 @@ def test_a_place_of_a_line_that_ends_is_where_it_is():
     assert stands_in(109.5, (110.0, None))
     assert stands_in(-1e6, (None, 150.0))
     assert not stands_in(None, (None, None))
+
+
+def test_indexed_values_come_in_numerical_order():
+    geometry = {f"support[{i}].x": float(i) for i in (10, 9, 1, 2)} | {
+        "support[1].xx": 7.0,
+        "dropper[1].x": 8.0,
+    }
+    assert indexed(geometry, "support", "x").tolist() == [1.0, 2.0, 9.0, 10.0]
+    assert indexed(geometry, "support", "y").size == 0
+
+
+def test_uplifts_are_sorted_by_support():
+    names = tuple(f"c.support[{i}].uplift" for i in (10, 2))
+    recording = Recording(np.array([0.0, 1.0]), names, ("m", "m"), np.array([[0.0, 0.3], [0.1, 0.2]]))
+    found = support_uplifts((recording,), {"c": {"support[2].x": 90.0}})
+    assert [(u.support, u.x, u.maximum, u.time) for u in found] == [(2, 90.0, 0.3, 0.0), (10, None, 0.1, 1.0)]

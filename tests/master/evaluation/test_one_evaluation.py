@@ -18,7 +18,7 @@ from master.evaluation.contact_quality import figures_of
 from master.evaluation.contact_signals import EvaluationSettings, contact_signals
 from master.evaluation.filters import BEFORE_CHOICE, DEFAULT, SETTLING, ForceFilter
 from master.recording.recording import Recording, load
-from master.report.charts.run_charts import interval_shape
+from master.report.charts.line_charts import interval_band
 from master.report.result_tables import figure_rows
 from master.results import results_folder, run_difference, run_results
 from master.results.run_results import Results
@@ -113,8 +113,8 @@ def test_without_an_interval_figures_begin_after_the_raising(toy, toy_text, tmp_
     assert begin == pytest.approx(signals.time[first] + SETTLING, abs=1.5e-3)
     quality = done.assessments()[0].quality
     assert (quality.start, quality.end) == pytest.approx((50.0 * begin, 125.0), abs=0.1)
-    (band,) = interval_shape(done, (0.0, 125.0))  # drawn as it was evaluated
-    assert (band["x0"], band["x1"]) == pytest.approx((quality.start, quality.end))
+    (band,) = interval_band(done, (0.0, 125.0))  # drawn as it was evaluated
+    assert (band.start, band.end) == pytest.approx((quality.start, quality.end))
 
 
 def made_up(bump=0.05, where=(50.0, 100.0, 150.0), moment=0.3, slack=None):

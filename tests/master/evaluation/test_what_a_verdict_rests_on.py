@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from master.batch.study.family import Family, Interval, Settings, Variant
-from master.batch.study.study_outcome import Done, Outcome, as_data
+from master.batch.study.study_outcome import StudyOutcome, VariantResult, as_data
 from master.batch.study.study_table import figures_table
 from master.evaluation.interval_coverage import shortfall
 from master.recording.recording import Recording
@@ -59,7 +59,7 @@ def test_limits_that_nothing_was_held_to_are_named():
     assert whole.assessments()[0].warnings == ()
     (found,) = bare.assessments()
     assert found.passed
-    assert found.unchecked.startswith("not checked: uplift at supports, for no support")
+    assert found.unchecked.startswith("not checked: uplift at supports, because no support")
     assert "contact height range, for the height" in found.unchecked
     assert run_summary.figures(bare)["quality"][0]["unchecked"] == found.unchecked
     assert found.unchecked in page(bare)
@@ -122,9 +122,9 @@ def test_runs_that_are_evaluated_differently_are_not_compared_without_a_word():
 def test_a_study_does_not_pass_what_it_has_not_judged(statuses, said):
     interval = Interval(name="i", start=90.0, end=160.0)
     variants = tuple(Variant(name=status, values={}) for status in statuses)
-    done = tuple(Done(status, made(status, **LIMITS)) for status in statuses)
+    done = tuple(VariantResult(status, made(status, **LIMITS)) for status in statuses)
     family = Family(name="f", folder=Path("f"), settings=Settings(title="t", interval=(interval,)), variants=variants)
-    outcome = Outcome(family, "today", {}, "complete", done)
+    outcome = StudyOutcome(family, done, date="today", versions={}, status="complete")
     console = Console(width=120, file=io.StringIO())
     console.print(figures_table(interval, outcome.entries(interval), outcome))
     text = " ".join(console.file.getvalue().split())

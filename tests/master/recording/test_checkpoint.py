@@ -16,7 +16,7 @@ from master.recording.checkpoint import pack, unpack
 from master.recording.checkpoint_writer import index_at
 from master.recording.continuation import Continuation
 from master.recording.recording import load
-from master.run import loaded
+from master.run import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 
@@ -124,7 +124,10 @@ def test_an_fmu_that_restores_less_than_its_state_is_found_out(toy, saved):
     wrong = replace(found, outputs={**found.outputs, "pantograph.A.z": 1.0})
     with open_scenario(toy, Overrides(), build=False) as scenario:
         way = Continuation(wrong, "state")
-        with loaded(scenario.system) as network, pytest.raises(RunError, match="does not restore its whole state"):
+        with (
+            connected_fmus(scenario.system) as network,
+            pytest.raises(RunError, match="does not restore its whole state"),
+        ):
             way.prepare(network, Jacobi(), way.grid(scenario.system))
 
 
@@ -138,7 +141,7 @@ def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
     with open_scenario(toy, Overrides(scheme="iterative"), build=False) as scenario:
         for renewed, expected in (((), found.memory.tolist()), (("pantograph",), [])):
             way, scheme = Continuation(found, "state", renewed=renewed), Iterative()
-            with loaded(scenario.system) as network:
+            with connected_fmus(scenario.system) as network:
                 way.prepare(network, scheme, way.grid(scenario.system))
                 assert scheme.save().tolist() == expected
                 if not renewed:
@@ -149,7 +152,7 @@ def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
 
 def test_a_scheme_does_not_take_another_s_memory(toy, saved):
     found = replace(checkpoint.read(saved[1]), memory=np.array([1.0, 2.0]))
-    with open_scenario(toy, Overrides(), build=False) as scenario, loaded(scenario.system) as network:
+    with open_scenario(toy, Overrides(), build=False) as scenario, connected_fmus(scenario.system) as network:
         way, scheme = Continuation(found, "state"), Iterative()
         way.prepare(network, scheme, way.grid(scenario.system))
         assert not scheme.save().size

@@ -32,7 +32,7 @@ def test_header(tmp_path, fake_slave):
 @pytest.mark.parametrize("every", [1, 5])
 def test_labels_are_the_times_at_which_values_hold(tmp_path, fake_slave, every):
     recorder = record(fake_slave, tmp_path / "a.csv", 1000, every)
-    recording = recorder.recording
+    recording = recorder.read_back()
     assert len(recording.time) == 1000 // every + 1
     assert recording[NAME] == pytest.approx(recording.time, abs=1e-12)
     assert recording.time == pytest.approx([2.0 + n * 1e-3 for n in range(0, 1001, every)], rel=1e-12)
@@ -43,8 +43,8 @@ def test_file_and_memory_agree(tmp_path, fake_slave):
     again = load(tmp_path / "a.csv")
     assert again.names == (NAME,)
     assert again.units == ("N",)
-    assert again.time == pytest.approx(recorder.recording.time, rel=1e-9)
-    assert again[NAME] == pytest.approx(recorder.recording[NAME], rel=1e-9)
+    assert again.time == pytest.approx(recorder.read_back().time, rel=1e-9)
+    assert again[NAME] == pytest.approx(recorder.read_back()[NAME], rel=1e-9)
 
 
 def test_rows_reach_the_disk_while_the_run_goes_on(tmp_path, fake_slave):

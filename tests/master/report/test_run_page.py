@@ -10,6 +10,7 @@ import pytest
 
 from master.recording.recording import Recording
 from master.report import run_page
+from master.report.charts.interactive_figure import interactive_figure
 from master.report.charts.run_charts import run_charts
 from master.report.result_tables import figure_rows
 from master.report.run_inputs import inputs_of, quality_rows
@@ -26,13 +27,13 @@ def charts_of(run):
 
 
 def traces_of(chart):
-    return {t["name"]: t for t in chart.figure["data"]}
+    return {t["name"]: t for t in interactive_figure(chart)["data"]}
 
 
 def test_text_is_escaped_and_incompleteness_is_said_first(made_up):
     page = run_page.page(made_up("failed"))
     assert "&lt;made&gt; &amp; up" in page
-    assert "<b>Incomplete.</b> This run is failed at t = 1 s. the wire &lt;broke&gt;" in page
+    assert "<b>Incomplete.</b> This run failed at t = 1 s. the wire &lt;broke&gt;. The" in page
     assert "<broke>" not in page
     assert page.index("Incomplete") < page.index("class='tiles'")
     assert "so far" in page
@@ -78,7 +79,7 @@ def test_supports_stand_where_they_are(made_up):
     drawn = traces_of(chart)
     assert sorted(set(unpacked(drawn["support"]["x"]))) == [50.0, 100.0]  # 150 m is beyond the run
     assert sorted(set(unpacked(drawn["dropper"]["x"]))) == [55.0, 80.0, 105.0, 130.0]
-    (band,) = chart.figure["layout"]["shapes"]
+    (band,) = interactive_figure(chart)["layout"]["shapes"]
     assert (band["x0"], band["x1"]) == (50.0, 110.0)
 
 
@@ -103,13 +104,13 @@ def test_droppers_are_marked_slack_when_the_line_says_so(made_up, told_slack):
 
 
 def test_uplift_bars_are_in_millimetres_at_their_supports(made_up):
-    (bars,) = charts_of(made_up())["uplift"].figure["data"]
+    (bars,) = interactive_figure(charts_of(made_up())["uplift"])["data"]
     assert unpacked(bars["x"]).tolist() == [50.0, 100.0, 150.0]
     assert unpacked(bars["y"]) == pytest.approx([40.0] * 3)
 
 
 def test_histograms_sum_to_100_percent(made_up):
-    (bars,) = charts_of(made_up())["histogram"].figure["data"]
+    (bars,) = interactive_figure(charts_of(made_up())["histogram"])["data"]
     assert unpacked(bars["y"]).sum() == pytest.approx(100.0, rel=1e-5)
 
 
@@ -124,7 +125,7 @@ def test_what_has_no_data_has_no_chart(made_up):
 def test_rows_give_a_dash_where_there_is_no_value(made_up):
     (assessment,) = made_up().assessments()
     rows = {r[0]: r[1] for r in figure_rows([assessment])}
-    assert rows["contact on strip, least [mm]"] == "-"
+    assert rows["contact on strip, minimum [mm]"] == "-"
     assert float(rows["mean force [N]"]) == pytest.approx(assessment.quality.mean, abs=0.05)
     assert float(rows["contact height range [mm]"]) == pytest.approx(18.0, rel=0.05)
 

@@ -223,7 +223,7 @@ def test_rows_are_the_written_ones_before_a_run_is_complete(toy, tmp_path, capsy
 
     monkeypatch.setattr("master.recording.recorder.load", replaced)
     assert go(toy, folder, "--stop", "0.1") == 1
-    assert "timeseries.csv is not what was written: it was changed while the run went on" in said(capsys)
+    assert "timeseries.csv is not what was written: it was changed while the run was in progress" in said(capsys)
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == "failed"
     assert "quality" not in summary
@@ -265,7 +265,7 @@ def test_one_calibration_at_a_time_stores_its_value(toy, capsys, holder):
     (toy / "parameters.ssv").write_text(before + " ")
     _, text = running.communicate(timeout=120)
     assert running.returncode == 1, first + text
-    assert "parameters.ssv was changed during the calibration: nothing is stored" in " ".join(text.split())
+    assert "parameters.ssv was changed during the calibration; nothing was stored" in " ".join(text.split())
     assert (toy / "parameters.ssv").read_text() == before + " "
 
 

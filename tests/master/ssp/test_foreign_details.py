@@ -9,7 +9,7 @@ import pytest
 
 from master.errors import RunError
 from master.fmu.isolation.isolated_instance import Isolation
-from master.run import Manner
+from master.run import RunOptions
 from master.ssp.pack import pack
 from tests.foreign_fmus import (
     compile_library,
@@ -242,7 +242,7 @@ def test_one_instance_in_a_process(scenario, tmp_path):
         RunError, match=r"'a' and 'b': both are of panel.fmu, of which a process can hold only one; --isolate"
     ):
         ran(folder, tmp_path)
-    assert ran(folder, tmp_path, Manner(isolation=Isolation()))["b.y"][-1] == 0.5
+    assert ran(folder, tmp_path, RunOptions(isolation=Isolation()))["b.y"][-1] == 0.5
 
 
 EARLY = ("    m->r[3] += h", "    if (t > 0.45) return 2;\n    m->r[3] += h")
@@ -270,7 +270,7 @@ def test_an_fmu_that_ends_early_says_so(scenario, tmp_path, changes, told, isola
     folder = scenario(ssd(system(component("a", Y, X))))
     write_fmu(folder / "resources/panel.fmu", compile_library(tmp_path, *changes), description())
     with pytest.raises(RunError, match=rf"component 'a' \(panel\.fmu\) {told}\. What was computed up to t = 0\.5 s"):
-        ran(folder, tmp_path, None if isolation is None else Manner(isolation=isolation))
+        ran(folder, tmp_path, None if isolation is None else RunOptions(isolation=isolation))
 
 
 # Times, sources, digits.

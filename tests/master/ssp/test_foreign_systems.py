@@ -14,7 +14,7 @@ from master.coupling.macro_steps import TimeGrid, simulate
 from master.errors import RequestError, SlaveError
 from master.fmu.isolation.isolated_instance import Isolation
 from master.fmu.typed_values import TEXTS
-from master.run import Manner, loaded
+from master.run import RunOptions, connected_fmus
 from tests.foreign_fmus import (
     binding,
     component,
@@ -39,7 +39,7 @@ BASE = '<ssc:Unit name="{}"><ssc:BaseUnit {}/></ssc:Unit>'
 
 def exchanged(system):
     """The outputs of a system after its run, by name."""
-    with loaded(system) as network:
+    with connected_fmus(system) as network:
         grid = TimeGrid(system.start, system.step, system.step_count)
         outcome = simulate(network, make_algorithm(system.settings.coupling), grid)
         assert outcome.error is None
@@ -211,14 +211,14 @@ def test_texts_are_exchanged(scenario, tmp_path):
     folder = scenario(pair("String", "s_out", "s_in", values(("s_in", 'String value="Fahrdraht \u00fc"'))))
     found = exchanged(opened(folder))
     assert TEXTS.text(found["a.s_out"]).decode() == "Fahrdraht \u00fc"
-    with loaded(opened(folder)) as network:
+    with connected_fmus(opened(folder)) as network:
         simulate(network, make_algorithm(opened(folder).settings.coupling), TimeGrid(0.0, 0.1, 3))
         assert TEXTS.text(network.inputs[0]).decode() == "Fahrdraht \u00fc"
     assert "a.s_out" not in ran(folder, tmp_path)
     with pytest.raises(SlaveError, match="between processes only numbers are exchanged"):
-        ran(folder, tmp_path, Manner(isolation=Isolation()))
+        ran(folder, tmp_path, RunOptions(isolation=Isolation()))
     with pytest.raises(RequestError, match=r"'a\.s_out' is a text"):
-        ran(folder, tmp_path, Manner(checkpoint=0.5))
+        ran(folder, tmp_path, RunOptions(checkpoint=0.5))
 
 
 SPEED = '<ssc:Enumeration name="Speed">{}</ssc:Enumeration>'
@@ -291,7 +291,7 @@ def test_all_types_isolated_and_iterated(scenario, tmp_path):
         f"{connector('i_out', 'output', 'Integer')}</ssd:Connectors></ssd:Component></ssd:Elements>",
     )
     plain = ran(scenario(text), tmp_path)
-    isolated = ran(scenario(text), tmp_path, Manner(isolation=Isolation()))
+    isolated = ran(scenario(text), tmp_path, RunOptions(isolation=Isolation()))
     assert {n: v.tolist() for n, v in plain.items()} == {n: v.tolist() for n, v in isolated.items()}
     run_settings = '<ssd:Annotations><ssc:Annotation type="urn:openpanto:ssp"><panto:Run xmlns:panto="urn:openpanto:ssp"><panto:Coupling scheme="iterative" weight="0.5"/></panto:Run></ssc:Annotation></ssd:Annotations></ssd:SystemStructureDescription>'
     iterated = ran(scenario(text.replace("</ssd:SystemStructureDescription>", run_settings)), tmp_path)
@@ -529,7 +529,7 @@ def test_the_tolerance_of_the_default_experiment_is_passed_on(scenario, tmp_path
     folder = scenario(ssd(system(component("a", told))), panel=description(tolerance="1e-5"))
     assert set(ran(folder, tmp_path)["a.tolerance"]) == {1e-5}
     assert set(ran(folder, tmp_path, tolerance=1e-8)["a.tolerance"]) == {1e-8}
-    assert set(ran(folder, tmp_path, Manner(isolation=Isolation()))["a.tolerance"]) == {1e-5}
+    assert set(ran(folder, tmp_path, RunOptions(isolation=Isolation()))["a.tolerance"]) == {1e-5}
     assert set(ran(scenario(ssd(system(component("a", told)))), tmp_path)["a.tolerance"]) == {-1.0}
     assert main(["validate", str(folder), "--no-build", "--tolerance", "1e-7"]) == 0
     assert "tolerance 1e-07 for all FMUs" in " ".join(capsys.readouterr().out.split())

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from master.errors import ScenarioError
-from master.run import loaded, run
+from master.run import connected_fmus, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.ssp.ssp_units import Conversion
@@ -245,5 +245,5 @@ def test_unused_root_outputs_do_no_harm(toy, toy_text, flat, tmp_path):
     wire = '<ssd:Connection startElement="catenary" startConnector="pantograph[1].contact.force" endConnector="f"/>'
     rewrite(toy, text.replace("</ssd:Connections>", f"{wire}</ssd:Connections>"))
     assert force(toy, tmp_path / "out").tolist() == flat
-    with open_scenario(toy, build=False) as scenario, loaded(scenario.system) as network:
+    with open_scenario(toy, build=False) as scenario, connected_fmus(scenario.system) as network:
         assert len(network.input_names) == 16

@@ -242,7 +242,7 @@ def _keeps_damper(model):
 
 def _damper(model, rate):
     """Return c e' of every dropper [N]."""
-    return model.definition.damping.alpha * model.dropper_stiffness * rate
+    return model.definition.damping.alpha * model.dropper_law.stiffness * rate
 
 
 @pytest.mark.parametrize("kernel", ["numpy", "numba"])
@@ -297,7 +297,7 @@ def test_droppers_slacken_far_from_the_contact_as_well(line_maker):
         model.set_velocity(state, field)
         for _ in range(40):
             pressed.append(model.step(state, 1e-3, StripMotion(strip, np.zeros(1))).force[0, 0])
-            forces.append(model.dropper_force(state) - _damper(model, model.B @ state.motion.attached[1]))
+            forces.append(model.dropper_force(state) - _damper(model, model.dropper_law.B @ state.motion.attached[1]))
         records.append((np.array(forces), np.array(pressed)))
     (alone, none), (beside, force) = records
     assert not none.any()
@@ -320,8 +320,10 @@ def test_stiffness_in_compression_is_the_given_share(line_maker, law):
     seen = 0
     for n in range(1, 400):
         model.step(state, 1e-3, StripMotion(_moving_strip(n, 1e-3), np.zeros(1)))
-        elastic = model.static.dropper_force + model.dropper_stiffness * (model.B @ state.motion.attached[0])
-        damper = 0.00275 * model.dropper_stiffness * (model.B @ state.motion.attached[1])
+        elastic = model.static.dropper_force + model.dropper_law.stiffness * (
+            model.dropper_law.B @ state.motion.attached[0]
+        )
+        damper = 0.00275 * model.dropper_law.stiffness * (model.dropper_law.B @ state.motion.attached[1])
         pull = elastic + damper if law == "tension" else elastic
         compressed = pull < 0.0
         seen += int(compressed.sum())

@@ -351,7 +351,7 @@ def test_responses_reach_round_the_seam(ring_maker):
     """Single ones and those of an interval side by side, against whole solutions."""
     ring = CatenaryModel(ring_maker(20))
     factor = factorised(ring.modes.K + 4e6 * ring.modes.M + 2e3 * ring.modes.C)
-    compliance = Compliance(factor, ring.B, ring.dropper_stiffness)
+    compliance = Compliance(factor, ring.dropper_law.B, ring.dropper_law.stiffness)
     n, wraps = factor.matrix.shape[0], 0
     wire = ring.wires[0]
     for x in (1.0, 300.0, 640.0, 998.0):
@@ -364,10 +364,10 @@ def test_responses_reach_round_the_seam(ring_maker):
         assert np.abs(found - whole).max() < 1e-13 * np.abs(whole).max()
         every = np.arange(n)
         assert (columns.at(every) == found).all()
-        stretch = np.zeros((ring.B.shape[0], len(places)))
+        stretch = np.zeros((ring.dropper_law.B.shape[0], len(places)))
         near = columns.dropper_index
-        stretch[near] = columns.dropper_force / ring.dropper_stiffness[near, None]
-        assert np.abs(stretch - ring.B @ whole).max() < 1e-13 * np.abs(whole).max()
+        stretch[near] = columns.dropper_force / ring.dropper_law.stiffness[near, None]
+        assert np.abs(stretch - ring.dropper_law.B @ whole).max() < 1e-13 * np.abs(whole).max()
     assert wraps
 
 

@@ -78,11 +78,11 @@ def _settled(line, model, base, B, right, rows, gaps):
     k, closed, slack = line.contact.stiffness, np.zeros(len(rows), dtype=bool), np.zeros(B.shape[0], dtype=bool)
     for _ in range(50):
         R = sp.csr_matrix(rows[closed])
-        system = base + k * (R.T @ R) - B[slack].T @ sp.diags(model.dropper_stiffness[slack]) @ B[slack]
+        system = base + k * (R.T @ R) - B[slack].T @ sp.diags(model.dropper_law.stiffness[slack]) @ B[slack]
         load = right - k * (R.T @ gaps[closed]) + B[slack].T @ model.static.dropper_force[slack]
         new = spsolve(system.tocsc(), load)
         penetration = gaps + rows @ new
-        elastic = model.static.dropper_force + model.dropper_stiffness * (B @ new)
+        elastic = model.static.dropper_force + model.dropper_law.stiffness * (B @ new)
         if np.array_equal(penetration > 0.0, closed) and np.array_equal(elastic < 0.0, slack):
             return new, penetration
         closed, slack = penetration > 0.0, elastic < 0.0

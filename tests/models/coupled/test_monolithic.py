@@ -59,12 +59,12 @@ def _assembled(line, pantograph, dt, steps):
                 load -= k * gap0 * row.toarray()[:, 0]
             if slack:
                 rows = sp.block_diag([catenary.B, sp.csr_matrix((0, m))], format="csr")[sorted(slack)]
-                stiff = sp.diags(model.dropper_stiffness[sorted(slack)])
+                stiff = sp.diags(model.dropper_law.stiffness[sorted(slack)])
                 system = system - rows.T @ stiff @ rows
                 load += rows.T @ model.static.dropper_force[sorted(slack)]
             new = spsolve(system.tocsc(), load)
             gap = gap0 + (row.T @ new)[0]
-            elastic = model.static.dropper_force + model.dropper_stiffness * (catenary.B @ new[:n])
+            elastic = model.static.dropper_force + model.dropper_law.stiffness * (catenary.B @ new[:n])
             now = set(np.flatnonzero(elastic < 0.0).tolist())
             if (gap > 0.0) == closed and now == slack:
                 break

@@ -118,9 +118,9 @@ def test_slack_droppers_take_energy_as_their_law_has_it(line_maker):
 
 def _absorbed(model, state):
     """Return what droppers carry beyond max(0, k e), and their elongation."""
-    elongation, rate = (model.B @ motion for motion in state.motion.attached)
-    spring = model.static.elastic_force + model.dropper_stiffness * elongation
-    damper = model.definition.damping.dropper.alpha * model.dropper_stiffness * rate
+    elongation, rate = (model.dropper_law.B @ motion for motion in state.motion.attached)
+    spring = model.static.elastic_force + model.dropper_law.stiffness * elongation
+    damper = model.definition.damping.dropper.alpha * model.dropper_law.stiffness * rate
     together = model.definition.dropper.slack_law == "tension"
     carried = np.maximum(spring + damper, 0.0) if together else np.maximum(spring, 0.0) + damper
     return carried - np.maximum(spring, 0.0), elongation

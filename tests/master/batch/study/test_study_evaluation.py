@@ -8,7 +8,7 @@ import pytest
 from master.batch.study import study_charts
 from master.batch.study.family import Family, Interval, Settings, Variant
 from master.batch.study.study_evaluation import entries
-from master.batch.study.study_outcome import Done, Outcome, as_csv, differences
+from master.batch.study.study_outcome import StudyOutcome, VariantResult, as_csv, differences
 from master.batch.study.study_page import page
 from master.batch.verification.quantities import QUANTITIES, Choice
 from master.evaluation.contact_assessment import slack_share
@@ -57,10 +57,14 @@ def outcome(pair, tmp_path):
     settings = Settings(title="A <pair>", interval=(WHOLE,), histories={"variants": ("30 m",), "position": 71.0},
                         sharing={"variants": ("30 m",)})  # fmt: skip
     variants = (Variant(name="30 m", values={}), Variant(name="single", values={}))
-    return Outcome(
-        Family(name="pair", folder=tmp_path, settings=settings, variants=variants), "today", {}, "complete",
-        (Done("30 m", pair), Done("single", _without(pair, "trailing"))), {"60 m": "the wire <broke>"},
-    )  # fmt: skip
+    return StudyOutcome(
+        Family(name="pair", folder=tmp_path, settings=settings, variants=variants),
+        (VariantResult("30 m", pair), VariantResult("single", _without(pair, "trailing"))),
+        {"60 m": "the wire <broke>"},
+        date="today",
+        versions={},
+        status="complete",
+    )
 
 
 def _without(pair, pantograph):
@@ -101,15 +105,15 @@ def test_histories_are_drawn_at_the_nearest_support_and_dropper(outcome):
 def test_wires_are_drawn_with_their_sum(outcome):
     made = study_charts.sharing_charts(outcome)
     assert [c.title for c in made] == [f"From wire to wire, 30 m, {p}" for p in ("leading", "trailing")]
-    assert [t["name"] for t in made[0].figure["data"]] == ["section 1", "section 2", "total"]
+    assert [part.name for part in made[0].parts] == ["section 1", "section 2", "total"]
 
 
 def test_statistics_are_drawn_by_place_in_the_train_with_the_single_one(outcome):
     made = study_charts.interval_charts(outcome, WHOLE, outcome.entries(WHOLE))
     assert [c.title for c in made[:2]] == ["Statistics, leading", "Statistics, trailing"]
-    assert [t["name"] for t in made[0].figure["data"]] == ["single", "30 m"]
+    assert [part.name for part in made[0].parts] == ["single", "30 m"]
     assert [c.title for c in made[2:]] == ["Contact force, 30 m", "Histogram, 30 m"]
-    shares = [np.sum(t["y"]) for t in made[3].figure["data"]]
+    shares = [np.sum(bars.y) for bars in made[3].parts]
     assert shares == pytest.approx([100.0, 100.0])
 
 

@@ -4,9 +4,10 @@ import json
 
 import pytest
 
+from master.batch.batch_session import Runner
 from master.batch.study.family import load_family
 from master.batch.study.study_session import study
-from master.batch.study.variants import Runner, calibrate_variant
+from master.batch.study.variants import calibrate_variant, opened_variant
 from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError, RequestError
 from master.results.results_folder import is_ours
@@ -112,7 +113,7 @@ def test_static_forces_are_found(family, counting):
 
 
 def test_a_component_is_taken_out_with_its_connections(family, counting):
-    with counting.opened(family, family.variants[0]) as system:
+    with opened_variant(family, family.variants[0], counting) as system:
         alone = without(system, ["pantograph"])
         assert [c.name for c in alone.components] == ["catenary"]
         assert alone.connections == ()

@@ -86,7 +86,7 @@ def test_elasticity_of_two_strings_tied_by_springs(line_maker, share):
     line = line.with_values(limp | {"contact_wire.tension": 18000.0, "dynamics.geometric_stiffness": 0})
     model = CatenaryModel(line)
     found = elasticity.elasticity(model, np.array([50.0 * share]), 1.0)
-    k = model.dropper_stiffness
+    k = model.dropper_law.stiffness
     expected = string_on_springs(50.0 * share, 18000.0, 14000.0, k, line.sections[0].spans[0].droppers, 50.0)
     assert found.value[0] == pytest.approx(expected, rel=2e-3)
 
@@ -108,13 +108,13 @@ def test_slack_droppers_make_a_line_softer_and_the_solution_exact(short):
     nodal = NodalLine(short)
     row, _ = nodal.row(0, *short.wires[0].locate(x))
     dropper_rows = nodal.B.toarray()
-    dense_K = nodal.K - dropper_rows.T @ np.diag(short.dropper_stiffness) @ dropper_rows
+    dense_K = nodal.K - dropper_rows.T @ np.diag(short.dropper_law.stiffness) @ dropper_rows
     while True:
         B = dropper_rows[elastic]
-        K = np.asarray(dense_K) + B.T @ (short.dropper_stiffness[elastic][:, None] * B)
+        K = np.asarray(dense_K) + B.T @ (short.dropper_law.stiffness[elastic][:, None] * B)
         gone = dropper_rows[~elastic].T @ short.static.dropper_force[~elastic]
         d = np.linalg.solve(K, force * row + gone)
-        tension = short.static.dropper_force + short.dropper_stiffness * (dropper_rows @ d)
+        tension = short.static.dropper_force + short.dropper_law.stiffness * (dropper_rows @ d)
         if np.array_equal(tension > 0.0, elastic):
             break
         elastic = tension > 0.0

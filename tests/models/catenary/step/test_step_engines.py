@@ -139,7 +139,7 @@ def _matrices(model, step=1e-3):
 
 
 def _compliance(model, matrices):
-    return Compliance(matrices.factor, model.B, model.dropper_stiffness)
+    return Compliance(matrices.factor, model.dropper_law.B, model.dropper_law.stiffness)
 
 
 def test_responses_to_unit_loads_are_columns_of_the_inverse(model):
@@ -150,11 +150,11 @@ def test_responses_to_unit_loads_are_columns_of_the_inverse(model):
     unit = np.eye(len(everywhere))[interval.ends]
     whole = np.stack([matrices.factor.solve(load) for load in unit], axis=1)
     assert columns.at(everywhere) == pytest.approx(whole, abs=1e-14 * np.abs(whole).max())
-    stretch = np.zeros((len(model.dropper_stiffness), len(interval.ends)))
+    stretch = np.zeros((len(model.dropper_law.stiffness), len(interval.ends)))
     near = columns.dropper_index
-    stretch[near] = columns.dropper_force / model.dropper_stiffness[near, None]
+    stretch[near] = columns.dropper_force / model.dropper_law.stiffness[near, None]
     # Both ends of a dropper may lie where a column is cut.
-    assert stretch == pytest.approx(model.B @ whole, abs=4.0 * CUT * np.abs(whole).max())
+    assert stretch == pytest.approx(model.dropper_law.B @ whole, abs=4.0 * CUT * np.abs(whole).max())
 
 
 def test_what_a_strip_comes_to_is_prepared_one_response_at_a_time(model):
@@ -170,7 +170,7 @@ def test_compliance_of_droppers_is_symmetric(model):
     i, j = 20, 22
     response = {}
     for k in (i, j):
-        stretch = columns[k].dropper_force[:, 0] / model.dropper_stiffness[columns[k].dropper_index]
+        stretch = columns[k].dropper_force[:, 0] / model.dropper_law.stiffness[columns[k].dropper_index]
         response[k] = dict(zip(columns[k].dropper_index.tolist(), stretch, strict=True))
     assert response[i][j] == pytest.approx(response[j][i], rel=1e-9)
     assert response[i][i] > abs(response[i][j])

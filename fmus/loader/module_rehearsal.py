@@ -1,4 +1,4 @@
-"""Runs FMUs of every kind for some steps, to see which modules Python loads for them."""
+"""Which modules Python loads for FMUs: those of every kind are run for a few steps."""
 
 from __future__ import annotations
 
@@ -90,20 +90,20 @@ def rehearse(
     imports : sequence of str
         Modules that are loaded besides.
     search_path : sequence of Path
-        What replaces ``sys.path``, so that modules come from nowhere else; as it is if empty.
+        What replaces ``sys.path``, so that modules come from nowhere else; unchanged if empty.
     preload : sequence of Path
         Libraries that are opened first.
 
     Raises
     ------
     RehearsalError
-        With the last line that Python said.
+        With the last line that Python printed.
     """
     answer = work / "modules.json"
     joined = [os.pathsep.join(str(path) for path in paths) for paths in (search_path, preload)]
     settings = [str(answer), *joined, " ".join(imports), json.dumps(dict(fronts))]
     command = [sys.executable, "-I", "-B", "-c", _SCRIPT, *settings, *map(str, resources)]
-    # A runtime is without numba: what the plain step loads is what counts.
+    # A runtime has no numba, so what the plain step loads is what counts.
     environment = {**os.environ, "OPENPANTO_KERNEL": "numpy", "OMP_NUM_THREADS": "1"}
     done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False, env=environment)
     if done.returncode != 0:

@@ -1,4 +1,4 @@
-"""A Python as it lies on disk, of this machine or of another: what a bundled runtime is taken from."""
+"""A Python installation on disk, of this machine or another: what a bundled runtime is taken from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FMUs of a user's own definitions, and the mark that says whose an FMU is."""
+"""Names and files that FMUs are made of, the hash of their sources, and the mark that says whose an FMU is."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import zipfile
 import pytest
 
 from fmus.__main__ import main
-from fmus.builder.fmu_build import MARK, BuildError, build, content_hash, fingerprint, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import MARK, BuildError, content_hash, fingerprint, recipe
 from master.fmu import fmu_provision
 from models.library.catalogue import line_path, pantograph_path
-from tests.fmus.support import Instance
+from tests.fmus.support import Instance, toy_recipe, toy_variant
 
 
 @pytest.fixture
@@ -59,15 +60,15 @@ def test_the_guid_follows_the_file_and_not_its_place(own, tmp_path):
 
 
 def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
-    path, told = build(recipe(str(own / "Light.toml")), tmp_path), []
-    assert fmu_provision.provide_fmu(path, told.append) == path
-    assert told == []
+    path, said = build(recipe(str(own / "Light.toml")), tmp_path), []
+    assert fmu_provision.provide_fmu(path, said.append) == path
+    assert said == []
     (own / "Light.toml").write_text((own / "Light.toml").read_text().replace("168", "170"))
-    fmu_provision.provide_fmu(path, told.append)
-    assert told == ["building Pantograph_Light.fmu again: its sources have changed"]
+    fmu_provision.provide_fmu(path, said.append)
+    assert said == ["building Pantograph_Light.fmu again: its sources have changed"]
     assert fmu_provision.stored_guid(path) == fingerprint(recipe(str(own / "Light.toml")))
-    fmu_provision.provide_fmu(path, told.append)
-    assert len(told) == 1
+    fmu_provision.provide_fmu(path, said.append)
+    assert len(said) == 1
 
 
 @pytest.mark.parametrize(
@@ -102,3 +103,32 @@ def test_the_mark_holds_the_hash_of_all_other_files(tmp_path):
     assert mark["content"] == content_hash(files)
     assert content_hash({**files, "resources/definition.toml": b""}) != mark["content"]
     assert "definition" not in mark  # of the library
+
+
+def test_fingerprint_is_the_guid(instantiate):
+    assert instantiate().description.guid == fingerprint(toy_recipe())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "file"),
+    [
+        ("GAIN = 1.0", "GAIN = 2.0", "law.py"),
+        ("choice: round", "Table 2", "toy.toml"),
+        ("not used", "of no use", "slave.py"),
+    ],
+)
+def test_any_change_of_sources_changes_the_fingerprint(tmp_path, old, new, file):
+    assert fingerprint(toy_recipe(toy_variant(tmp_path, old, new, file))) != fingerprint(toy_recipe())
+
+
+def test_unknown_name_lists_the_known_ones(tmp_path, capsys):
+    assert main(["build", "Catenary_LN2", "Catenary_Nowhere", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("error: There is no FMU 'Catenary_Nowhere'; known are")
+    assert "Catenary_LN2" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_list_names_every_definition(capsys):
+    assert main(["list"]) == 0
+    assert "Catenary_LN2" in capsys.readouterr().out.split()

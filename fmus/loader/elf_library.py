@@ -18,7 +18,7 @@ _ENTRY: Final = struct.Struct("<qQ")
 
 
 class ElfError(ValueError):
-    """A file that is no library of 64-bit Linux."""
+    """A file that is not a library of 64-bit Linux."""
 
 
 def needed(library: bytes) -> tuple[str, ...]:

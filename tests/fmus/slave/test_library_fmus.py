@@ -10,7 +10,8 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.builder.fmu_build import build, fingerprint, known_names, recipe
+from fmus.builder.fmu_build import build
+from fmus.builder.recipe import fingerprint, known_names, recipe
 from tests.fmus.support import Instance, names_of, run
 
 READY = [name for name in known_names() if "Catenary" not in name or find_spec("models.catenary.line_part")]

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from fmus.loader.installation import PACKAGES, Installation, InstallationError
+from fmus.loader.python_installation import PACKAGES, Installation, InstallationError
 
 FOLDER: Final = "licences"
 #: Folder of libraries of our own.
@@ -30,7 +30,7 @@ def licences(source: Installation, files: Mapping[str, Path]) -> dict[str, bytes
     Raises
     ------
     InstallationError
-        If a text is nowhere to be found: without it nothing may be passed on.
+        If a text cannot be found: without it nothing may be redistributed.
     """
     found = {"python": _python_licence(source)}
     for package in PACKAGES:
@@ -53,7 +53,7 @@ def _python_licence(source: Installation) -> bytes:
             return (source.modules / name).read_bytes()
     for path in source.modules.parent.parent.glob(f"share/doc/*python{source.minor_version}*/copyright"):
         return path.read_bytes()
-    raise InstallationError(f"the licence of the Python in {source.root} (LICENSE.txt) is not to be found")
+    raise InstallationError(f"the licence of the Python in {source.root} (LICENSE.txt) cannot be found")
 
 
 def _package_licences(source: Installation, package: str) -> dict[str, bytes]:
@@ -65,7 +65,7 @@ def _package_licences(source: Installation, package: str) -> dict[str, bytes]:
             inner = path.relative_to(info).with_suffix("").as_posix().removeprefix("licenses/")
             found[f"{package}-{inner.replace('/', '-')}"] = path.read_bytes()
     if not found:
-        raise InstallationError(f"the licence of {package} is not to be found in {folder}")
+        raise InstallationError(f"the licence of {package} cannot be found in {folder}")
     return found
 
 
@@ -74,7 +74,7 @@ def _system_licences(library: Path) -> dict[str, bytes]:
     texts = dict(_texts(package)) if package else {}
     if not texts:
         raise InstallationError(
-            f"the licence of {library} is not to be found among the system's packages; a standalone FMU may not carry "
+            f"the licence of {library} cannot be found among the system's packages; a standalone FMU may not carry "
             "a library without it"
         )
     return texts

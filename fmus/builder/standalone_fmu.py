@@ -1,4 +1,4 @@
-"""Standalone FMUs: those that bring the Python that they run in."""
+"""Standalone FMUs, which bring the Python that they run in: where that comes from, whether an FMU has it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from fmus.builder.fmu_build import RUNTIME, BuildError, archive, recipe
-from fmus.loader.installation import InstallationError, installed_at, own
+from fmus.builder.fmu_build import RUNTIME, archive
+from fmus.builder.recipe import BuildError, recipe
 from fmus.loader.loader_build import DESCRIPTION
+from fmus.loader.python_installation import InstallationError, installed_at, own
 from fmus.loader.runtime import Runtime, RuntimeBuildError, make_runtime, write_files
 
 #: An FMU of each kind: what their runs load is what a runtime holds, the same for all FMUs.
@@ -43,7 +44,7 @@ def _unpacked(kind: str, folder: Path) -> Path:
 
 
 def write_runtime(runtime: Runtime, folder: Path) -> Path:
-    """Write a runtime into a folder of its own, for FMUs beside it (OPENPANTO_RUNTIME); return the folder.
+    """Write a runtime into a folder for several FMUs (OPENPANTO_RUNTIME); return the folder.
 
     Raises
     ------
@@ -57,7 +58,7 @@ def write_runtime(runtime: Runtime, folder: Path) -> Path:
 
 
 def bundled_platform(fmu: Path) -> str:
-    """Return for which system an FMU brings its own Python (``linux64``, ``win64``), empty if it brings none."""
+    """Return the system (``linux64``, ``win64``) for which an FMU brings its own Python, empty if it brings none."""
     try:
         with zipfile.ZipFile(fmu) as file:
             text = file.read(f"{RUNTIME}/{DESCRIPTION}").decode()

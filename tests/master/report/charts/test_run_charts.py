@@ -1,13 +1,18 @@
-"""Plots as files."""
+"""Charts as files: what is drawn where."""
 
-import base64
 import dataclasses
 
 import numpy as np
 import pytest
 
-from master.report.charts import static_charts
-from master.report.charts.run_charts import line_marks, run_charts
+from master.report.charts.chart import Band
+from master.report.charts.line_charts import geometry_charts, line_marks
+from master.report.charts.run_charts import file_charts, run_charts
+from master.report.charts.static_figure import static_figure
+
+
+def drawn(run, name):
+    return static_figure(file_charts(run)[name]).axes
 
 
 def lines(axes):
@@ -15,11 +20,11 @@ def lines(axes):
 
 
 def test_contact_force_shows_raw_and_filtered_over_track_position(made_up):
-    (axes,) = static_charts.contact_force(made_up()).axes
-    drawn = lines(axes)
-    assert drawn["raw"].get_xdata()[0] == pytest.approx(20.0)
-    assert np.ptp(drawn["raw"].get_ydata()) == pytest.approx(180.0, rel=0.03)
-    assert np.ptp(drawn["0-20 Hz"].get_ydata()) == pytest.approx(60.0, rel=0.1)
+    (axes,) = drawn(made_up(), "contact_force")
+    curves = lines(axes)
+    assert curves["raw"].get_xdata()[0] == pytest.approx(20.0)
+    assert np.ptp(curves["raw"].get_ydata()) == pytest.approx(180.0, rel=0.03)
+    assert np.ptp(curves["0-20 Hz"].get_ydata()) == pytest.approx(60.0, rel=0.1)
     shown = {c.get_label(): c for c in axes.collections}
     assert len(shown["support"].get_segments()) == 2  # at 50 m and 100 m; 150 m is beyond the run
     assert len(shown["dropper"].get_segments()) == 4
@@ -29,29 +34,31 @@ def test_contact_force_shows_raw_and_filtered_over_track_position(made_up):
 
 
 def test_uplift_bars_are_in_millimetres_at_their_supports(made_up):
-    (axes,) = static_charts.uplift(made_up()).axes
-    assert [bar.get_height() for bar in axes.patches] == pytest.approx([40.0] * 3)
-    assert [t.get_text() for t in axes.get_xticklabels()] == ["50", "100", "150"]
+    (axes,) = drawn(made_up(), "uplift")
+    bars = [p for c in axes.containers for p in c]
+    assert [bar.get_height() for bar in bars] == pytest.approx([40.0] * 3)
+    assert [bar.get_x() + 0.5 * bar.get_width() for bar in bars] == pytest.approx([50.0, 100.0, 150.0])
 
 
 def test_uplift_history_keeps_to_the_interval(made_up):
-    (axes,) = static_charts.uplift_history(made_up()).axes
+    (axes,) = drawn(made_up(), "uplift_history")
     assert [line.get_label() for line in axes.get_lines()] == ["50 m", "100 m"]
 
 
 def test_geometry_shows_elevation_and_plan(line_geometry):
-    elevation, plan = static_charts.geometry(line_geometry).axes
+    elevation, plan = static_figure(geometry_charts("line", line_geometry)).axes
     wire = lines(elevation)["contact wire"]
     assert wire.get_xdata().tolist() == sorted(wire.get_xdata())
     assert len(wire.get_xdata()) == 7
     assert max(lines(elevation)["messenger wire"].get_ydata()) == pytest.approx(6.48)
-    assert max(plan.get_lines()[0].get_ydata()) == pytest.approx(0.2)
+    assert max(plan.get_lines()[0].get_ydata()) == pytest.approx(200.0)
+    assert "[mm]" in plan.get_ylabel()
 
 
 def test_what_has_no_data_has_no_plot(made_up):
     bare = dataclasses.replace(made_up(with_geometry=False), recordings=(made_up().recordings[0],))
-    assert set(static_charts.all_plots(bare)) == {"contact_force", "contact_height"}
-    assert static_charts.geometry({"support[1].x": 1.0}) is None
+    assert set(file_charts(bare)) == {"contact_force", "contact_height"}
+    assert geometry_charts("line", {"support[1].x": 1.0}) == []
 
 
 @pytest.fixture
@@ -66,12 +73,11 @@ def on_ring(made_up):
 
 
 def test_supports_of_a_line_that_closes_on_itself_are_marked_in_every_lap(on_ring):
-    (axes,) = static_charts.contact_force(on_ring).axes
+    (axes,) = drawn(on_ring, "contact_force")
     shown = {c.get_label(): c for c in axes.collections}
     assert [s[0, 0] for s in shown["support"].get_segments()] == [50.0, 100.0]
     assert [s[0, 0] for s in shown["dropper"].get_segments()] == [55.0, 80.0]
-    packed = [mark["x"] for mark in line_marks(on_ring, "catenary", (120.0, 260.0))]
-    supports, droppers = (np.frombuffer(base64.b64decode(x["bdata"]), x["dtype"]) for x in packed)
+    supports, droppers = (mark.x for mark in line_marks(on_ring, "catenary", (120.0, 260.0)))
     assert sorted(set(supports)) == [150.0, 200.0, 250.0]
     assert sorted(set(droppers)) == [155.0, 180.0, 255.0]
 
@@ -79,7 +85,7 @@ def test_supports_of_a_line_that_closes_on_itself_are_marked_in_every_lap(on_rin
 def test_the_interval_of_a_later_lap_has_its_supports(on_ring):
     settings = on_ring.summary["settings"] | {"interval": {"start": 140.0, "end": 160.0}}
     run = dataclasses.replace(on_ring, summary=on_ring.summary | {"settings": settings})
-    (axes,) = static_charts.uplift_history(run).axes
+    (axes,) = drawn(run, "uplift_history")
     assert [line.get_label() for line in axes.get_lines()] == ["50 m"]
 
 
@@ -90,6 +96,5 @@ def test_charts_over_places_of_one_lap_say_so(made_up):
         (bars,) = [c for c in run_charts(run, run.signals) if c.key == "uplift"]
         (droppers,) = [c for c in run_charts(run, run.signals) if c.key == "droppers_catenary"]
         for chart in (bars, droppers):
-            layout = chart.figure["layout"]
-            assert ("in its lap" in layout["xaxis"]["title"]["text"]) == named
-            assert any(s["type"] == "rect" for s in layout["shapes"]) != named  # the interval is not of one lap
+            assert ("in its lap" in chart.x.label) == named
+            assert any(isinstance(part, Band) for part in chart.parts) != named  # the interval is not of one lap

@@ -1,0 +1,216 @@
+"""A chart as it is described, once: curves, bars, points and marks over two axes with units.
+
+Nothing here draws: `interactive_figure` makes of a chart what plotly.js shows on a page, `static_figure` what goes into
+a file. Curves differ in dash and width as well as in colour (the palette of Okabe and Ito, its blue lighter, so that it
+stands out on a dark page too), bars in hatching: charts survive a grey printer and colour-blind eyes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from master.arrays import FloatArray
+from master.report.charts.sample_packing import MOST_POINTS, kept_samples
+
+Dash = Literal["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"]
+
+COLOURS: Final = ("#1f80c4", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+DASHES: Final[tuple[Dash, ...]] = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+#: What stands behind the curves, marks of the line, limits.
+GREY: Final = "#8a8f98"
+MARK: Final = "#6b7280"
+LIMIT: Final = "#b3261e"
+#: The interval of interest, its transparency, and that of its edges.
+INTERVAL: Final = "#e6b428"
+INTERVAL_OPACITY: Final = 0.16
+EDGE: Final = "#aa7800"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What an axis shows.
+
+    Attributes
+    ----------
+    name, unit : str
+        The unit is empty for names and numbers of things.
+    limits : (float, float), optional
+        What is shown at first; as much as there is, if None.
+    is_logarithmic : bool
+    ticks : tuple of float
+        Where the numbers stand, if it is not left to the renderer.
+    """
+
+    name: str
+    unit: str = ""
+    limits: tuple[float, float] | None = None
+    is_logarithmic: bool = False
+    ticks: tuple[float, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Name and unit as printed."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """How a line is drawn; the width is in points."""
+
+    colour: str
+    dash: Dash = "solid"
+    width: float = 1.8
+
+
+def stroke(index: int, width: float = 1.8) -> Stroke:
+    """Return the stroke of a chart's curve by its number; no two of the first 36 have the same colour and dash."""
+    dash = DASHES[(index + index // len(COLOURS)) % len(DASHES)]
+    return Stroke(COLOURS[index % len(COLOURS)], dash, width)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line through points; NaN interrupts it.
+
+    Attributes
+    ----------
+    name : str
+        In the legend.
+    x, y : ndarray, shape (n,)
+    stroke : Stroke
+    is_shown : bool
+        Whether it is drawn at first; a page shows it when its name is clicked, a file leaves it out.
+    is_whole : bool
+        Whether all points are drawn; else those that can be seen (`kept_samples`).
+    most : int
+        How many points are drawn at most.
+    """
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    stroke: Stroke
+    is_shown: bool = True
+    is_whole: bool = False
+    most: int = MOST_POINTS
+
+    @property
+    def points(self) -> tuple[FloatArray, FloatArray]:
+        """What is drawn of x and y."""
+        if self.is_whole:
+            return self.x, self.y
+        kept = kept_samples(self.y, self.most)
+        return self.x[kept], self.y[kept]
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars over places or names; those of one chart stand side by side.
+
+    Attributes
+    ----------
+    name : str
+        In the legend.
+    x : ndarray or tuple of str, shape (n,)
+    y : ndarray, shape (n,)
+    index : int
+        Number of colour and hatching.
+    width : float, optional
+        In units of the abscissa.
+    words : tuple of str
+        What a page says when a bar is pointed at, instead of its numbers.
+    """
+
+    name: str
+    x: FloatArray | tuple[str, ...]
+    y: FloatArray
+    index: int = 0
+    width: float | None = None
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Points:
+    """Single points, each a symbol."""
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    colour: str
+    symbol: Literal["circle", "x", "triangle-up"]
+    size: float = 8.0
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """Upright strokes at places of the line, from the bottom up to a share of the chart's height."""
+
+    name: str
+    x: FloatArray
+    share: float = 1.0
+    dash: Dash = "solid"
+
+
+@dataclass(frozen=True)
+class Band:
+    """A stretch of the abscissa that is shaded over the whole height: the interval of interest."""
+
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Level:
+    """A dashed line across the chart at a value of the ordinate, or of the abscissa, with a text at its end."""
+
+    at: float
+    text: str
+    is_upright: bool = False
+
+    @property
+    def colour(self) -> str:
+        """Red for limits, grey for what is only pointed out."""
+        return MARK if self.is_upright else LIMIT
+
+
+Part = Curve | Bars | Points | Ticks | Band | Level
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart and its caption.
+
+    Attributes
+    ----------
+    key : str
+        Identifier on the page.
+    title : str
+        Heading.
+    x, y : Axis
+    parts : tuple
+        What is drawn, from the back to the front.
+    note : str
+        What a reader must know.
+    height : int
+        Pixels.
+    group : str
+        Charts of a page whose abscissas are moved together.
+    """
+
+    key: str
+    title: str
+    x: Axis
+    y: Axis
+    parts: tuple[Part, ...]
+    note: str = ""
+    height: int = 380
+    group: str = ""
+
+
+def gapped(x: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the points of a curve of separate upright strokes."""
+    return np.repeat(x, 3), np.column_stack((low, high, np.full(len(x), np.nan))).ravel()

@@ -1,0 +1,146 @@
+"""Charts as Matplotlib draws them into a file, one below the other; nothing is written here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import singledispatch
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from master.report.charts.chart import (
+    COLOURS,
+    INTERVAL,
+    INTERVAL_OPACITY,
+    MARK,
+    Axis,
+    Band,
+    Bars,
+    Chart,
+    Curve,
+    Dash,
+    Level,
+    Points,
+    Ticks,
+)
+
+_WIDTH: Final = 9.0
+#: Pixels of a page that an inch of a file has.
+_PIXELS: Final = 125.0
+#: Points that a legend has for its width, and needs for a row, a letter, and the line beside a name.
+_LEGEND_WIDTH, _LEGEND_ROW, _LETTER, _LINE = 590.0, 13.0, 4.6, 44.0
+_GRID: Final = "#e3e5e8"
+#: Curves are thinner on paper than on a screen.
+_THINNER: Final = 0.65
+_PATTERNS: Final[dict[Dash, Any]] = {
+    "solid": "-",
+    "dash": (0, (5, 2)),
+    "dot": (0, (1, 1.3)),
+    "dashdot": (0, (5, 2, 1, 2)),
+    "longdash": (0, (9, 3)),
+    "longdashdot": (0, (9, 3, 1, 3)),
+}
+_HATCHES: Final = ("", "//", "xx", "--", "..", "++")
+_SYMBOLS: Final = {"circle": "o", "x": "x", "triangle-up": "^"}
+
+
+def static_figure(charts: Sequence[Chart]) -> Figure:
+    """Return one figure of all charts, each with its title, its legend and its axes."""
+    heights = [chart.height / _PIXELS + 0.4 for chart in charts]
+    figure = Figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
+    rows = figure.subplots(len(charts), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for axes, chart in zip(rows, charts, strict=True):
+        _draw_chart(axes, chart)
+    return figure
+
+
+def _draw_chart(axes: Any, chart: Chart) -> None:
+    axes.grid(axis="y", color=_GRID, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    bars = [part for part in chart.parts if isinstance(part, Bars)]
+    for number, each in enumerate(bars):
+        _draw_bars(axes, each, number, len(bars))
+    for part in chart.parts:
+        if not isinstance(part, Bars):
+            _draw(part, axes)
+    _scale(axes, "x", chart.x)
+    _scale(axes, "y", chart.y)
+    axes.set_title(chart.title, loc="left", fontsize=10, pad=6.0 + _LEGEND_ROW * _draw_legend(axes))
+
+
+def _draw_legend(axes: Any) -> int:
+    """Draw the legend above the axes, where there is more than one thing to tell apart, and return its rows."""
+    _, labels = axes.get_legend_handles_labels()
+    if len(labels) < 2:
+        return 0
+    columns = max(1, int(_LEGEND_WIDTH / (_LINE + _LETTER * max(map(len, labels)))))
+    place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
+    axes.legend(ncols=columns, frameon=False, fontsize=8, **place)
+    return -(-len(labels) // columns)
+
+
+def _scale(axes: Any, which: str, axis: Axis) -> None:
+    axes.set(**{f"{which}label": axis.label})
+    if axis.is_logarithmic:
+        axes.set(**{f"{which}scale": "log"})
+    if axis.ticks:
+        axes.set(**{f"{which}ticks": axis.ticks, f"{which}ticklabels": [f"{tick:g}" for tick in axis.ticks]})
+    if axis.limits is not None:
+        axes.set(**{f"{which}lim": axis.limits})
+
+
+@singledispatch
+def _draw(part: object, axes: Any) -> None:
+    raise TypeError(f"cannot draw {part!r} on {axes}")
+
+
+@_draw.register
+def _(curve: Curve, axes: Any) -> None:
+    if curve.is_shown:
+        style = {"color": curve.stroke.colour, "linestyle": _PATTERNS[curve.stroke.dash]}
+        axes.plot(*curve.points, linewidth=_THINNER * curve.stroke.width, label=curve.name, **style)
+
+
+@_draw.register
+def _(points: Points, axes: Any) -> None:
+    style = {"color": points.colour, "marker": _SYMBOLS[points.symbol], "markersize": _THINNER * points.size}
+    axes.plot(points.x, points.y, linestyle="none", label=points.name, **style)
+
+
+@_draw.register
+def _(ticks: Ticks, axes: Any) -> None:
+    style = {"color": MARK, "linewidth": 0.6, "linestyle": _PATTERNS[ticks.dash], "label": ticks.name}
+    axes.vlines(ticks.x, 0.0, ticks.share, transform=axes.get_xaxis_transform(), **style)
+
+
+@_draw.register
+def _(band: Band, axes: Any) -> None:
+    look = {"alpha": 1.5 * INTERVAL_OPACITY, "linewidth": 0, "zorder": 0.5}
+    axes.axvspan(band.start, band.end, color=INTERVAL, label="interval of interest", **look)
+
+
+@_draw.register
+def _(level: Level, axes: Any) -> None:
+    style = {"color": level.colour, "linewidth": 0.8, "linestyle": "--"}
+    if level.is_upright:
+        axes.axvline(level.at, **style)
+        place = {"rotation": 90, "ha": "right", "va": "top", "transform": axes.get_xaxis_transform()}
+        axes.text(level.at, 0.98, level.text, fontsize=8, **place)
+    else:
+        axes.axhline(level.at, **style)
+        axes.text(0.0, level.at, f" {level.text}", fontsize=8, va="bottom", transform=axes.get_yaxis_transform())
+
+
+def _draw_bars(axes: Any, bars: Bars, number: int, count: int) -> None:
+    """Draw bars that stand beside the others of the chart."""
+    is_named = isinstance(bars.x, tuple)
+    x = np.arange(float(len(bars.x))) if is_named else np.asarray(bars.x)
+    gap = float(np.diff(np.unique(x)).min()) if len(np.unique(x)) > 1 else 1.0
+    width = (bars.width or 0.9 * gap) / count
+    look = {"color": COLOURS[bars.index % len(COLOURS)], "hatch": _HATCHES[bars.index % len(_HATCHES)]}
+    places = x + (number - 0.5 * (count - 1)) * width
+    axes.bar(places, bars.y, width, label=bars.name, edgecolor="white", linewidth=0.3, **look)
+    if is_named:
+        axes.set_xticks(x, bars.x)

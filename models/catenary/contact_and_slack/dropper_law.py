@@ -1,0 +1,120 @@
+"""What droppers carry, taut and slack.
+
+A dropper pulls T = k e + c e', with e its elongation, where spring and damper go slack together, and T = k e where its
+spring does so alone. One that would push lacks f = max(0, -(1 - r) T) to that, with r its stiffness ratio in
+compression. Those forces f are unknowns of a step; here is what is linear.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from models.arrays import FloatArray, IntArray
+from models.catenary.linear_motion.sparse_products import Product
+from models.numerics.newmark import Newmark
+
+
+class DropperLaw:
+    """The droppers of a line about its static shape.
+
+    Parameters
+    ----------
+    B : sparse, shape (n_droppers, n_attached)
+        Rows of dropper elongation over the attachments' displacements.
+    stiffness : ndarray, shape (n_droppers,)
+        k [N/m].
+    alpha : float
+        c / k [s].
+    unilateral : ndarray, shape (n_droppers,)
+        1 - r.
+    slack_delay : ndarray, shape (n_droppers,)
+        c / k where spring and damper go slack together [s]; 0 where the spring does so alone.
+    elastic_force, force : ndarray, shape (n_droppers,)
+        At rest: k e, and what the dropper carries [N].
+
+    Attributes
+    ----------
+    B, stiffness, unilateral, slack_delay
+        The parameters.
+    rest_compensation : ndarray, shape (n_droppers,)
+        What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
+    rest_load : ndarray, shape (n_attached,)
+        What that does to the attachments [N].
+    """
+
+    def __init__(
+        self,
+        B: sp.csr_matrix,
+        stiffness: FloatArray,
+        alpha: float,
+        unilateral: FloatArray,
+        slack_delay: FloatArray,
+        elastic_force: FloatArray,
+        force: FloatArray,
+    ) -> None:
+        self.B, self.stiffness = B, stiffness
+        self.unilateral, self.slack_delay = unilateral, slack_delay
+        self._elastic_at_rest = elastic_force
+        self.rest_compensation = force - elastic_force
+        self.rest_load = B.T @ self.rest_compensation
+        #: Elastic forces from the attachments' displacements; those of the dampers from velocities.
+        self._tighten = Product(sp.diags(stiffness) @ B)
+        self._damp = Product(alpha * sp.diags(stiffness) @ B)
+        self._pull = self._pulls()
+        #: What each dropper pulls at.
+        self._stretch = [(row.indices, row.data) for row in B]
+
+    def spring_force(self, displacement: FloatArray) -> FloatArray:
+        """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""
+        force = self._elastic_at_rest.copy()
+        self._tighten.add(displacement, force)
+        return force
+
+    def force(self, attached: FloatArray, slack: IntArray, compensation: FloatArray) -> FloatArray:
+        """Return what every dropper carries [N], its damper's part included, shape (n_droppers,).
+
+        By the law "tension" that is nothing where it is slack; by "elastic_only" what the damper, which knows no slack
+        there, pulls or pushes.
+
+        Parameters
+        ----------
+        attached : ndarray, shape (2, n_attached)
+            Displacements of the attachments and their velocities.
+        slack, compensation : ndarray
+            Which droppers are slack, and their forces f [N].
+        """
+        released, damper = self.spring_force(attached[0]), np.zeros(len(self.stiffness))
+        self._damp.add(attached[1], damper)
+        together = self.slack_delay > 0.0  # spring and damper are released as one
+        released[together] += damper[together]
+        released[slack] = np.where(self.unilateral[slack] == 1.0, 0.0, released[slack] + compensation)
+        return released + np.where(together, 0.0, damper)
+
+    def known_load(self, slack: IntArray, compensation: FloatArray) -> FloatArray:
+        """Return what slack does to the attachments in a step, as far as known [N], shape (n_attached,).
+
+        What a dropper that is slack at rest lacks is part of the static state, so it acts at both ends of the step.
+        """
+        load = 2.0 * self.rest_load
+        for j, force in zip(slack.tolist(), compensation.tolist(), strict=True):
+            places, stretch = self._stretch[j]
+            load[places] -= force * stretch
+        return load
+
+    def pull(self, attached: FloatArray) -> FloatArray:
+        """Return the pulls T at the end of a step that the motion at its beginning makes [N], shape (n_droppers,)."""
+        pull = self._elastic_at_rest.copy()
+        self._pull.add(attached.ravel(), pull)
+        return pull
+
+    def by_change(self, newmark: Newmark) -> FloatArray:
+        """Return what a change of the elongation within a step adds to the pulls T [N/m], shape (n_droppers,)."""
+        return self.stiffness * (1.0 + newmark.a1 * self.slack_delay)
+
+    def _pulls(self) -> Product:
+        """Return k (x - w v), w the delay of the slack: v turns to a1 dx - v in a step."""
+        k = self.stiffness
+        by_velocity = sp.csr_matrix(sp.diags(-k * self.slack_delay) @ self.B)
+        by_velocity.eliminate_zeros()
+        return Product(sp.hstack([sp.diags(k) @ self.B, by_velocity]))

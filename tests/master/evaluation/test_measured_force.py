@@ -1,0 +1,94 @@
+"""Measurements beside simulations: read, filtered alike, compared."""
+
+import numpy as np
+import pytest
+
+from master.errors import MasterError
+from master.evaluation.measured_force import compare_measured, read_measured
+from master.report.charts.measured_charts import comparison_rows
+from tests.master.report.conftest import _made_up
+
+
+def write(path, text):
+    path.write_text(text)
+    return path
+
+
+def as_csv(title, xs, fs):
+    return "\n".join([title, *(f"{x:.6f},{f:.6f}" for x, f in zip(xs, fs, strict=True))])
+
+
+@pytest.fixture
+def signals():
+    return _made_up().signals[0]
+
+
+def test_a_measurement_of_the_simulation_itself_correlates_fully(signals, tmp_path):
+    over_x = write(tmp_path / "x.csv", as_csv("position [m],force [N]", signals.position, signals.raw))
+    over_t = write(tmp_path / "t.csv", as_csv("time [s],force [N]", signals.time, signals.raw))
+    for path in (over_x, over_t):
+        found = compare_measured(signals, read_measured(path))
+        assert found.correlation == pytest.approx(1.0, abs=1e-6)
+        assert found.rms < 0.01
+        assert found.start == pytest.approx(50.0, abs=0.07)
+
+
+def test_units_separators_and_further_columns(signals, tmp_path):
+    rows = [f"{x / 1e3:.7f};7;{f / 1e3 + 0.01:.7f}" for x, f in zip(signals.position, signals.raw, strict=True)]
+    path = write(tmp_path / "m.csv", "\ufeffposition [km];mark;Force (kN)\n" + "\n".join(rows) + "\n\n")
+    found = compare_measured(signals, read_measured(path))
+    rows = {r[0]: r[1:] for r in comparison_rows(found)}
+    assert rows["mean force [N]"][2] == "-10.0"
+    assert rows["standard deviation [N]"][2] == "+0.0"
+    assert rows["correlation"][2] == "1.000"
+
+
+@pytest.mark.parametrize(("every", "gap", "is_coarse"), [(1, None, False), (20, None, False), (40, None, True),
+                                                         (1, (70.0, 72.4), True)])  # fmt: skip
+def test_rows_too_far_apart_for_the_filter_are_told(signals, tmp_path, every, gap, is_coarse):
+    """20 Hz needs a row every 25 ms at least; at 60 m/s a gap of 2.4 m takes 40 ms."""
+    kept = np.zeros(len(signals.time), dtype=bool)
+    kept[::every] = True
+    if gap is not None:
+        kept &= (signals.position < gap[0]) | (signals.position > gap[1])
+    for title, there in (("time [s]", signals.time), ("position [m]", signals.position)):
+        path = write(tmp_path / "m.csv", as_csv(f"{title},force [N]", there[kept], signals.raw[kept]))
+        found = compare_measured(signals, read_measured(path))
+        assert bool(found.coarse) == is_coarse
+        assert not is_coarse or "40 ms apart; 20 Hz needs at most 25 ms" in found.coarse.replace("41 ms", "40 ms")
+        assert found.part == ""
+
+
+def test_a_measurement_of_a_part_of_the_interval_is_told(signals, tmp_path):
+    half = signals.position < 80.0
+    path = write(tmp_path / "m.csv", as_csv("time [s],force [N]", signals.time[half], signals.raw[half]))
+    assert "only 49.9 % of the interval" in compare_measured(signals, read_measured(path)).part
+
+
+def test_noise_above_20_hz_does_not_disturb(signals, tmp_path):
+    noise = 40.0 * np.sin(2 * np.pi * 80.0 * signals.time)
+    path = write(tmp_path / "m.csv", as_csv("time [s],force [N]", signals.time, signals.raw + noise))
+    assert compare_measured(signals, read_measured(path)).rms < 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("position [m],speed [m/s]\n1,2\n", "no column named force"),
+        ("force [N]\n1\n", "no column named position or time"),
+        ("time [min],force [N]\n1,2\n2,3\n3,4\n", "unit 'min'"),
+        ("time [s],force [N]\n1,2\n2,x\n3,4\n", "is not a finite number"),
+        ("time [s],force [N]\n1,2\n1,3\n3,4\n", "does not increase"),
+        ("time [s],force [N]\n1,2\n2,nan\n3,4\n", "finite"),
+        ("", "no column named position or time"),
+    ],
+)
+def test_what_is_wrong_with_a_measurement_is_said(tmp_path, text, said):
+    with pytest.raises(MasterError, match=said):
+        read_measured(write(tmp_path / "m.csv", text))
+
+
+def test_a_measurement_elsewhere_is_refused(signals, tmp_path):
+    path = write(tmp_path / "m.csv", "position [m],force [N]\n900,1\n901,2\n902,3\n")
+    with pytest.raises(MasterError, match="outside the interval of interest"):
+        compare_measured(signals, read_measured(path))

@@ -1,0 +1,52 @@
+"""The results folder of a run: whose it is, and what a claim leaves in it."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from master.errors import RequestError
+from master.results.results_folder import GENERATOR, RunFolder, claimed_for_run
+
+
+def summary_of(run):
+    return {"generator": GENERATOR, "run": run}
+
+
+def continued(run, folder):
+    checkpoint = SimpleNamespace(run=run)
+    return SimpleNamespace(checkpoint=checkpoint, file=folder / "checkpoint.state", is_same_run=True)
+
+
+def test_a_new_run_finds_its_folder_empty_and_gets_its_own_identity(tmp_path):
+    folder = tmp_path / "out"
+    with claimed_for_run(folder) as first:
+        first.write_summary(summary_of(first.run))
+        (folder / "timeseries.csv").write_text("time [s]\n0\n")
+        (folder / "notes.txt").write_text("the user's")
+    with claimed_for_run(folder) as second:
+        assert second.run != first.run
+        assert [p.name for p in folder.iterdir() if not p.name.startswith(".")] == ["notes.txt"]
+
+
+def test_a_run_knows_whether_its_results_still_lie_there(tmp_path):
+    with claimed_for_run(tmp_path / "out") as own:
+        assert not own.is_intact  # nothing is written yet
+        own.write_summary(summary_of(own.run))
+        assert own.is_intact
+        own.write_summary(summary_of("another"))
+        assert not own.is_intact
+
+
+def test_only_the_run_of_the_checkpoint_continues_in_its_folder(tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    RunFolder(folder, "first").write_summary(summary_of("first"))
+    (folder / "timeseries.csv").write_text("time [s]\n0\n")
+    with claimed_for_run(folder, continued("first", folder)) as own:
+        assert own.run == "first"
+        assert (folder / "timeseries.csv").exists()
+    with (
+        pytest.raises(RequestError, match="comes from another run"),
+        claimed_for_run(folder, continued("second", folder)),
+    ):
+        pass

@@ -71,6 +71,11 @@ def stroke(index: int, width: float = 1.8) -> Stroke:
     return Stroke(COLOURS[index % len(COLOURS)], dash, width)
 
 
+def fill(index: int) -> tuple[str, int]:
+    """Return colour and number of the hatching (0 to 5) of a chart's bars by their number, no two of 36 alike."""
+    return COLOURS[index % len(COLOURS)], (index + index // len(COLOURS)) % 6
+
+
 @dataclass(frozen=True)
 class Curve:
     """A line through points; NaN interrupts it.
@@ -117,7 +122,7 @@ class Bars:
     x : ndarray or tuple of str, shape (n,)
     y : ndarray, shape (n,)
     index : int
-        Number of colour and hatching.
+        Number of colour and hatching (`fill`).
     width : float, optional
         In units of the abscissa.
     words : tuple of str

@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 
 from master.report.charts.chart import (
-    COLOURS,
     EDGE,
     INTERVAL,
     INTERVAL_OPACITY,
@@ -22,6 +21,7 @@ from master.report.charts.chart import (
     Points,
     Stroke,
     Ticks,
+    fill,
     gapped,
 )
 from master.report.charts.sample_packing import packed
@@ -81,8 +81,8 @@ def _(ticks: Ticks) -> Trace:
 
 @_trace.register
 def _(bars: Bars) -> Trace:
-    pattern = {"shape": _PATTERNS[bars.index % len(_PATTERNS)], "solidity": 0.4}
-    marker = {"color": COLOURS[bars.index % len(COLOURS)], "pattern": pattern}
+    colour, hatching = fill(bars.index)
+    marker = {"color": colour, "pattern": {"shape": _PATTERNS[hatching], "solidity": 0.4}}
     x = list(bars.x) if isinstance(bars.x, tuple) else packed(bars.x)
     trace = {"type": "bar", "name": bars.name, "marker": marker, "x": x, "y": packed(bars.y), "width": bars.width}
     said = {"text": list(bars.words), "textposition": "none", "hovertemplate": "%{text}"}

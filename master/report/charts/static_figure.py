@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from master.report.charts.chart import (
-    COLOURS,
     INTERVAL,
     INTERVAL_OPACITY,
     MARK,
@@ -23,13 +22,14 @@ from master.report.charts.chart import (
     Level,
     Points,
     Ticks,
+    fill,
 )
 
 _WIDTH: Final = 9.0
 #: Pixels of a page that an inch of a file has.
 _PIXELS: Final = 125.0
 #: Points that a legend has for its width, and needs for a row, a letter, and the line beside a name.
-_LEGEND_WIDTH, _LEGEND_ROW, _LETTER, _LINE = 590.0, 13.0, 4.6, 44.0
+_LEGEND_WIDTH, _LEGEND_ROW, _LETTER, _LINE = 610.0, 13.0, 3.8, 44.0
 _GRID: Final = "#e3e5e8"
 #: Curves are thinner on paper than on a screen.
 _THINNER: Final = 0.65
@@ -139,8 +139,8 @@ def _draw_bars(axes: Any, bars: Bars, number: int, count: int) -> None:
     x = np.arange(float(len(bars.x))) if is_named else np.asarray(bars.x)
     gap = float(np.diff(np.unique(x)).min()) if len(np.unique(x)) > 1 else 1.0
     width = (bars.width or 0.9 * gap) / count
-    look = {"color": COLOURS[bars.index % len(COLOURS)], "hatch": _HATCHES[bars.index % len(_HATCHES)]}
-    places = x + (number - 0.5 * (count - 1)) * width
-    axes.bar(places, bars.y, width, label=bars.name, edgecolor="white", linewidth=0.3, **look)
+    colour, hatching = fill(bars.index)
+    look = {"color": colour, "hatch": _HATCHES[hatching], "edgecolor": "white", "linewidth": 0.3}
+    axes.bar(x + (number - 0.5 * (count - 1)) * width, bars.y, width, label=bars.name, **look)
     if is_named:
         axes.set_xticks(x, bars.x)

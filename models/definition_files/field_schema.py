@@ -18,7 +18,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeVar, runtime_checkable
 
@@ -30,6 +30,8 @@ _META = "openpanto"
 #: Names of elements: parts of dotted parameter names.
 _NAME: Final = re.compile(r"[\w-]+")
 XYZ: Final = ("x", "y", "z")
+#: Kind of an element -> its class, or what finds that in the element's table.
+Kinds = Mapping[str, type[Any] | Callable[[Table], type[Any]]]
 T = TypeVar("T")
 
 
@@ -109,8 +111,11 @@ class _Text:
     """A text, one of the choices if there are any."""
 
     choices: Iterable[str] | None
+    filled: bool
 
     def read(self, table: Table, name: str, default: Any) -> Any:
+        if self.filled and table.data.get(name) == "":
+            table.problem(name, "is empty")
         return table.text(name, default=None if default is dataclasses.MISSING else default, choices=self.choices)
 
 
@@ -132,7 +137,7 @@ class _Named:
     """Dataclasses with a name, in tables ``[key.NAME]``; their class may depend on the text ``kind`` in each."""
 
     key: str
-    kinds: type[Any] | Mapping[str, type[Any]]
+    kinds: type[Any] | Kinds
 
     def read(self, table: Table, name: str, default: Any) -> Any:
         every = table.table(self.key)
@@ -150,7 +155,8 @@ class _Named:
             return read(self.kinds, table, name=name)
         kind = table.text("kind", choices=self.kinds)
         if kind in self.kinds:
-            return read(self.kinds[kind], table, name=name)
+            cls = self.kinds[kind]
+            return read(cls if isinstance(cls, type) else cls(table), table, name=name)
         table.accept_all()  # what the other keys mean depends on the kind
         return None
 
@@ -201,9 +207,9 @@ def monitoring() -> Any:
     return count("whether the energy balance is kept, for energy.* and contact.work: 0 no, 1 yes", default=0, maximum=1)
 
 
-def text(*, default: Any = dataclasses.MISSING, choices: Iterable[str] | None = None) -> Any:
-    """Declare a text."""
-    return _field(_Text(choices), default)
+def text(*, default: Any = dataclasses.MISSING, choices: Iterable[str] | None = None, filled: bool = False) -> Any:
+    """Declare a text; where it is ``filled``, an empty one is a mistake."""
+    return _field(_Text(choices, filled), default)
 
 
 def part(cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:
@@ -211,7 +217,7 @@ def part(cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:
     return _field(_Part(cls), default)
 
 
-def named(key: str, kinds: type[Any] | Mapping[str, type[Any]]) -> Any:
+def named(key: str, kinds: type[Any] | Kinds) -> Any:
     """Declare the tables ``[key.NAME]``: a tuple of dataclasses with a ``name``, of the class that ``kind`` says."""
     return _field(_Named(key, kinds), dataclasses.MISSING)
 

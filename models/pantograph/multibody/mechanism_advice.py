@@ -35,10 +35,8 @@ def working_height_warning(mechanism: Mechanism, standing: FloatArray, x: float,
 
 
 def _raised(definition: MechanismDefinition) -> Raised:
-    lift, operation = definition.lift_force, definition.operation
-    is_moment = lift is not None and lift.kind == "actuator_moment"
-    parameter, unit = ("static_moment", "N.m") if is_moment else ("static_force", "N")
-    return Raised(parameter, definition.lift, unit, operation.reference_height, operation.start_position)
+    parameter, unit = ("static_moment", "N.m") if definition.lifts_by_moment else ("static_force", "N")
+    return Raised(parameter, definition.lift, unit, definition.reference_height, definition.start_position)
 
 
 def _force(mechanism: Mechanism, standing: FloatArray, height: float) -> float | None:

@@ -54,6 +54,12 @@ def test_reference_height_at_the_wire_is_the_cure():
     assert said("generic_multibody", 250.0, 5.35, reference_height=5.30) == ""
 
 
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_a_spring_that_carries_the_weights_keeps_a_stiffness(value):
+    with pytest.raises(ParameterError, match=r"'force\.stage_1\.stiffness': .* must be greater than 0"):
+        load_pantograph("CX_multibody").with_values({"force.stage_1.stiffness": value})
+
+
 @pytest.mark.parametrize(
     ("name", "value", "unit"),
     [
@@ -62,7 +68,7 @@ def test_reference_height_at_the_wire_is_the_cure():
         ("joint.slide_1.point_i.x", 200.0, "m"),
         ("force.stage_1.stiffness", 1.7845e9, "N/m"),
         ("force.stage_1.damping", 1.1e6, "N.s/m"),
-        ("force.stage_1.stiffness", -1.0, "N/m"),
+        ("force.stage_1.damping", -1.0, "N.s/m"),
         ("static_force", 1.68e5, "N"),
     ],
 )

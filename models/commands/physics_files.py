@@ -1,4 +1,8 @@
-"""Files that the verbs write: each replaces the old one as a whole or leaves it, and every error names its file."""
+"""Files that the verbs write: each replaces the old one as a whole or leaves it, and every error names its file.
+
+`master.recording.safe_files` writes a run's files by the same rules; the packages do not import each other's tools, so
+the few lines stand in both.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +34,7 @@ def write_whole(path: Path, data: bytes) -> None:
     """
     # A device, such as /dev/null, would be replaced by a file for all users of the computer.
     if path.exists() and not (path.is_file() or path.is_dir()):
-        raise OSError(errno.EEXIST, "this is no file, and is left alone; choose another", str(path))
+        raise OSError(errno.EEXIST, "this is not a regular file and is left alone; choose another", str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART}")  # two commands do not mix
     try:
         with temporary.open("wb") as file:

@@ -210,7 +210,7 @@ def arm_loads(model: CatenaryModel, section: int = 0) -> ArmLoads:
     mesh, static = model.mesh, model.static
     chosen = mesh.section[mesh.arms[:, 1]] == section
     end, node = mesh.arms[chosen].T
-    along = static.points[node] - static.points[end]
+    along = static.shape.points[node] - static.shape.points[end]
     length = np.linalg.norm(along, axis=1)
     along /= length[:, None]
     tension = static.arm_force[chosen]

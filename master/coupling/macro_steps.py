@@ -20,7 +20,7 @@ Status = Literal["complete", "interrupted", "failed", "incomplete"]
 
 
 class Observer(Protocol):
-    """Looks on; outside the loop's logic."""
+    """Watches the loop from outside."""
 
     def begin(self, time: float, network: Network) -> None:
         """After initialization, at the start time."""
@@ -128,7 +128,7 @@ def _run(
     except KeyboardInterrupt:
         return RunOutcome("interrupted", index, grid.time(index))
     except MasterError as error:
-        # An FMU in Python takes the interruption for a failure of its own.
+        # An FMU in Python reports the interruption as if it had failed itself.
         if stop_wanted():
             return RunOutcome("interrupted", index, grid.time(index))
         return RunOutcome("failed", index, grid.time(index), error)
@@ -212,6 +212,6 @@ def _not_finite(names: Sequence[str], values: FloatArray, last_good: FloatArray 
 
 
 def _remarks(network: Network) -> str:
-    """Return what the slaves themselves have said."""
+    """Return what the slaves themselves have reported."""
     said = ((slave.name, slave.remark()) for slave in network.slaves)
     return "; ".join(f"component '{name}' says: {text}" for name, text in said if text)

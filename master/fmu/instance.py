@@ -146,8 +146,8 @@ class Instance:
         """Set up the experiment, set the parameters, enter initialization mode."""
         self.time = start
         tolerance = self.component.tolerance
-        told = (0, 0.0) if tolerance is None else (1, tolerance)
-        self._call("setting up the experiment", "fmi2SetupExperiment", *told, start, 1, stop)
+        wanted = (0, 0.0) if tolerance is None else (1, tolerance)
+        self._call("setting up the experiment", "fmi2SetupExperiment", *wanted, start, 1, stop)
         for name, value in self.component.parameters.items():
             self._set(self.component.fmu.variables[name], value)
         self._call("entering initialization", "fmi2EnterInitializationMode")

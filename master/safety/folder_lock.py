@@ -88,7 +88,9 @@ def claimed(folder: Path, remedy: str = "choose another with --out") -> Iterator
     finally:
         del _held[key]
         with suppress(OSError):  # the folder is gone, or (Windows) the file is open
-            if os.path.samestat(os.fstat(lock), (folder / LOCK).stat()):  # not another's, in a folder made anew
+            if os.path.samestat(
+                os.fstat(lock), (folder / LOCK).stat()
+            ):  # not another's, in a new folder of the same name
                 (folder / OWNER).unlink()
                 (folder / LOCK).unlink()
         os.close(lock)

@@ -67,7 +67,7 @@ def atomic_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
 
 
 def cannot_write(path: Path, error: OSError, elsewhere: str = _ELSEWHERE) -> MasterError:
-    """Return the error that tells the user which file cannot be written, why, and what to do."""
+    """Return the error that says which file cannot be written, why, and what to do."""
     remedy = "make room there, or choose" if error.errno in _NO_ROOM else "choose"
     return MasterError(f"{path} cannot be written ({error.strerror or error}); {remedy} {elsewhere}")
 
@@ -93,7 +93,7 @@ def safe_cell(text: str) -> str:
 
 
 def plain_cell(cell: str) -> str:
-    """Return the text of which `safe_cell` has made a cell."""
+    """Return the text that `safe_cell` was given."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
@@ -108,7 +108,7 @@ class AppendOnlyFile:
     path : Path
         The file.
     keep : int, optional
-        Bytes of an existing file to keep and to go on after; 0 for a new file.
+        Bytes of an existing file to keep and to append to; 0 for a new file.
 
     Raises
     ------

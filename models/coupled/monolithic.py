@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import BoolArray, FloatArray
-from models.catenary.line_model import CatenaryModel, ContactResult, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import ContactResult, StripMotion
 from models.contact_law import application_point
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState

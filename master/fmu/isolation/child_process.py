@@ -22,9 +22,9 @@ from master.safety.supervision import signal_text
 
 #: Seconds that a process has to be gone after its connection has ended.
 _ENDING_SECONDS: Final = 5.0
-#: Seconds that a process has to end by itself once it was told to, or its connection was closed.
+#: Seconds that a process has to end by itself once it was asked to, or its connection was closed.
 _GRACE_SECONDS: Final = 2.0
-#: Variable of the environment that tells whose child a process is, whatever it has become since.
+#: Environment variable that says whose child a process is, whatever it has become since.
 _MARK: Final = "OPENPANTO_ISOLATED"
 #: What is kept of what an FMU prints: this many pieces of at most so many bytes.
 _PIECES: Final = 4
@@ -117,7 +117,7 @@ def _end_group(group: int) -> None:
 
 
 def marked_processes(folder: str) -> Iterator[int]:
-    """Yield the processes that were started with a folder's mark, also in sessions of their own (on Linux)."""
+    """Yield the processes that were started with a folder's mark, also in other sessions (on Linux)."""
     mark = f"{_MARK}={folder}\0".encode()
     for path in Path("/proc").glob("[0-9]*/environ"):
         with suppress(OSError):

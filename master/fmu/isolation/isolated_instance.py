@@ -97,7 +97,7 @@ class IsolatedGroup:
 
 
 class IsolatedInstance:
-    """An FMU in a process of its own; a `Slave` with the order of calls, the texts and the figures of `Instance`.
+    """An FMU in a separate process; a `Slave` with the order of calls, the texts and the figures of `Instance`.
 
     A step is one message there and one back: inputs go with it, and outputs and what is recorded come back with its
     end. The answer is awaited when it is needed, so that scheme jacobi has its components step at the same time.
@@ -142,7 +142,7 @@ class IsolatedInstance:
         try:
             self._process = Process()
         except OSError as error:
-            raise SlaveError(f"{self._who} cannot be given a process of its own ({error})") from error
+            raise SlaveError(f"{self._who} cannot be given a separate process ({error})") from error
         self._channel = self._process.channel
         self._limit(isolation.init_timeout, "--init-timeout")
         self._lay_out()
@@ -176,7 +176,7 @@ class IsolatedInstance:
         self._limit(self._isolation.step_timeout, "--step-timeout")
 
     def write(self) -> None:
-        """Take the bound inputs; the FMU is told them with the next message."""
+        """Take the bound inputs; the FMU receives them with the next message."""
         self._settle()
         self._request_inputs[:] = self._inputs
         self._has_inputs = True

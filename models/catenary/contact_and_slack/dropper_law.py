@@ -1,8 +1,9 @@
 """What droppers carry, taut and slack.
 
-A dropper pulls T = k e + c e', with e its elongation, where spring and damper go slack together, and T = k e where its
-spring does so alone. One that would push lacks f = max(0, -(1 - r) T) to that, with r its stiffness ratio in
-compression. Those forces f are unknowns of a step; here is what is linear.
+A dropper of elongation e that could push as well would pull T: the elastic force k e where the spring goes slack
+alone, and k e + c e' where its damper does so too. Within a step the rate e' is a1 times the change of the elongation
+plus what is known, so that T is linear in both cases. A slack dropper lacks f = max(0, -(1 - r) T) to that, with r its
+stiffness ratio in compression: the forces f are unknowns of the local problem.
 """
 
 from __future__ import annotations

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
-from models.arrays import BoolArray, FloatArray, IntArray, Snapshot
+from models.arrays import BoolArray, FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.dropper_law import DropperLaw
 from models.catenary.contact_and_slack.local_problem import (
@@ -20,6 +20,7 @@ from models.catenary.contact_and_slack.local_problem import (
 )
 from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.mode_finding import line_modes
@@ -44,81 +45,6 @@ from models.numerics.newmark import Newmark
 _KEPT_STEPS = 3
 #: No forces on the contact wires.
 _NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
-
-
-@dataclass
-class CatenaryState:
-    """State of a line, changed in place by a step.
-
-    Attributes
-    ----------
-    motion : LineMotion
-    slack : ndarray of int
-        Slack droppers.
-    compensation : ndarray
-        What each of them lacks to the force that it would carry if it could push [N].
-    element : ndarray of int, shape (n_pantographs, n_sections)
-        Element of the contact wire met last.
-    impact_velocity : ndarray, shape (n_pantographs, n_sections)
-        Velocity at impact of the closed contacts [m/s], 0 where open.
-    loaded : ndarray of int, shape (k, 2)
-        Section and element of every force on a contact wire.
-    load : ndarray, shape (k, 2)
-        Its place on the element, xi, and its value [N].
-    """
-
-    motion: LineMotion
-    slack: IntArray
-    compensation: FloatArray
-    element: IntArray
-    impact_velocity: FloatArray
-    loaded: IntArray
-    load: FloatArray
-
-    def snapshot(self) -> Snapshot:
-        """Return copies of all arrays."""
-        return {name: getattr(self, name).copy() for name in self._arrays()} | self.motion.snapshot()
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Take over the arrays of a snapshot."""
-        self.motion.restore(snapshot)
-        for name in self._arrays():
-            setattr(self, name, snapshot[name].copy())
-
-    def _arrays(self) -> Iterator[str]:
-        return (item.name for item in fields(self) if item.name != "motion")
-
-
-@dataclass
-class ContactResult:
-    """Contacts of one step.
-
-    Attributes
-    ----------
-    force : ndarray, shape (n_pantographs, n_sections)
-        Contact force [N].
-    point : ndarray, shape (n_pantographs, n_sections, 3)
-        Point of contact on the wire, NaN where strip and wire do not cross [m].
-    """
-
-    force: FloatArray
-    point: FloatArray
-
-
-@dataclass
-class StripMotion:
-    """Strips at the end of a step, were there no contact force within it.
-
-    Attributes
-    ----------
-    strip : ndarray, shape (n_pantographs, 2, 2, 3)
-        End A, B; position, velocity; x, y, z.
-    compliance : ndarray, shape (n_pantographs,)
-        How far a strip gives way within the step per force [m/N]; 0 for prescribed strips.
-    """
-
-    strip: FloatArray
-    compliance: FloatArray
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu, spsolve
 
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import StripMotion
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import weight
 from models.catenary.shape.line_mesh import CatenaryMesh, Chain

@@ -9,8 +9,9 @@ import scipy.sparse as sp
 
 from models.catenary.definition.line_reading import read
 from models.catenary.line_energy import LineBalance
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
+from models.catenary.line_state import StripMotion
 from models.catenary.linear_motion.attachment_solver import Banded, Cyclic, factorised
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.shape.beam_elements import NODE_DOFS

@@ -8,7 +8,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import StripMotion
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, find_form, weight
 from models.catenary.shape.line_matrices import assemble

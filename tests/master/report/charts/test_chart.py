@@ -63,6 +63,15 @@ def test_colours_are_told_apart_without_red_or_green(sight):
     assert min(apart.values()) > 6.0 * 2.3, min(apart, key=apart.get)
 
 
+def test_twelve_bars_can_be_told_apart_on_a_page_and_in_a_file():
+    drawn = chart(*(Bars(f"run {i}", ("mean",), X[:1], i) for i in range(12)), x=Axis("figure"))
+    markers = [trace["marker"] for trace in interactive_figure(drawn)["data"]]
+    (axes,) = static_figure([drawn]).axes
+    in_file = [(to_hex(bar.get_facecolor()), bar.get_hatch()) for bars in axes.containers for bar in bars]
+    assert len({(m["color"], m["pattern"]["shape"]) for m in markers}) == len(set(in_file)) == 12
+    assert [colour for colour, _ in in_file] == [m["color"] for m in markers]
+
+
 def test_both_renderers_draw_the_same_numbers_over_the_same_axes():
     drawn = chart(Curve("one", X, X**2, stroke(0)), Ticks("support", X[::5]), Level(0.5, "limit"))
     (axes,) = static_figure([drawn]).axes

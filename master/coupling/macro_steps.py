@@ -13,7 +13,7 @@ from master.arrays import FloatArray
 from master.coupling.coupling_schemes import Algorithm, initialise
 from master.coupling.network import Network
 from master.errors import MasterError, RunError
-from master.safety.interruption import heeded_at_once
+from master.safety.interruption import interruptible_at_once
 from master.safety.supervision import phase
 
 Status = Literal["complete", "interrupted", "failed", "incomplete"]
@@ -113,7 +113,7 @@ def _run(
 ) -> RunOutcome:
     index = grid.first
     try:
-        with phase("loading"), heeded_at_once():
+        with phase("loading"), interruptible_at_once():
             prepare(network, algorithm, grid)
         check_finite(network, grid.begin, None)
         check_inputs(network, grid.begin, None)

@@ -27,7 +27,7 @@ from master.safety.interruption import end_signals, raise_on_signals
 _PR_SET_PDEATHSIG: Final = 1
 #: Phases in which native code may keep the child from reacting to a signal, and how long it may [s].
 _PATIENCE: Final = {"loading": 2.0, "stepping": 10.0, "closing": 10.0}
-#: Seconds that a child which has finished has to be gone.
+#: Seconds within which a child that has finished has to be gone.
 _ENDING_SECONDS: Final = 10.0
 
 #: Where the child reports to its parent what it does; None without supervision.
@@ -45,12 +45,12 @@ def supervised(work: Callable[[], int]) -> int:
         return work()
     reports, _reports = os.pipe()
     parent = os.getpid()
-    # None may come before somebody is there to take it.
+    # No signal may arrive before a handler is there.
     signal.pthread_sigmask(signal.SIG_BLOCK, end_signals())
     child = os.fork()
     if child == 0:
         os.close(reports)
-        os.setpgid(0, 0)  # the terminal's Ctrl-C comes by way of the parent, and so only once
+        os.setpgid(0, 0)  # the terminal's Ctrl-C arrives through the parent, and so only once
         die_with(parent)
         return _worked(work)
     os.close(_reports)
@@ -58,7 +58,7 @@ def supervised(work: Callable[[], int]) -> int:
 
 
 def _fill_standard_streams() -> None:
-    """Open what the caller has closed (``>&-``): else the next file would be it, and take what FMUs print."""
+    """Open what the caller has closed (``>&-``): else the next file opened would receive what FMUs print."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
@@ -68,7 +68,7 @@ def _fill_standard_streams() -> None:
 
 
 def die_with(parent: int) -> None:
-    """End this process when its parent ends, even in an endless loop; elsewhere than on Linux only if it has ended."""
+    """End this process with its parent, even in an endless loop; on other systems than Linux only if that has ended."""
     if sys.platform == "linux":
         import ctypes
 
@@ -180,7 +180,7 @@ class _Supervisor:
             os.kill(self._child, number)
 
     def _listen(self, seconds: float | None) -> None:
-        """Wait for a signal or a report, and take what has come."""
+        """Wait for a signal or a report, and process what has arrived."""
         ready, _, _ = select.select(self._sources, [], [], seconds)
         for source in ready:
             piece = os.read(source, 65536)

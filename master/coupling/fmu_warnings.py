@@ -1,4 +1,4 @@
-"""What the FMUs of a run warn of, and values that cannot be.
+"""Warnings of the FMUs of a run, and values that cannot be right.
 
 An FMU is asked when initialization and the first step are over, and once more at the end.
 """
@@ -21,15 +21,15 @@ LARGEST: Final = 1e15
 
 @dataclass(frozen=True)
 class FmuWarning:
-    """What an FMU has warned of.
+    """A warning from an FMU.
 
     Attributes
     ----------
     component : str
     text : str
-        In the FMU's own words.
+        What it said.
     is_own : bool
-        Whether they are: how an FMU ended it does not say itself.
+        Whether the FMU said it itself; how its termination went it does not say.
     """
 
     component: str
@@ -43,7 +43,7 @@ class FmuWarning:
 
 
 class Excess(FmuWarning):
-    """What was seen in an FMU's values, which has not warned of it itself; the text begins with the variable."""
+    """A value of an FMU that cannot be right, which it has not warned of itself; the text begins with the variable."""
 
     def __str__(self) -> str:
         return f"warning: component '{self.component}': {self.text}"
@@ -85,7 +85,7 @@ class FmuWarningObserver:
             self._look(network)
 
     def finish(self) -> None:
-        """Ask for what was said since the first step; one that cannot answer any more has said why it failed."""
+        """Ask for what was said since the first step; one that can no longer answer has said why it failed."""
         if self._network is not None:
             with suppress(MasterError):
                 self._look(self._network)

@@ -72,7 +72,7 @@ class Network:
     Attributes
     ----------
     inputs : ndarray, shape (n_inputs,)
-        What the slaves were last told.
+        What the slaves received last.
     outputs : ndarray, shape (n_outputs,)
         What the slaves last said.
     input_names, output_names : tuple of str
@@ -107,7 +107,7 @@ class Network:
             self.inputs += self._offset
 
     def converted(self, outputs: FloatArray) -> FloatArray:
-        """Return what the inputs would be told if the outputs were these, shape (n_inputs,)."""
+        """Return what the inputs would be if the outputs were these, shape (n_inputs,)."""
         with np.errstate(over="ignore", invalid="ignore"):  # who asks looks whether it is finite
             return np.take(outputs, self._from) * self._factor + self._offset
 

@@ -18,7 +18,7 @@ from master.ssp.ssp_xml import XmlError, is_one_line, safe_root
 from master.system.components import Fmu, Variable
 
 _DESCRIPTION: Final = "modelDescription.xml"
-#: What FMPy raises without words of its own where it misses something.
+#: What FMPy raises without a message where something is missing.
 _UNWORDED: Final = (TypeError, AttributeError, LookupError, AssertionError)
 #: FMI 2.0 wants a C identifier; a path would lead out of the FMU.
 _IDENTIFIER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -87,7 +87,7 @@ def _tolerance(experiment: Any | None) -> float | None:
 
 
 def _units(defined: Sequence[Any], file: str) -> dict[str, Unit]:
-    """Return the units that an FMU defines in SI units; of others it tells no more than the name."""
+    """Return the units that an FMU defines in SI units; of others it gives no more than the name."""
     found = {}
     for unit in defined or ():
         base = unit.baseUnit

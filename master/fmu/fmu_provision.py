@@ -1,4 +1,4 @@
-"""Having the FMUs that a scenario names: asks ``python -m fmus`` for those that are missing or stale.
+"""Provide the FMUs that a scenario names; ``python -m fmus`` builds those that are missing or stale.
 
 This is the only thing the master wants from ``fmus``, and it does without: a foreign FMU, of which ``fmus``
 knows nothing, is used as it is.
@@ -48,9 +48,9 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
     ----------
     path : Path
     tell : callable
-        Is told what takes time, and what is kept.
+        Called with what takes time, and what is kept.
     scratch : Path, optional
-        Folder to build into instead, where nothing may be written beside ``path``.
+        Folder to build into instead, where nothing may be written next to ``path``.
 
     Returns
     -------
@@ -66,13 +66,13 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
         return path
     origin = _origin(path)
     if origin is not None and not origin.definition.is_file():
-        tell(f"{path.name} is used as it is: {origin.definition}, which it was built from, is not there")
+        tell(f"{path.name} is used as it is: {origin.definition}, which it was built from, is missing")
         return path
     wanted = fingerprint(origin.definition.as_posix(), origin.pantographs) if origin else fingerprint(path.stem)
     if wanted is None or (path.is_file() and _matches(wanted, stored_guid(path))):
         return path
     if path.exists() and (why := why_not_ours(path)):
-        tell(f"{path.name} is used as it is: {why}; to have it built anew, remove it")
+        tell(f"{path.name} is used as it is: {why}; to have it rebuilt, remove it")
         return path
     place = scratch / path.name if scratch else path
     tell(f"building {path.name}" + (" again: its sources have changed" if path.is_file() else ""))
@@ -160,7 +160,7 @@ def fingerprint(name: str, pantographs: str = "") -> str | None:
     Raises
     ------
     ValueError
-        With the builder's own words, if it knows the name but cannot tell.
+        With the builder's own words, if it knows the name but cannot say.
     """
     try:
         answer = _fmus("fingerprint", "--if-known", *_ports(pantographs), "--", name, seconds=_ASK_SECONDS)

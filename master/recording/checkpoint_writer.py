@@ -16,15 +16,15 @@ from master.system.step_rounding import ROUNDING, steps_in
 
 
 class StatefulObserver(Protocol):
-    """An observer whose work has to go on where it was."""
+    """An observer that has to continue where it was."""
 
     name: str
 
     def save(self) -> list[float | None]:
-        """Return what it remembers from step to step."""
+        """Return what the observer keeps from step to step."""
 
     def restore(self, memory: Sequence[float | None]) -> None:
-        """Take such a memory back."""
+        """Restore what `save` returned."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class CheckpointObserver:
         """Nothing to save yet."""
 
     def observe(self, index: int, time: float, network: Network) -> None:
-        """Write one if it is time."""
+        """Write a checkpoint if one is due."""
         if index in self.schedule:
             write(self.path, self.take(network, index))
 

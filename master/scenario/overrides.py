@@ -129,7 +129,7 @@ def with_energy(components: tuple[Component, ...], settings: RunSettings) -> tup
     """Make the components that can keep their energy balance do so, and record it."""
     able = [ENERGY_MONITOR in c.fmu.variables for c in components]
     if not any(able):
-        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{ENERGY_MONITOR}'; build them anew")
+        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{ENERGY_MONITOR}'; build them again")
     watched = tuple(
         replace(c, parameters={**c.parameters, ENERGY_MONITOR: 1}) if can else c
         for c, can in zip(components, able, strict=True)
@@ -188,7 +188,7 @@ def _whole(full: str, text: str) -> int:
 
 
 def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
-    """Return a number in the FMU's unit from a text with or without a unit of its own."""
+    """Return a number in the FMU's unit from a text with or without a unit."""
     number, unit = split_quantity(text)
     if number is None:
         example = f", or a number with its unit ('{variable.start or 1} {variable.unit}')" if variable.unit else ""

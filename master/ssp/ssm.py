@@ -87,8 +87,8 @@ def apply(entries: tuple[Entry, ...], given: ParameterSet, prefix: str, reader: 
     prefix : str
         Put before the names of the set's parameters.
     reader : Reader
-        Is told of transformations of what is no number, and warned, in one sentence each, of entries without a
-        parameter and of parameters without an entry.
+        Receives a problem for every transformation of what is no number, and one warning each for entries without a
+        parameter and for parameters without an entry.
     """
     mapped = []
     _check_targets(entries, reader)

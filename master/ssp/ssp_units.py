@@ -156,7 +156,7 @@ def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
     for unit in declared:
         other = first.setdefault(unit.name, unit)
         where = f"{other.file}, line {other.line}" if other.line else other.file
-        if other.dimension != unit.dimension and other.line:  # many tools tell no more of an FMU's unit than its name
+        if other.dimension != unit.dimension and other.line:  # many tools give no more of an FMU's unit than its name
             yield unit, f"measures something else in {where}"
         elif other.dimension == unit.dimension and not _agree(other, unit):
             yield unit, f"is declared with {_scale(unit)} here, with {_scale(other)} in {where}"
@@ -177,7 +177,7 @@ def unusual(unit: Unit) -> str:
 
 
 def unlike(unit: Unit, other: Unit) -> str:
-    """Return how two FMUs' units of one name differ, empty if they do not; many tools tell no more than the name."""
+    """Return how two FMUs' units of one name differ, empty if they do not; many tools give no more than the name."""
     if unit.dimension[:-1] != other.dimension[:-1]:  # but for angles
         return "measures something else" if any(unit.dimension) and any(other.dimension) else ""
     return (

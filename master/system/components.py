@@ -25,7 +25,7 @@ class Variable:
     """A variable of an FMU, as its modelDescription.xml declares it.
 
     ``initial`` is that of the standard where the file leaves it open; ``items`` are those of an enumeration;
-    ``is_difference`` tells a relative quantity, to which the offset of its unit does not apply.
+    ``is_difference`` marks a relative quantity, to which the offset of its unit does not apply.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Fmu:
 class Component:
     """An FMU in the system: its name, parameter values (in the FMU's units) and exchanged variables.
 
-    ``tolerance`` is what the FMU is told when the experiment is set up, None for nothing.
+    ``tolerance`` is passed to the FMU when the experiment is set up; None for none.
     """
 
     name: str

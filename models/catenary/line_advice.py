@@ -11,7 +11,7 @@ from typing import Final, Protocol
 
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition, Contact
-from models.catenary.statics.elasticity import OPERATION_LIMIT, contact_wire_wave_speed
+from models.catenary.statics.wire_waves import OPERATION_LIMIT, contact_wire_wave_speed
 
 #: Contact force at which the stiffness of a law with an exponent is taken [N].
 _REFERENCE_FORCE: Final = 200.0

@@ -104,7 +104,7 @@ def _sharing(key: str, done: Results, e: StudyEntry) -> Chart:
     count = forces.shape[1]
     curves = [Curve(f"section {s + 1}", position[near], forces[near, s], stroke(s)) for s in range(count)]
     curves.append(Curve("total", position[near], forces[near].sum(axis=1), stroke(count, 1.2)))
-    title = f"From wire to wire, {e.variant}, {e.pantograph}"
+    title = f"From wire to wire, {e.name}"
     return Chart(key, title, TRACK, Axis("contact force, as computed", "N"), tuple(curves), height=340)
 
 

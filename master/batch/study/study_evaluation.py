@@ -68,6 +68,11 @@ class StudyEntry:
         return self.assessment.contact.pantograph
 
     @property
+    def name(self) -> str:
+        """Variant and pantograph."""
+        return f"{self.variant}, {self.pantograph}"
+
+    @property
     def quality(self) -> Quality:
         """The figures of the contact force."""
         return self.assessment.quality

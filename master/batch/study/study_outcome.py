@@ -67,6 +67,11 @@ class StudyOutcome(BatchState):
         """Return the figures of all pantographs of all variants in an interval."""
         return tuple(e for d in self.done for e in entries(d.name, d.results, interval))
 
+    @property
+    def all_entries(self) -> tuple[StudyEntry, ...]:
+        """The figures of all pantographs of all variants, interval by interval."""
+        return tuple(e for interval in self.family.settings.interval for e in self.entries(interval))
+
 
 def shown(value: float | None, decimals: int) -> str:
     """Return a figure as text."""
@@ -99,7 +104,7 @@ def filter_remarks(found: Sequence[StudyEntry]) -> list[str]:
     """Return remarks on extremes and verdicts that depend on the filter, with the figures of other filters."""
     remarks = []
     for e in found:
-        who = f"{e.variant}, {e.pantograph}"
+        who = e.name
         others = "; ".join(
             f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.filter_dependent
         )
@@ -201,7 +206,7 @@ def as_data(outcome: StudyOutcome) -> dict[str, Any]:
             for d in outcome.done
         ],
         "failures": dict(outcome.failures),
-        "figures": [_entry_data(e) for i in outcome.family.settings.interval for e in outcome.entries(i)],
+        "figures": [_entry_data(e) for e in outcome.all_entries],
     }
 
 

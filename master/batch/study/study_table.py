@@ -28,9 +28,9 @@ def show(console: Console, outcome: StudyOutcome) -> None:
             console.print(figures_table(interval, found, outcome))
         if beside := differences(found):
             console.print(differences_table(beside))
-    if sharing := [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing]:
+    if sharing := [e for e in outcome.all_entries if e.sharing]:
         console.print(sharing_table(sharing))
-    for remark in filter_remarks([e for i in outcome.family.settings.interval for e in outcome.entries(i)]):
+    for remark in filter_remarks(outcome.all_entries):
         console.print(remark, markup=False, soft_wrap=True)
     for sentence in filters(outcome):
         console.print(f"filter: {sentence}", markup=False, soft_wrap=True)
@@ -50,16 +50,8 @@ def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: Stud
         uplift = shown(None if e.uplift is None else 1e3 * e.uplift, 0)
         slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
         style = "" if e.assessment.passed else "yellow"
-        table.add_row(_name(e), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
+        table.add_row(escape(e.name), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
     return table
-
-
-def _name(e: StudyEntry) -> str:
-    return escape(_name_of(e))
-
-
-def _name_of(e: StudyEntry) -> str:
-    return f"{e.variant}, {e.pantograph}"
 
 
 def _failing(found: Sequence[StudyEntry], title: str) -> str:
@@ -68,8 +60,8 @@ def _failing(found: Sequence[StudyEntry], title: str) -> str:
     for e in found:
         for criterion in e.assessment.criteria:
             if not criterion.passed:
-                failing.setdefault(criterion.name, []).append(f"{e.variant}, {e.pantograph}")
-    withheld = [f"{_name_of(e)}: {e.assessment.withheld}" for e in found if e.assessment.withheld]
+                failing.setdefault(criterion.name, []).append(e.name)
+    withheld = [f"{e.name}: {e.assessment.withheld}" for e in found if e.assessment.withheld]
     not_judged = "".join(f"\nnot judged: {text}" for text in withheld)
     if not failing:
         others = "all others pass" if withheld else "all pass"
@@ -96,7 +88,7 @@ def sharing_table(found: Sequence[StudyEntry]) -> Table:
     for e in found:
         if (s := e.sharing) is not None:
             numbers = (f"{s.start:.1f}", f"{s.end:.1f}", f"{s.duration:.3f}", " ".join(map(str, s.losses)))
-            table.add_row(_name(e), *numbers, f"{s.least_force:.0f}")
+            table.add_row(escape(e.name), *numbers, f"{s.least_force:.0f}")
     return table
 
 

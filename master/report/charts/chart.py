@@ -8,7 +8,7 @@ stands out on a dark page too), bars in hatching: charts survive a grey printer 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 
@@ -19,14 +19,10 @@ Dash = Literal["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"]
 
 COLOURS: Final = ("#1f80c4", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 DASHES: Final[tuple[Dash, ...]] = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-#: What stands behind the curves, marks of the line, limits.
+#: Colours of what lies behind the curves, of marks along the line, and of limits.
 GREY: Final = "#8a8f98"
 MARK: Final = "#6b7280"
 LIMIT: Final = "#b3261e"
-#: The interval of interest, its transparency, and that of its edges.
-INTERVAL: Final = "#e6b428"
-INTERVAL_OPACITY: Final = 0.16
-EDGE: Final = "#aa7800"
 
 
 @dataclass(frozen=True)
@@ -69,6 +65,11 @@ def stroke(index: int, width: float = 1.8) -> Stroke:
     """Return the stroke of a chart's curve by its number; no two of the first 36 have the same colour and dash."""
     dash = DASHES[(index + index // len(COLOURS)) % len(DASHES)]
     return Stroke(COLOURS[index % len(COLOURS)], dash, width)
+
+
+def fill(index: int) -> tuple[str, int]:
+    """Return colour and number of the hatching (0 to 5) of a chart's bars by their number, no two of 36 alike."""
+    return COLOURS[index % len(COLOURS)], (index + index // len(COLOURS)) % 6
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ class Bars:
     x : ndarray or tuple of str, shape (n,)
     y : ndarray, shape (n,)
     index : int
-        Number of colour and hatching.
+        Number of colour and hatching (`fill`).
     width : float, optional
         In units of the abscissa.
     words : tuple of str
@@ -139,8 +140,8 @@ class Points:
     name: str
     x: FloatArray
     y: FloatArray
-    colour: str
     symbol: Literal["circle", "x", "triangle-up"]
+    colour: str = MARK
     size: float = 8.0
     words: tuple[str, ...] = ()
 
@@ -153,6 +154,7 @@ class Ticks:
     x: FloatArray
     share: float = 1.0
     dash: Dash = "solid"
+    colour: ClassVar = MARK
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,9 @@ class Band:
 
     start: float
     end: float
+    colour: ClassVar = "#e6b428"
+    edge: ClassVar = "#aa7800"
+    opacity: ClassVar = 0.16
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from master.arrays import FloatArray
 from master.evaluation.filters import stands_in
 from master.evaluation.line_geometry import indexed, period_of, slackness
 from master.recording.recording import Recording
-from master.report.charts.chart import COLOURS, MARK, Axis, Chart, Curve, Level, Part, Points, Stroke, gapped, stroke
+from master.report.charts.chart import COLOURS, Axis, Chart, Curve, Level, Part, Points, Stroke, gapped, stroke
 from master.report.charts.line_charts import interval_band
 from master.report.charts.uplift_charts import FEW_POINTS, IN_LAP, TIME
 from master.results.run_results import Results
@@ -66,11 +66,11 @@ def _ranges(place: FloatArray, forces: FloatArray, share: FloatArray) -> list[Pa
     slack = share > 0.0
     parts: list[Part] = [
         Curve("minimum to maximum", *gapped(place, low, high), Stroke(COLOURS[0], width=3.0), is_whole=True),
-        Points("at the start", place, forces[0], MARK, "circle", 5.0),
+        Points("at the start", place, forces[0], "circle", size=5.0),
     ]
     if slack.any():
         words = tuple(f"slack {s:.1f} % of the time" for s in share[slack])
-        parts.append(Points("slack", place[slack], low[slack], COLOURS[1], "x", words=words))
+        parts.append(Points("slack", place[slack], low[slack], "x", COLOURS[1], words=words))
     return parts
 
 

@@ -1,4 +1,4 @@
-"""Global matrices of a line from its mesh: K, M, C, dropper rows, loads."""
+"""Global matrices of a line about reference points: K, M, C and the static load."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
-from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition, Dropper
+from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition
 from models.catenary.shape.beam_elements import (
     NODE_DOFS,
     bar_geometric_stiffness,
@@ -67,13 +67,17 @@ def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamP
     return properties
 
 
-def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> Matrices:
+def assemble(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, dropper_mass: FloatArray
+) -> Matrices:
     """Assemble the line's matrices and static loads about the reference positions ``points``.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
         Reference positions [m].
+    dropper_mass : ndarray, shape (n_droppers,)
+        [kg].
     """
     properties = beam_properties(definition, mesh)
     start, end = mesh.beams.T
@@ -85,10 +89,12 @@ def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatAr
     C_e = properties.alpha[:, None, None] * K_e + properties.beta[:, None, None] * M_e
     dofs = element_dofs(mesh.owner[mesh.beams])
     size = NODE_DOFS * len(points)
-    M = _assembled(M_e, dofs, size) + _lumped(definition, mesh, points)
+    lumped = _clamp_mass(mesh, size) + _dropper_mass(mesh, dropper_mass, size)
+    M = _assembled(M_e, dofs, size) + lumped
     load = _gravity(M) + _tensioning(mesh, axes, properties.tension, size)
     load += _kinks(K_e, axes, dofs, properties.tension > 0.0, size)
-    C = _assembled(C_e, dofs, size) + _dropper_mass_damping(definition, mesh, points)
+    # What of their damping is proportional to the droppers' stiffness is added with it.
+    C = _assembled(C_e, dofs, size) + definition.damping.of("dropper").beta * lumped
     support = definition.messenger_support
     K = _assembled(K_e, dofs, size)
     if len(mesh.adrift):
@@ -174,63 +180,6 @@ def steady_arm_tension(
     return tension
 
 
-def dropper_rows(mesh: CatenaryMesh, points: FloatArray) -> sp.csr_matrix:
-    """Return the rows b with elongation of dropper j = b_j . d, shape (n_droppers, 6 n)."""
-    lower, upper = mesh.droppers.T
-    direction = points[upper] - points[lower]
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    n = len(mesh.droppers)
-    axes = np.arange(3)
-    columns = np.hstack([lower[:, None] * NODE_DOFS + axes, upper[:, None] * NODE_DOFS + axes])
-    values = np.hstack([-direction, direction])
-    rows = np.repeat(np.arange(n), 6)
-    return sp.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(n, NODE_DOFS * len(points)))
-
-
-def dropper_lengths(mesh: CatenaryMesh, points: FloatArray) -> FloatArray:
-    """Return the distance between the ends of every dropper [m]."""
-    lower, upper = mesh.droppers.T
-    return np.linalg.norm(points[upper] - points[lower], axis=1)
-
-
-def dropper_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> FloatArray:
-    """Return the axial stiffness of every dropper, as given or EA/L [N/m]."""
-    length = dropper_lengths(mesh, points)
-    result = _stiffness(definition.dropper, length)
-    if definition.hanger is not None:
-        result[mesh.is_hanger] = _stiffness(definition.hanger, length)[mesh.is_hanger]
-    return result
-
-
-def compression_ratio(definition: CatenaryDefinition, mesh: CatenaryMesh) -> FloatArray:
-    """Return every dropper's stiffness in compression over that in tension, shape (n_droppers,)."""
-    result = np.full(len(mesh.droppers), definition.dropper.compression_ratio)
-    if definition.hanger is not None:
-        result[mesh.is_hanger] = definition.hanger.compression_ratio
-    return result
-
-
-def slack_delay(definition: CatenaryDefinition, mesh: CatenaryMesh) -> FloatArray:
-    """Return how much of its rate counts with a dropper's elongation when it comes to slack [s], shape (n_droppers,).
-
-    Under the law "tension" spring and damper go slack together, k (e + alpha e') < 0: alpha. Under "elastic_only" the
-    spring does so alone: 0.
-    """
-    alpha = definition.damping.of("dropper").alpha
-    result = np.full(len(mesh.droppers), alpha if definition.dropper.slack_law == "tension" else 0.0)
-    if definition.hanger is not None:
-        result[mesh.is_hanger] = alpha if definition.hanger.slack_law == "tension" else 0.0
-    return result
-
-
-def _stiffness(dropper: Dropper, length: FloatArray) -> FloatArray:
-    if dropper.stiffness is not None:
-        return np.full_like(length, dropper.stiffness)
-    assert dropper.area is not None
-    assert dropper.youngs_modulus is not None
-    return dropper.youngs_modulus * dropper.area / length
-
-
 def _component(definition: CatenaryDefinition, name: str) -> list[float]:
     """Return EA, EI, GJ, mass, J/A, tension, alpha, beta of a component type; zeros where the line has none."""
     item = getattr(definition, name)
@@ -251,27 +200,17 @@ def _assembled(matrices: FloatArray, dofs: IntArray, size: int) -> sp.csc_matrix
     return sp.csc_matrix((matrices.ravel(), (rows, columns)), shape=(size, size))
 
 
-def _lumped(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
-    """Mass of clamps and droppers, on the translations."""
-    size = NODE_DOFS * len(points)
-    diagonal = np.zeros((len(points), NODE_DOFS))
+def _clamp_mass(mesh: CatenaryMesh, size: int) -> sp.csc_matrix:
+    """Return the mass of the clamps, on the translations."""
+    diagonal = np.zeros((size // NODE_DOFS, NODE_DOFS))
     diagonal[:, :3] = mesh.clamp_mass[:, None]
-    return sp.diags(diagonal.ravel(), format="csc") + _dropper_mass(definition, mesh, points, size)
+    return sp.diags(diagonal.ravel(), format="csc")
 
 
-def _dropper_mass(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, size: int) -> sp.csc_matrix:
-    """Consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions."""
-    per_length = np.full(len(mesh.droppers), definition.dropper.mass)
-    if definition.hanger is not None:
-        per_length[mesh.is_hanger] = definition.hanger.mass
-    mass = per_length * dropper_lengths(mesh, points)
+def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray, size: int) -> sp.csc_matrix:
+    """Return the consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions."""
     pattern = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
     return _assembled(mass[:, None, None] * pattern, _translations(mesh.droppers), size)
-
-
-def _dropper_mass_damping(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
-    """Return beta M of droppers and clamps (what is proportional to the droppers' stiffness is added with it)."""
-    return definition.damping.of("dropper").beta * _lumped(definition, mesh, points)
 
 
 def _gravity(M: sp.csc_matrix) -> FloatArray:

@@ -157,7 +157,7 @@ def test_a_run_goes_on_only_as_it_began(toy, killed, capsys, options, text):
     ("spoil", "text"),
     [
         (lambda f: (f / checkpoint.NAME).unlink(), "holds no checkpoint.state to continue from"),
-        (lambda f: (f / SERIES[1]).write_text("time [s],other\n0,1\n"), "holds other variables than this run records"),
+        (lambda f: (f / SERIES[1]).write_text("time [s],other\n0,1\n"), "records other variables than this run does"),
         (lambda f: (f / SERIES[0]).write_bytes((f / SERIES[0]).read_bytes()[:9000]), "some are lost"),
         (lambda f: (f / "summary.json").write_text('{"generator": "openpanto master", "run": "x"}'), "another run"),
         (lambda f: (f / "summary.json").write_text('{"generator": "openpanto master"}'), "another run"),

@@ -16,7 +16,7 @@ from models.catenary.line_advice import (
     tangent_stiffness,
 )
 from models.catenary.line_part import CatenaryPart
-from models.catenary.statics.elasticity import contact_wire_wave_speed, wave_speed
+from models.catenary.statics.wire_waves import contact_wire_wave_speed, wave_speed
 from models.commands.physics_main import main
 
 

@@ -9,13 +9,14 @@ import scipy.sparse as sp
 
 from models.catenary.definition.line_reading import read
 from models.catenary.line_energy import LineBalance
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
+from models.catenary.line_state import StripMotion
 from models.catenary.linear_motion.attachment_solver import Banded, Cyclic, factorised
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.line_matrices import assemble, dropper_rows
 from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.shape.line_shape import line_shape
 from models.catenary.statics.elasticity import elasticity
 from models.coupled.monolithic import CoupledModel
 from models.definition_files.toml_reader import DefinitionError, Table
@@ -65,11 +66,14 @@ def test_every_support_is_there_once(ring):
 
 def test_matrices_are_those_of_the_open_chain_with_its_ends_tied_together(ring):
     """T' A T, with T from the degrees of freedom of the owners to those of all nodes."""
-    mesh, points = ring.mesh, ring.static.points
+    mesh, points = ring.mesh, ring.static.shape.points
     alone = replace(mesh, owner=np.arange(len(mesh.owner)))
     columns = (mesh.owner[:, None] * NODE_DOFS + np.arange(NODE_DOFS)).ravel()
     T = sp.csr_matrix((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns),) * 2)
-    tied, opened = assemble(ring.definition, mesh, points), assemble(ring.definition, alone, points)
+    tied, opened = (
+        line_shape(ring.definition, mesh, points).matrices,
+        line_shape(ring.definition, alone, points).matrices,
+    )
     for name in ("K", "M", "C"):
         expected = T.T @ getattr(opened, name) @ T
         difference = abs(getattr(tied, name) - expected).max()
@@ -436,8 +440,8 @@ def test_uneven_spans_with_listed_stagger_close_as_well(ring_maker, sections_mak
     model = CatenaryModel(line)
     static, mesh = model.static, model.mesh
     assert static.residual < 1e-12
-    unbalanced = static.matrices.K @ static.displacement - static.matrices.load
-    unbalanced += dropper_rows(mesh, static.points).T @ static.dropper_force
+    unbalanced = static.shape.matrices.K @ static.displacement - static.shape.matrices.load
+    unbalanced += static.shape.droppers.rows.T @ static.dropper_force
     assert np.abs(unbalanced.reshape(-1, NODE_DOFS)[:, 1][~mesh.fixed[:, 1]]).max() < 1e-6
     assert build_mesh(line).points[mesh.support_nodes, 0].tolist() == [-10.0, 35.0, 89.0]
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from models.catenary.contact_and_slack.crossing import STRIP_EDGE
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
-from models.catenary.statics.elasticity import arm_loads
+from models.catenary.line_state import StripMotion
+from models.catenary.statics.rest_profile import arm_loads
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import load_line
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import StripMotion
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.interval_modes import slower_than
 from models.catenary.linear_motion.step_matrices import StepMatrices

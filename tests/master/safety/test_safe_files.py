@@ -20,7 +20,6 @@ import pytest
 from master.commands.main import main
 from master.errors import MasterError
 from master.recording import checkpoint
-from master.recording.checkpoint_writer import CheckpointSchedule
 from master.recording.recorder import LONGEST_UNWRITTEN, RecordedValues, Recorder
 from master.recording.recording import load
 from master.results import results_folder, run_results
@@ -321,10 +320,3 @@ def test_every_write_is_of_whole_lines(tmp_path, monkeypatch):
     assert len(written) < 15
     assert all(piece.endswith(b"\n") for piece in written)
     assert b"".join(written) == (tmp_path / "a.csv").read_bytes()
-
-
-def test_occasions():
-    due = [n for n in range(1, 10) if n in CheckpointSchedule(5, 3)]
-    assert due == [3, 5, 6, 9]
-    assert not CheckpointSchedule()
-    assert not any(n in CheckpointSchedule() for n in range(10))

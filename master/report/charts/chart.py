@@ -1,8 +1,8 @@
 """The description of a chart: curves, bars, points and marks over two axes with units.
 
-Nothing here draws: `interactive_figure` turns a chart into what plotly.js shows on a page, `static_figure` into a figure
-for a file. Curves differ in dash and width as well as in colour (the palette of Okabe and Ito, its blue lighter, so that it
-stands out on a dark page too), bars in hatching: charts survive a grey printer and colour-blind eyes.
+Nothing here draws: `interactive_figure` turns a chart into what plotly.js shows on a page, `static_figure` into a
+figure for a file. Curves differ in dash and width as well as in colour (the palette of Okabe and Ito, its blue lighter,
+so that it stands out on a dark page too), bars in hatching: charts survive a grey printer and colour-blind eyes.
 """
 
 from __future__ import annotations

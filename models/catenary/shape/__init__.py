@@ -1,4 +1,4 @@
-"""The line as designed, at rest: mesh, matrices and droppers about a set of points, and the points that form finding finds.
+"""The line as designed, at rest: mesh, matrices and droppers about a set of points, and the points found for them.
 
 The static state keeps the `LineShape` that it was found with; rooms above take mesh, matrices and droppers from there
 and assemble nothing.

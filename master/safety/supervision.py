@@ -27,7 +27,7 @@ from master.safety.interruption import end_signals, raise_on_signals
 _PR_SET_PDEATHSIG: Final = 1
 #: Phases in which native code may keep the child from reacting to a signal, and how long it may [s].
 _PATIENCE: Final = {"loading": 2.0, "stepping": 10.0, "closing": 10.0}
-#: Seconds that a child which has finished has to be gone.
+#: Seconds within which a child that has finished has to be gone.
 _ENDING_SECONDS: Final = 10.0
 
 #: Where the child reports to its parent what it does; None without supervision.
@@ -35,7 +35,7 @@ _reports: int | None = None
 
 
 def supervised(work: Callable[[], int]) -> int:
-    """Do work in a child process; returns the exit code, 1 if the child ends without having finished.
+    """Do work in a child process; return the exit code, 1 if the child ends without having finished.
 
     Returns in both processes: the caller is to end with the code that it gets.
     """
@@ -45,12 +45,12 @@ def supervised(work: Callable[[], int]) -> int:
         return work()
     reports, _reports = os.pipe()
     parent = os.getpid()
-    # None may come before somebody is there to take it.
+    # No signal may arrive before a handler is there.
     signal.pthread_sigmask(signal.SIG_BLOCK, end_signals())
     child = os.fork()
     if child == 0:
         os.close(reports)
-        os.setpgid(0, 0)  # the terminal's Ctrl-C comes by way of the parent, and so only once
+        os.setpgid(0, 0)  # the terminal's Ctrl-C arrives through the parent, and so only once
         die_with(parent)
         return _worked(work)
     os.close(_reports)
@@ -58,7 +58,7 @@ def supervised(work: Callable[[], int]) -> int:
 
 
 def _fill_standard_streams() -> None:
-    """Open what the caller has closed (``>&-``): else the next file would be it, and take what FMUs print."""
+    """Open what the caller has closed (``>&-``): else the next file opened would receive what FMUs print."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
@@ -68,7 +68,7 @@ def _fill_standard_streams() -> None:
 
 
 def die_with(parent: int) -> None:
-    """End this process when its parent ends, even in an endless loop; elsewhere than on Linux only if it has ended."""
+    """End this process with its parent, even in an endless loop; on other systems than Linux only if that has ended."""
     if sys.platform == "linux":
         import ctypes
 
@@ -180,7 +180,7 @@ class _Supervisor:
             os.kill(self._child, number)
 
     def _listen(self, seconds: float | None) -> None:
-        """Wait for a signal or a report, and take what has come."""
+        """Wait for a signal or a report, and process what has arrived."""
         ready, _, _ = select.select(self._sources, [], [], seconds)
         for source in ready:
             piece = os.read(source, 65536)
@@ -218,7 +218,7 @@ class _Supervisor:
             else:
                 self._send(number)
                 self._hurry()
-        elif number == signal.SIGTSTP:  # the terminal stops only the group in front, which the child does not belong to
+        elif number == signal.SIGTSTP:  # the terminal stops only the foreground group, which the child is not in
             self._send(signal.SIGSTOP)
             os.kill(os.getpid(), signal.SIGSTOP)
             self._send(signal.SIGCONT)
@@ -238,7 +238,7 @@ class _Supervisor:
 
 
 def _wake_up(handle: Callable[[int, object], None]) -> int:
-    """Have signals handled, and return a descriptor that can be read from after each."""
+    """Handle signals, and return a descriptor that becomes readable after each."""
     ours, theirs = os.pipe()
     os.set_blocking(theirs, False)
     signal.set_wakeup_fd(theirs, warn_on_full_buffer=False)
@@ -249,7 +249,7 @@ def _wake_up(handle: Callable[[int, object], None]) -> int:
 
 
 def _mark(path: Path, key: str, status: str, reason: str) -> bool:
-    """Mark a JSON file of a run that has ended; returns whether it was its own and still open."""
+    """Mark the JSON file of a run that has ended; return whether it was this run's and still open."""
     from master.errors import MasterError
     from master.safety.folder_lock import claimed
     from master.safety.safe_files import write_atomically

@@ -22,9 +22,8 @@ from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.compliance import Compliance
-from models.catenary.linear_motion.interval_modes import IntervalModes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
-from models.catenary.linear_motion.mode_finding import interval_modes
+from models.catenary.linear_motion.mode_finding import line_modes
 from models.catenary.linear_motion.sparse_products import Product, inner
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS
@@ -36,7 +35,6 @@ from models.catenary.shape.wire_intervals import (
     intervals,
     plan_angles,
     plan_rotation,
-    without_rounding,
 )
 from models.catenary.step.engine_choice import make_engine
 from models.catenary.step.step_engine import AppliedForce, StepEngine
@@ -83,8 +81,8 @@ class CatenaryModel:
         self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.shape.points)
         #: Coordinates of the line.
         with self._solvable("move in modes of its intervals"):
-            self.modes = self._modes([part for parts in by_wire for part in parts])
-        self.dropper_law = self._dropper_law()
+            self.modes = line_modes(self.static, [part for parts in by_wire for part in parts], self._angles)
+        self.dropper_law = DropperLaw(self.static, self.modes.attached)
         self.wires = tuple(self._wires(by_wire))
         self.uplift_places = self.modes.place[self.mesh.support_nodes * NODE_DOFS + 2]
         self._law = CONTACT_LAWS[definition.contact.law]
@@ -258,23 +256,6 @@ class CatenaryModel:
         modal[1], attached[1] = modes.coordinates(nodal)
         momentum[...] = modal[1] + modes.coupling @ (modes.turn @ attached[1])
 
-    def _modes(self, parts: Sequence[Interval]) -> IntervalModes:
-        """Return the line's coordinates and matrices, droppers included."""
-        matrices, droppers, Q = self.static.shape.matrices, self.static.droppers, plan_rotation(self._angles)
-        springs = droppers.rows.T @ sp.diags(droppers.stiffness) @ droppers.rows
-        damping = self.definition.damping
-        C = matrices.C + damping.of("dropper").alpha * springs
-        stiffness = matrices.K + springs
-        if self.definition.dynamics.geometric_stiffness:
-            # Not in C: alpha times it would be a damping that nothing has.
-            stiffness = stiffness + self.static.pendulum_stiffness()
-        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (stiffness, matrices.M, C))
-        K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
-        rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
-        modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel(), self.mesh.owner)
-        highest = self.definition.dynamics.highest_frequency
-        return slower_than(modes, highest) if highest else modes
-
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:
         """Explain matrices that are not positive definite: parts of the line differ too much, or it buckles."""
@@ -284,19 +265,6 @@ class CatenaryModel:
             raise EquilibriumError(
                 f"line '{self.definition.name}' cannot {doing}: {error}; check masses, tensions and stiffnesses"
             ) from error
-
-    def _dropper_law(self) -> DropperLaw:
-        static = self.static
-        droppers = static.droppers
-        return DropperLaw(
-            B=droppers.rows[:, self.modes.attached].tocsr(),  # the attachments' displacements are in global axes
-            stiffness=droppers.stiffness,
-            alpha=self.definition.damping.of("dropper").alpha,
-            unilateral=1.0 - droppers.compression_ratio,
-            slack_delay=droppers.slack_delay,
-            elastic_force=static.elastic_force,
-            force=static.dropper_force,
-        )
 
     def _wires(self, by_wire: Sequence[Sequence[Interval]]) -> Iterator[ContactWire]:
         spans = iter(self.modes.spans)

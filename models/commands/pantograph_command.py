@@ -28,7 +28,7 @@ _DIGITS: Final = 17
 
 @dataclass(frozen=True)
 class Characteristics:
-    """What the command tells of a pantograph.
+    """What the command reports on a pantograph.
 
     Attributes
     ----------

@@ -38,7 +38,7 @@ def main(argv: Sequence[str]) -> int:
     try:
         code = int(arguments.run(arguments))
         if sys.stdout is not None:  # closed by the caller
-            sys.stdout.flush()  # here, where an error can still be told
+            sys.stdout.flush()  # here, where an error can still be reported
     except OSError as error:
         text = f"{error.filename or 'standard output'}: {error.strerror or error}"
         print(f"error: {printable(text)}", file=sys.stderr)

@@ -24,7 +24,7 @@ from models.library.catalogue import load_line
 
 @dataclass(frozen=True)
 class LineStatics:
-    """What the command tells of a line: a section of it, and one span in detail."""
+    """What the command reports on a line: a section of it, and one span in detail."""
 
     model: CatenaryModel
     section: int
@@ -176,7 +176,7 @@ def _dropper_rows(droppers: rest_profile.Droppers) -> Iterable[Sequence[str]]:
 
 
 def _write_profiles(folder: Path, profiles: Sequence[rest_profile.Profile]) -> None:
-    """Write every kind of wire to a file of its own, stitch wires one after the other."""
+    """Write a file for every kind of wire, stitch wires one after the other."""
     for component in dict.fromkeys(p.component for p in profiles):
         same = [p for p in profiles if p.component == component]
         columns = [np.concatenate(c) for c in zip(*((p.x, p.y, p.z) for p in same), strict=True)]

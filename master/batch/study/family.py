@@ -163,7 +163,7 @@ def store_values(family: Family, variant: str, values: dict[str, float]) -> None
     rows = _table(path)
     wanted = [row for row in rows[1:] if row and row[0] == variant]
     if len(wanted) != 1 or not set(values) <= set(rows[0]):
-        raise MasterError(f"{path}: row '{variant}' with columns {', '.join(values)} is needed once")
+        raise MasterError(f"{path} must have one row '{variant}', with columns {', '.join(values)}")
     for name, value in values.items():
         wanted[0][rows[0].index(name)] = f"{value:.6g}"
     text = io.StringIO()
@@ -209,7 +209,7 @@ def _read_variants(path: Path) -> tuple[Variant, ...]:
 def _name_texts(names: Sequence[str]) -> list[str]:
     """Return what is wrong with the names of the variants: each must name a different folder."""
     folders = [folder_name(n).casefold() for n in names]
-    texts = [f"'{n}' stands there twice" for n in dict.fromkeys(names) if names.count(n) > 1]
+    texts = [f"'{n}' appears more than once" for n in dict.fromkeys(names) if names.count(n) > 1]
     taken = dict(zip(reversed(folders), reversed(names), strict=True))
     texts += [
         f"'{name}' and '{taken[folder]}' would have the same folder of results, '{folder}'; rename one"
@@ -235,7 +235,7 @@ def _head_problems(path: Path, heads: Sequence[str]) -> list[Problem]:
         return [Problem(str(path), 1, "variants", f"the first column must be '{_NAME}'")]
     text = f"is neither 'component.parameter' nor one of {', '.join(_RUN)}"
     wrong = [f"column '{h}' {text}" for h in heads[1:] if h not in _RUN and not all(h.partition("."))]
-    wrong += [f"column '{h}' is there {heads.count(h)} times" for h in dict.fromkeys(heads) if heads.count(h) > 1]
+    wrong += [f"column '{h}' appears {heads.count(h)} times" for h in dict.fromkeys(heads) if heads.count(h) > 1]
     return [Problem(str(path), 1, "variants", text) for text in wrong]
 
 

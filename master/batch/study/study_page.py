@@ -54,7 +54,7 @@ def page(outcome: StudyOutcome) -> str:
 
 
 def _tables(found: Sequence[StudyEntry], title: str) -> list[str]:
-    heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), title]
+    heads = ["variant, pantograph", *(f"{name} [{unit}]".removesuffix(" [1]") for name, unit, _, _ in FIGURES), title]
     rows = [[e.name, *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found]
     note = INTERVAL_NOTE
     parts = [html_markup.table(heads, rows), f"<p class='note'>{note}</p>"]

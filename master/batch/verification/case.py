@@ -179,7 +179,7 @@ class Row(_Data):
     def _tolerance_problems(self) -> Iterator[str]:
         given = [t for t in (self.tolerance, self.tolerance_percent) if t is not None]
         if len(given) > 1:
-            yield "tolerance and tolerance_percent exclude each other"
+            yield "only one of tolerance and tolerance_percent may be given"
         if self.value is not None and not given:
             yield "a value needs a tolerance or a tolerance_percent"
         if given and (self.others or self.truth is not None):
@@ -300,7 +300,7 @@ def _run_problems(data: _CaseData) -> Iterator[str]:
         yield "either 'scenario' or 'runs' is needed, not both"
         return
     if not data.rows:
-        yield "rows: there is none; each begins with [[rows]]"
+        yield "rows: there are none; each begins with [[rows]]"
     for number, row in enumerate(data.rows, 1):
         if not row.run and len(data.runs) > 1:
             yield f"rows[{number}].run: is missing; the runs are {', '.join(data.runs)}"

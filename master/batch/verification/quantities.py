@@ -103,7 +103,7 @@ def _figure(get: Callable[[Quality], float | None], scale: float = 1.0) -> Calla
     def measure(results: Results, choice: Choice) -> Measured:
         value = get(assessment(results, choice).quality)
         if value is None:
-            raise MissingQuantityError("the run does not record what this figure needs")
+            raise MissingQuantityError("the run does not record what this figure requires")
         return Measured((scale * value,))
 
     return measure
@@ -200,7 +200,7 @@ def _slack_share(results: Results, choice: Choice) -> Measured:
 def _wave_speed(results: Results, choice: Choice) -> Measured:
     found = [values[_WAVE_SPEED] for values in results.geometry.values() if _WAVE_SPEED in values]
     if not found:
-        raise MissingQuantityError(f"no component tells '{_WAVE_SPEED}'")
+        raise MissingQuantityError(f"no component reports '{_WAVE_SPEED}'")
     return Measured((3.6 * found[0],))
 
 
@@ -210,7 +210,7 @@ def _elasticity(name: str) -> Callable[[Results, Choice], Measured]:
     def measure(results: Results, choice: Choice) -> Measured:
         found = [values[name] for values in results.geometry.values() if name in values]
         if not found:
-            raise MissingQuantityError(f"no component tells '{name}'")
+            raise MissingQuantityError(f"no component reports '{name}'")
         return Measured((1e3 * found[0],))
 
     return measure

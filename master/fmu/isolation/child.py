@@ -129,16 +129,16 @@ class Child:
         _, _, has_inputs, groups = STEP.unpack_from(self._channel.buffer, HEADER.size)
         if has_inputs:
             self._instance.write()
-        self._tell_values(groups)
+        self._send_values(groups)
 
     def _step(self, _argument: int, _length: int) -> None:
         time, step, has_inputs, groups = STEP.unpack_from(self._channel.buffer, HEADER.size)
         if has_inputs:
             self._instance.write()
         self._instance.step(time, step)
-        self._tell_values(groups)
+        self._send_values(groups)
 
-    def _tell_values(self, groups: int) -> None:
+    def _send_values(self, groups: int) -> None:
         self._instance.read()
         self._numbers[0] = self._instance.stepping_time
         rest = b""

@@ -4,6 +4,8 @@
 
 M is block diagonal, so the multipliers come from (Phi_q M^-1 Phi_q^T) lambda = Phi_q M^-1 g - rhs: the same solution
 with a matrix of the size of the constraints alone. Bodies of prescribed motion enter with M^-1 = 0.
+
+The file is longer than others because one evaluation of the equations reads from top to bottom here.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def working_height_warning(mechanism: Mechanism, standing: FloatArray, x: float,
     above = mechanism.strip_height(standing)
     at_reference = _force(mechanism, standing, above)
     if at_reference is None or at_reference <= 0.0:
-        return ""  # it lifts nothing even there: the run tells
+        return ""  # it lifts nothing even there, which the run reports
     return raised.warning(z, _force(mechanism, standing, above + z - raised.reference), at_reference)
 
 

@@ -3,6 +3,8 @@
 Every kind of joint and of force element is a class whose fields know unit, range and meaning; a file has a table
 ``[body.NAME]``, ``[joint.NAME]`` or ``[force.NAME]`` for each, with the fields' names as keys. Points and axes are in
 body-fixed components, points counted from the body's centre of mass.
+
+The file is longer than others because all kinds are declared side by side, and nothing else is in it.
 """
 
 from __future__ import annotations
@@ -417,7 +419,7 @@ class MechanismDefinition(Operation):
 
     @property
     def lifts_by_moment(self) -> bool:
-        """Whether a moment raises the pantograph, and not a force."""
+        """Return whether a moment raises the pantograph, and not a force."""
         return any(isinstance(f, LiftingMoment) for f in self.forces)
 
     @property

@@ -10,10 +10,9 @@ import pytest
 
 from master.commands.main import main
 from master.coupling.coupling_schemes import Iterative, Jacobi
-from master.errors import MasterError, RequestError, RunError
+from master.errors import MasterError, RunError
 from master.recording import checkpoint
 from master.recording.checkpoint import pack, unpack
-from master.recording.checkpoint_writer import index_at
 from master.recording.continuation import Continuation
 from master.recording.recording import load
 from master.run import connected_fmus
@@ -156,14 +155,6 @@ def test_a_scheme_does_not_take_another_s_memory(toy, saved):
         way, scheme = Continuation(found, "state"), Iterative()
         way.prepare(network, scheme, way.grid(scenario.system))
         assert not scheme.save().size
-
-
-def test_fmus_that_cannot_serialise_are_named(toy):
-    with open_scenario(toy, Overrides(), build=False) as scenario:
-        system = scenario.system
-        mute = replace(system.components[0], fmu=replace(system.components[0].fmu, can_serialise=False))
-        with pytest.raises(RequestError, match="FMU of catenary cannot serialise"):
-            index_at(replace(system, components=(mute, system.components[1])), 0.1)
 
 
 def test_a_checkpoint_of_another_version_is_refused_in_one_sentence(tmp_path):

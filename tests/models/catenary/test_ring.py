@@ -165,7 +165,7 @@ def test_force_does_not_see_the_seam(run):
 
 
 def test_two_pantographs_with_the_seam_between_them(run):
-    """85 m apart: both before the seam, one on either side, both behind it, in whatever order they are told."""
+    """85 m apart: both before the seam, one on either side, both behind it, in whatever order they are given."""
     before, _ = run([290.0, 205.0])
     for places in ([540.0, 455.0], [590.0, 505.0], [40.0, -45.0], [540.0, 455.0 + 500.0]):
         shift = (places[0] - 290.0) % 100.0

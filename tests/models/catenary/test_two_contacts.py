@@ -37,7 +37,7 @@ def pantograph(cx):
 
 
 def _assembled(line, pantograph, dt, steps):
-    """One matrix for both wires, pantograph and the springs of the closed contacts, solved anew every step."""
+    """One matrix for both wires, pantograph and the springs of the closed contacts, solved in every step."""
     model, lumped = CatenaryModel(line), LumpedModel(pantograph)
     catenary = NodalLine(model)
     newmark, n, m = Newmark(dt), catenary.size, lumped.size

@@ -159,5 +159,5 @@ class Rig:
         except np.linalg.LinAlgError as error:
             raise MechanismError(
                 f"{self.definition.name}: its small motions about a strip height of {height:g} m have no solution "
-                f"({error}); look for a part that nothing holds, or joints that say the same twice"
+                f"({error}); look for a part that nothing holds, or for joints that repeat each other"
             ) from error

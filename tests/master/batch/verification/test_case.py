@@ -45,7 +45,10 @@ def test_a_case_with_one_scenario(tmp_path):
         ('quantity = "sigma"', "exactly one of value, range"),
         ('quantity = "sigma"\nvalue = 1\nminimum = 2\ntolerance = 1', "given: value, minimum"),
         ('quantity = "sigma"\nvalue = 1', "a value needs a tolerance"),
-        ('quantity = "sigma"\nvalue = 1\ntolerance = 1\ntolerance_percent = 1', "exclude each other"),
+        (
+            'quantity = "sigma"\nvalue = 1\ntolerance = 1\ntolerance_percent = 1',
+            "only one of tolerance and tolerance_percent",
+        ),
         ('quantity = "sigma"\nrange = [2, 1]', "the range begins at 2, above its end 1"),
         ('quantity = "sigma"\nrange = [2, 3]\ntolerance_percent = -1', "rows[1].tolerance_percent: "),
         ('quantity = "sigma"\nrange = [2, nan]', "rows[1].range[2]: "),

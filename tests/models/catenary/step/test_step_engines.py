@@ -59,7 +59,7 @@ def test_steps_are_those_of_newmark_s_method_in_nodal_coordinates(model, dt):
 
 
 def test_momentum_stays_that_of_the_velocities(model):
-    """It is carried on from step to step, not computed anew."""
+    """It is carried on from step to step, not recomputed."""
     state, _ = _moving(model, 4)
     modes = model.modes
     for _ in range(200):

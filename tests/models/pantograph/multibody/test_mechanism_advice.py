@@ -23,7 +23,7 @@ def test_masses_on_slides_are_left_what_the_springs_leave():
     text = said("CX_multibody", 250.0, 5.30, static_force=178.0)
     assert text == (
         "the static force of 178 N is that at the reference height, 5.02 m; at the wire's, 5.30 m, "
-        f"{left:.0f} N are left: set reference_height to the wire's height, or find static_force anew"
+        f"{left:.0f} N are left: set reference_height to the wire's height, or find another static_force"
     )
 
 
@@ -33,7 +33,7 @@ def test_a_moment_is_told_with_the_force_that_the_rig_finds():
     text = said("generic_multibody", 250.0, 5.30)
     assert "the static moment of 1313.7 N.m is that at the reference height" in text
     assert f"5.30 m, {left.contact_force[-1]:.0f} N are left" in text
-    assert "find static_moment anew" in text
+    assert "find another static_moment" in text
     assert left.contact_force[-1] < 0.85 * left.contact_force[0]
 
 

@@ -1,12 +1,12 @@
-"""Reading definition files: values with unit and source, every mistake reported at once.
+"""Read definition files: values with unit and source, with every mistake reported at once.
 
-A definition (a line, a pantograph, a mechanism) is a TOML file in which a physical value is written
-with its unit and its source::
+A definition (of a line, a pantograph, a mechanism) is a TOML file in which a physical value has its unit and its
+source::
 
     tension = [20, "kN", "Table 5.2"]
     encumbrance = [1.2, "m", "choice: gives the printed first dropper"]
 
-Sources that begin with ``choice`` mark what the data leaves open.
+A source that begins with ``choice`` marks a value that the data leave open.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from typing import Any, Final
 
 from models.definition_files.si_units import shown, to_si
 
-#: Longest message told in full [characters]: a value may be megabytes of nested lists; and most of them told.
+#: Longest message shown in full [characters], as a value may be megabytes of nested lists; most problems shown.
 _LONGEST: Final = 400
 _MOST: Final = 100
-#: Deepest nesting of tables and lists; a definition needs five levels.
+#: Deepest allowed nesting of tables and lists; a definition needs five levels.
 _DEEPEST: Final = 20
-#: Magnitudes in SI beyond which no quantity of a line or pantograph lies, and squares and quotients stay finite.
+#: Limits of magnitude in SI: no quantity of a line or pantograph lies beyond, and squares and quotients stay finite.
 LARGEST: Final = 1e15
 SMALLEST: Final = 1e-15
 
 
 class _Shown(reprlib.Repr):
-    """Values as they are told: short, whatever is in them."""
+    """Values as shown in messages: short, whatever they hold."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -40,7 +40,7 @@ class _Shown(reprlib.Repr):
         self.maxstring = self.maxother = self.maxlong = 80
 
     def repr_int(self, x: int, level: int) -> str:
-        """Return a number; Python refuses to write out one of thousands of digits."""
+        """Return a number as text; Python refuses to write out thousands of digits."""
         return f"(a whole number of {x.bit_length()} bits)" if x.bit_length() > 1000 else super().repr_int(x, level)
 
 
@@ -48,19 +48,19 @@ _shown = _Shown().repr
 
 
 def beyond_all(value: float) -> str:
-    """Return why a value in SI cannot be that of anything here, empty if it can."""
+    """Return why a value in SI cannot belong to anything here, empty if it can."""
     if not abs(value) <= LARGEST:
         return f"is not finite, or larger than anything here can be ({LARGEST:g})"
     return ""
 
 
 def in_its_unit(unit: str) -> str:
-    """Return what to do about a value out of range: most such values are in another unit."""
+    """Return advice on a value out of range: most such values are in the wrong unit."""
     return "" if unit == "1" else ": check its size and its unit"
 
 
 def one_line(text: str) -> str:
-    """Return text on one line, without control characters, its middle left out if it is very long."""
+    """Return text on one line without control characters, and without its middle if it is very long."""
     if len(text) > _LONGEST:
         half = _LONGEST // 2
         text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
@@ -68,7 +68,7 @@ def one_line(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Return text whose characters all print, lines kept: for what others have written, on its way to a terminal."""
+    """Return text with printable characters only, its lines kept, so that foreign text is safe on a terminal."""
     return "".join(c if c == "\n" else _printed(c) for c in text)
 
 
@@ -78,7 +78,7 @@ def _printed(c: str) -> str:
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake in a definition: where it is, what is wrong, what to do."""
+    """A mistake in a definition: where it is, what is wrong, what to do."""
 
     file: str
     key: str
@@ -90,7 +90,7 @@ class Problem:
 
 
 class DefinitionError(ValueError):
-    """A definition that cannot be used; lists every problem found, one per line."""
+    """A definition that cannot be used; the message lists every problem, one per line."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -102,7 +102,7 @@ class DefinitionError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A value as written in a definition, with where it comes from.
+    """A value as written in a definition, with its source.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Quantity:
 
     @property
     def is_choice(self) -> bool:
-        """Whether the value was chosen because no source states it."""
+        """Return whether the value was chosen because no source states it."""
         return self.source.startswith("choice")
 
 
@@ -134,8 +134,8 @@ class _Log:
 class Table:
     """One table of a definition file, read key by key.
 
-    Reading collects problems instead of stopping; ``finish`` on the root reports unknown keys and raises
-    them all. A value that could not be read comes back as its ``default`` (or NaN, empty), so that reading goes on.
+    Reading collects problems instead of stopping; ``finish`` on the root adds unknown keys and raises them all. A value
+    that cannot be read is returned as its ``default`` (or as NaN, or empty), so that reading continues.
     """
 
     def __init__(self, data: dict[str, Any], log: _Log, path: str = "") -> None:
@@ -176,17 +176,17 @@ class Table:
 
     @property
     def provenance(self) -> dict[str, Quantity]:
-        """Every quantity read so far, by its dotted key, as written."""
+        """Return every quantity read so far as written, by its dotted key."""
         return self._log.provenance
 
     @property
     def data(self) -> dict[str, Any]:
-        """The mapping that the table was made from."""
+        """Return the mapping that the table was made from."""
         return self._data
 
     @property
     def file(self) -> str:
-        """The file's name, for messages."""
+        """Return the name of the file, for messages."""
         return self._log.file
 
     def key(self, name: str) -> str:
@@ -194,7 +194,7 @@ class Table:
         return f"{self._path}.{name}" if self._path else name
 
     def has(self, name: str) -> bool:
-        """Whether the table has the key."""
+        """Return whether the table has a key."""
         return name in self._data
 
     def names(self) -> tuple[str, ...]:
@@ -202,7 +202,7 @@ class Table:
         return tuple(self._data)
 
     def accept_all(self) -> None:
-        """Take every key as known: for a table whose keys mean nothing until a mistake in it is mended."""
+        """Accept every key, in a table whose keys mean nothing until a mistake in it is corrected."""
         self._known.update(self._data)
 
     def problem(self, name: str, text: str) -> None:
@@ -315,12 +315,12 @@ class Table:
         return self._child(entry, self.key(name))
 
     def required_table(self, name: str) -> Table:
-        """Return the sub-table ``[name]``; its absence is a problem and gives an empty table."""
+        """Return the sub-table ``[name]``; report it and return an empty table if it is absent."""
         table = self.table(name)
         if table is None:
             if name not in self._data:
                 self.problem(name, f"table [{self.key(name)}] is missing")
-            table = Table({}, _Log(self._log.file), self.key(name))  # its own log: one message is enough
+            table = Table({}, _Log(self._log.file), self.key(name))  # with a separate log, as one message is enough
         return table
 
     def tables(self, name: str) -> list[Table]:
@@ -334,7 +334,7 @@ class Table:
         return [self._child(e, f"{self.key(name)}[{i}]") for i, e in enumerate(entry, 1)]
 
     def finish(self) -> None:
-        """Report keys that nothing read, and raise if there was any problem.
+        """Report keys that were not read, and raise if there was any problem.
 
         Raises
         ------
@@ -343,7 +343,7 @@ class Table:
         """
         self._report_unknown()
         if self._log.problems:
-            # A rule that is read for every span reports its mistakes for every span.
+            # A rule is read for every span, and reports its mistakes for every span.
             raise DefinitionError(tuple(dict.fromkeys(self._log.problems)))
 
     def _child(self, data: dict[str, Any], path: str) -> Table:
@@ -420,7 +420,7 @@ def _too_deep(file: str) -> DefinitionError:
 
 
 def _is_deep(data: Any) -> bool:
-    """Whether values are nested deeper than allowed; found without recursion."""
+    """Return whether values are nested deeper than allowed, found without recursion."""
     level = [data]
     for _ in range(_DEEPEST):
         inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, (dict, list))]

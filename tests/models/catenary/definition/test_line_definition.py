@@ -32,7 +32,7 @@ def problems(data: dict) -> dict[str, str]:
         read(Table.from_dict(data, "line.toml"))
     assert all(p.file == "line.toml" for p in caught.value.problems)
     texts = [str(p) for p in caught.value.problems]
-    assert len(texts) == len(set(texts)), "a mistake is told once"
+    assert len(texts) == len(set(texts)), "a mistake is reported once"
     return {p.key: p.text for p in caught.value.problems}
 
 

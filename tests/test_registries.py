@@ -134,7 +134,7 @@ def test_a_sound_law_is_registered_once(monkeypatch):
     monkeypatch.setattr(contact_law, "_laws", {})
     register_contact_law("mine", continuous_contact)
     assert contact_law._laws == {"mine": continuous_contact}
-    with pytest.raises(ContactLawError, match="there is a contact law 'mine' already"):
+    with pytest.raises(ContactLawError, match="there is already a contact law 'mine'"):
         register_contact_law("mine", continuous_contact)
 
 

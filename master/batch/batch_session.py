@@ -1,4 +1,4 @@
-"""What verification and study have in common: runs, one after the other, and a state that is on disk after each.
+"""The skeleton of verification and study: tasks are run one after the other, and the state is on disk after each.
 
 A batch consists of a state, a sequence of tasks, and a function that adds the result of a task to the state. Its files
 are written before the first task and after each, so whatever ends it, the folder shows what was finished and says so.
@@ -80,14 +80,14 @@ def _now() -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchState:
-    """The part of its state that every batch has.
+    """The part of the state that all batches share.
 
     Attributes
     ----------
     date : str
         When it began.
     versions : dict
-        Of the programs that compute it.
+        Versions of the programs that compute it.
     status : str
         running, complete or interrupted.
     """
@@ -130,10 +130,10 @@ class BatchFiles(Generic[State]):
             results_folder.write_text(folder / name, text(state))
 
 
-def work_off(
+def run_tasks(
     state: State, tasks: Iterable[Task], finish: Callable[[State, Task], State], files: BatchFiles[State], folder: Path
 ) -> State:
-    """Finish tasks one after the other and return the last state.
+    """Run tasks one after the other and return the last state.
 
     Parameters
     ----------

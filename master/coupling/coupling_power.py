@@ -2,7 +2,7 @@
 
 At a contact the catenary gives the force F and receives the strip's velocity v', the pantograph receives F'
 and gives v. What the pantograph loses, F' v, and what the catenary gains, F v', differ, because values are
-exchanged only once per step. The difference is power that the coupling makes up; its time integral is the
+exchanged only once per step. The difference is power that the coupling creates; its time integral is the
 energy added to the system (positive) or taken from it. Components that extrapolate their inputs within the
 step do better than this says: it is judged by the values at the communication points alone.
 """

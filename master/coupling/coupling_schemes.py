@@ -188,7 +188,7 @@ def make_algorithm(coupling: Coupling) -> Algorithm:
     Raises
     ------
     RunError
-        If there is none of this name.
+        If there is no scheme of this name.
     """
     if coupling.scheme not in ALGORITHMS:
         raise RunError(f"there is no coupling scheme '{coupling.scheme}' (known: {', '.join(ALGORITHMS)})")

@@ -63,7 +63,7 @@ class RunOutcome:
     Attributes
     ----------
     status : str
-        complete, interrupted, failed, or incomplete: it came to its end, and that is not enough to judge it.
+        complete, interrupted, failed, or incomplete: it reached its end, which is not enough to judge it.
     steps : int
         Completed macro steps.
     time : float
@@ -136,7 +136,7 @@ def _run(
 
 
 def _finish(observers: Sequence[Observer]) -> MasterError | None:
-    """Finish every observer, also after one that cannot; returns the first failure."""
+    """Finish every observer, also after one that fails; return the first failure."""
     first = None
     for observer in observers:
         try:
@@ -156,7 +156,7 @@ def _advance(
 ) -> None:
     algorithm.step(network, grid.time(index), grid.step)
     end = grid.time(index + 1)
-    # Cheap, at every step: not finite if a value is not (or if they are too large to be added).
+    # Cheap enough for every step: the sum is not finite if a value is not (or if they are too large to be added).
     if not math.isfinite(sum(network.outputs.tolist())):
         check_finite(network, end, previous)
     if not network.is_plain:
@@ -183,7 +183,7 @@ def check_finite(network: Network, time: float, last_good: FloatArray | None) ->
 
 
 def check_inputs(network: Network, time: float, last_good: FloatArray | None) -> None:
-    """Refuse outputs, finite themselves, that a connection's conversion turns into something that is not.
+    """Refuse finite outputs that the conversion of a connection turns into values that are not.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ _C_TYPES: Final[dict[str, Any]] = {
     "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
 }
-#: Types that FMI reads and writes as another one.
+#: Types that FMI reads and writes as another type.
 _AS: Final = {"Enumeration": "Integer"}
 
 

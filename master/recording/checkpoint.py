@@ -179,7 +179,7 @@ def _of_another_format(found: str) -> ValueError:
 
 
 def storable(slave: object) -> Storable:
-    """Return a slave whose state can be saved; RunError if it is none."""
+    """Return ``slave`` if its state can be saved; RunError otherwise."""
     if not isinstance(slave, Storable):
         raise RunError(f"component '{getattr(slave, 'name', slave)}' cannot be saved to a file")
     return slave

@@ -1,4 +1,4 @@
-"""Writing checkpoints while a run goes on: when, what of, and the observer that does it."""
+"""Writing checkpoints during a run: when, of what, and by which observer."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class CheckpointSchedule:
 
 @dataclass(frozen=True)
 class CheckpointObserver:
-    """Observer that writes checkpoints, each in the place of the one before.
+    """Observer that writes checkpoints, each replacing the one before.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def index_at(system: System, time: float) -> int:
     Raises
     ------
     RequestError
-        If that is no communication point of the run, or a component cannot be saved.
+        If this is not a communication point of the run, or a component cannot be saved.
     """
     steps = (time - system.start) / system.step
     index = round(steps)

@@ -1,4 +1,4 @@
-"""Starting from a checkpoint: whether it fits the system, and bringing the system to it."""
+"""Starting from a checkpoint: whether it matches the system, and restoring the system from it."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Continuation:
         grid = self.grid(system)
         if self.is_same_run:
             found += self._changes(system)
-        # A run that was ended after its last step has its summary left to write.
+        # A run that was stopped after its last step still has to write its summary.
         if grid.count < grid.first or (grid.count == grid.first and not self.is_same_run):
             found.append(f"it was saved at {self.checkpoint.time:g} s, the run would end at {system.stop:g} s")
         if found:

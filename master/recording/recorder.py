@@ -16,7 +16,7 @@ from master.errors import ForeignResultsError, MasterError
 from master.recording.recording import NUMBER_FORMAT, Recording, header, load
 from master.safety.safe_files import AppendOnlyFile, safe_cell
 
-#: Rows kept back before they are written, and the simulated time that they may span [s].
+#: Rows held back before they are written, and the simulated time that they may span [s].
 ROWS_PER_FLUSH: Final = 250
 LONGEST_UNWRITTEN: Final = 1.0
 #: What a user can do about results that were changed by others.
@@ -36,7 +36,7 @@ class Recorder:
     """Observer that records sources every ``every``-th step in a CSV file, row by row.
 
     A row is written at the latest when `ROWS_PER_FLUSH` are waiting, or when waiting for the next one would leave more
-    than `LONGEST_UNWRITTEN` of simulated time unwritten, so that a process that is killed loses no more than that.
+    than `LONGEST_UNWRITTEN` of simulated time unwritten, so a process that is killed loses no more than that.
 
     Parameters
     ----------
@@ -51,12 +51,12 @@ class Recorder:
     keep : int, optional
         Rows to keep of an existing file, which is then continued; the first of them is the start.
     is_steady : bool
-        Whether every row costs the same; otherwise many are made into text at once, which costs less in all.
+        Whether every row takes the same time; otherwise many are formatted at once, which takes less in all.
 
     Raises
     ------
     MasterError
-        If the file cannot be written, or what is to be kept is not there.
+        If the file cannot be written, or lacks rows that are to be kept.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class Recorder:
     def _write(self) -> None:
         self._format_rows()
         lines, self._count = b"".join(self._lines), 0
-        self._lines.clear()  # before writing: what cannot be written now is not tried again
+        self._lines.clear()  # before writing: what fails now is not tried again
         if lines:
             self._file.write(lines)
 
@@ -171,7 +171,7 @@ def _title_line(names: Sequence[str], units: Sequence[str]) -> str:
 
 
 def _end_of_rows(path: Path, titles: str, rows: int) -> int:
-    """Return how long a recording with these titles is up to and with its row number ``rows`` [bytes]."""
+    """Return the length [bytes] of a recording with these titles up to the end of row ``rows``."""
     try:
         with path.open("rb") as file:
             same = file.readline() == titles.encode()

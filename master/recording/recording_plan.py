@@ -98,7 +98,7 @@ def make_recorder(
 
 
 def _exchanged(system: System, network: Network) -> RecordedValues:
-    """Return the exchanged outputs as a source; of texts there is no column."""
+    """Return the exchanged outputs; texts have no column."""
     texts = {f"{c.name}.{n}" for c in system.components for n in c.texts}
     places = [i for i, name in enumerate(network.output_names) if name not in texts]
     if len(places) == len(network.output_names):

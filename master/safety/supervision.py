@@ -35,7 +35,7 @@ _reports: int | None = None
 
 
 def supervised(work: Callable[[], int]) -> int:
-    """Do work in a child process; returns the exit code, 1 if the child ends without having finished.
+    """Do work in a child process; return the exit code, 1 if the child ends without having finished.
 
     Returns in both processes: the caller is to end with the code that it gets.
     """
@@ -218,7 +218,7 @@ class _Supervisor:
             else:
                 self._send(number)
                 self._hurry()
-        elif number == signal.SIGTSTP:  # the terminal stops only the group in front, which the child does not belong to
+        elif number == signal.SIGTSTP:  # the terminal stops only the foreground group, which the child is not in
             self._send(signal.SIGSTOP)
             os.kill(os.getpid(), signal.SIGSTOP)
             self._send(signal.SIGCONT)
@@ -238,7 +238,7 @@ class _Supervisor:
 
 
 def _wake_up(handle: Callable[[int, object], None]) -> int:
-    """Have signals handled, and return a descriptor that can be read from after each."""
+    """Handle signals, and return a descriptor that becomes readable after each."""
     ours, theirs = os.pipe()
     os.set_blocking(theirs, False)
     signal.set_wakeup_fd(theirs, warn_on_full_buffer=False)
@@ -249,7 +249,7 @@ def _wake_up(handle: Callable[[int, object], None]) -> int:
 
 
 def _mark(path: Path, key: str, status: str, reason: str) -> bool:
-    """Mark a JSON file of a run that has ended; returns whether it was its own and still open."""
+    """Mark the JSON file of a run that has ended; return whether it was this run's and still open."""
     from master.errors import MasterError
     from master.safety.folder_lock import claimed
     from master.safety.safe_files import write_atomically

@@ -59,7 +59,7 @@ def open_scenario(
     build : bool
         Whether missing or stale FMUs are built.
     is_check : bool
-        Whether nothing may be written: FMUs are built into a temporary folder, to be looked at only.
+        Whether nothing may be written: FMUs are built into a temporary folder, for inspection only.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def load_system(
 
 
 def _ends_with_interval(structure: Structure) -> bool:
-    """Whether the end of the interval of interest ends the run, and not a stop time."""
+    """Whether the run ends with the interval of interest rather than at a stop time."""
     interval = structure.annotations.settings.interval
     if interval.until is None:
         return structure.stop is None and interval.end is not None
@@ -207,7 +207,7 @@ def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) 
 
 
 def _step_problem(start: float, stop: float, step: float) -> str:
-    """Return why a run cannot be made in these steps, empty if it can."""
+    """Return why a run cannot use this step, empty if it can."""
     if not 0 < step <= stop - start:
         return f"must lie between 0 and {stop - start:g} s"
     if (stop - start) / step > MAX_STEPS:
@@ -218,7 +218,7 @@ def _step_problem(start: float, stop: float, step: float) -> str:
 
 
 def _filter_problems(settings: RunSettings, step: float) -> Iterator[Problem]:
-    """Yield a problem if a filter is asked for that nothing of what is sampled is above."""
+    """Yield a problem if the wanted cutoff lies above all frequencies that are sampled."""
     cutoff = settings.filter.cutoff
     if "filter" in settings.model_fields_set and 2.0 * cutoff * step >= 1.0:
         half = f"half the sampling frequency, {0.5 / step:g} Hz at a macro step of {step:g} s"

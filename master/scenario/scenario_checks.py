@@ -1,4 +1,4 @@
-"""Checking a scenario as a whole: structure, FMUs, connections, units, start values.
+"""Checks of the structure: FMUs, connectors, connections, units, start values; the result is what is coupled.
 
 Problems are collected in a list (file, line, rule, text) instead of stopping at the first, and what only follows from
 one of them is not reported besides.
@@ -53,7 +53,7 @@ class _Endpoint:
 
 
 class ScenarioChecks:
-    """Turns a structure and its FMUs into components and connections, collecting problems on the way.
+    """Turn a structure and its FMUs into components and connections, collecting problems on the way.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class ScenarioChecks:
         self._fmus = fmus
         self._problems = problems
         self._warnings = [] if warnings is None else warnings
-        # The first of a name counts; that there is a second one is reported elsewhere.
+        # The first of a name counts; a second one is reported elsewhere.
         self._named = {c.name: c for c in reversed(structure.components)}
         self._connectors = {(c.name, x.name): x for c in self._named.values() for x in reversed(c.connectors)}
         self._units = UnitChecks(structure, fmus.values(), problems)
@@ -206,7 +206,7 @@ class ScenarioChecks:
                 self._units.convert(units[0], units[1], f"{names[0]} to {names[1]}", joint.line)
             return
         self._ill_typed.add(joint.line)
-        self._faulty.update(x for c, x in ends if not c)  # what it is connected to else is no second mistake
+        self._faulty.update(x for c, x in ends if not c)  # its other connections are no second mistake
 
     def _known_items(self, connector: Connector, variable: Variable | None) -> Items | None:
         if variable is not None and variable.items:
@@ -255,7 +255,7 @@ class ScenarioChecks:
     def _has_one_type(
         self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
     ) -> bool:
-        """Whether both ends are of the same type, which can be exchanged; reports what is not so."""
+        """Whether both ends are of the same, exchangeable type; report what is not."""
         ends = [(end, v.type if v else end.connector.type) for end, v in zip((source, target), variables, strict=True)]
         kinds = [kind for _, kind in ends if kind]
         if self._ill_typed.intersection((c.line, *(leg.line for leg in c.before))):
@@ -289,7 +289,7 @@ class ScenarioChecks:
         self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
     ) -> Conversion:
         where = f"'{source.full_name}' to '{target.full_name}'"
-        # The FMU's own unit is what the number is in; the connector's unit is what the SSD talks in.
+        # The number is in the FMU's own unit; the SSD uses the connector's unit.
         fmu_units = [v.unit if v else "" for v in variables]
         written = [end.connector.unit or u for end, u in zip((source, target), fmu_units, strict=True)]
         is_difference = any(v is not None and v.is_difference for v in variables)
@@ -337,14 +337,14 @@ class ScenarioChecks:
             self._warn_of_outside(component, [x for x in free if (component.name, x.name) in outside], outside)
 
     def _is_own_port(self, component: SystemComponent, connector: Connector) -> bool:
-        """Report an input by which a pantograph and its line are coupled; returns whether it is one."""
+        """Report an input by which a pantograph and its line are coupled; return whether it is one."""
         name, strip = connector.name, _STRIP.fullmatch(connector.name)
         partner = f"{strip['port']}contact.force" if strip else "A.z" if _FORCE.fullmatch(name) else ""
         variable = component.fmu.variables.get(partner)
         if variable is None or variable.causality != "output":
             return False
         if any(p.rule == "connection" for p in self._problems):
-            return True  # a connection that is not sound may be the one
+            return True  # a faulty connection may be the one
         text = f"input '{component.name}.{name}' is declared but not connected; pantograph and line need each other"
         self._report(connector.line, "connection", text)
         return True
@@ -379,7 +379,7 @@ def _told(c: SystemConnection) -> str:
 
 
 def _start(component: SystemComponent, connector: Connector) -> str:
-    """Return in words which value an input keeps, and whose it is."""
+    """Return in words which value an input keeps, and where it comes from."""
     if connector.name in component.parameters:
         value = component.parameters[connector.name]
         return f"its start value {str(value).lower() if isinstance(value, bool) else value} of the scenario"

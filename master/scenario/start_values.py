@@ -20,7 +20,7 @@ from master.system.components import Fmu, Variable
 _GIVEN = ("parameter", "input", "structuralParameter")
 #: Values of `initial` with which the others take one before initialization [FMI 2.0.4, section 2.2.7].
 _GUESSED = ("exact", "approx")
-#: Which SSP types a variable of a type accepts, if not its own alone.
+#: Which SSP types a variable of a type accepts, if more than its own.
 _ACCEPTED = {"Real": ("Real", "Integer"), "Enumeration": ("Enumeration", "Integer")}
 _TAKING = ("input", "parameter")
 
@@ -34,7 +34,7 @@ class Given:
 
 
 class StartValues:
-    """Finds the start values of components, collecting problems and warnings on the way.
+    """Find the start values of components, collecting problems and warnings on the way.
 
     A component's own bindings count least, then those of the systems around it from the inside out [SSP 1.0,
     ParameterBindings]; what a connector of a system is bound to goes along its connections, and counts most, as what
@@ -153,7 +153,7 @@ class StartValues:
         return found.then(p.transformation)
 
     def _along(self, component: Component, given: Given, stop: Stop, variable: Variable, where: str) -> Conversion:
-        """Return the conversion of a value that is bound to a system's connector, in whose unit it is from there on."""
+        """Return the conversion of a value that is bound to a system's connector, whose unit it has from there on."""
         p, legs = given.parameter, stop.legs
         unit, is_difference = stop.connector.unit or p.unit, variable.is_difference
         first = Conversion()

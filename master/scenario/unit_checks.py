@@ -13,7 +13,7 @@ from master.system.components import Fmu
 
 
 class UnitChecks:
-    """Finds conversions; what it cannot convert becomes a problem, an unknown unit once.
+    """Find conversions; what cannot be converted becomes a problem, an unknown unit once.
 
     Parameters
     ----------

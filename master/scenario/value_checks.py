@@ -1,4 +1,4 @@
-"""What the numbers of a scenario rule out before anything is run.
+"""Checks of values: what the numbers of a scenario rule out before anything is run.
 
 A stop time that does not cover the interval of interest, a pantograph that starts beyond it or that nothing lifts. The
 master knows no physics but what FMUs show: a pantograph whose FMU has the parameters ``speed`` and ``start_position``,

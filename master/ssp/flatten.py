@@ -106,7 +106,7 @@ def _connections(systems: dict[str, SystemNode], reader: Reader) -> tuple[list[C
 
 
 def _leads_out(c: Connection, inside: set[str], system: str, reader: Reader) -> bool:
-    """Report a connection with an element inside another system: from outside one connects that system."""
+    """Report a connection to an element inside another system; only that system itself can be connected."""
     for element in (c.start_element, c.end_element):
         if "." in element and element not in inside:
             text = f"'{element}' is not a component or system in system '{system}'; connect the system that holds it"
@@ -134,7 +134,7 @@ def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Read
             text = f"connects '{name}' of kind '{connector.kind}', which is not supported"
             reader.report(c.line, "unsupported", text)
             return None
-        # Seen from inside, a system's own input gives values and its own output takes them.
+        # From the inside, a system's own input gives values and its own output takes them.
         ends.append((place, connector, (connector.kind in _GIVING) == bool(element)))
     (first, one, first_gives), (second, other, second_gives) = ends
     if (one.kind in _PARAMETERS) != (other.kind in _PARAMETERS):

@@ -32,8 +32,8 @@ OSP_TYPE: Final = "com.opensimulationplatform"
 
 Scheme = Literal["jacobi", "gauss-seidel", "iterative"]
 SCHEMES: Final[tuple[Scheme, ...]] = get_args(Scheme)
-#: Options of each scheme: the settings of `Coupling` that it uses. `coupling_schemes` makes it with just these, the
-#: summary, comparisons and checkpoints show just these.
+#: Options of each scheme: the settings of `Coupling` that it uses. `coupling_schemes` makes it with these alone, and
+#: the summary, comparisons and checkpoints show these alone.
 OPTIONS: Final[dict[Scheme, tuple[str, ...]]] = {
     "jacobi": (),
     "gauss-seidel": ("order",),
@@ -112,7 +112,7 @@ class Filter(_Settings):
 
 
 class Limits(_Settings):
-    """By which limits the figures are judged: those of EN 50367 for a supply system, and the scenario's own, SI.
+    """Limits by which the figures are judged: those of EN 50367 for a supply system, and the scenario's own, in SI.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ def _check_plain(node: Any, reader: Reader, name: str) -> None:
 
 
 def check_places(root: Any, read: list[Any], reader: Reader) -> None:
-    """Report annotations of ours that stand where nobody reads them, and elements of ours in those of others."""
+    """Report our annotations in places where they are not read, and our elements in annotations of others."""
     for node in root.iter(f"{{{SSC}}}Annotation"):
         if node.get("type") == NAMESPACE and node.getparent() not in read:
             text = "is not read here; put it into the ssd:Annotations of the description or its DefaultExperiment"
@@ -277,7 +277,7 @@ def check_places(root: Any, read: list[Any], reader: Reader) -> None:
 
 
 def _tell_of_others(root: Any, reader: Reader) -> None:
-    """Note which tools' annotations are not read: they may hold steps, solvers or events of those tools."""
+    """Note which tools' annotations are not read; they may hold steps, solvers or events of those tools."""
     found = [a for a in root.iter(f"{{{SSC}}}Annotation") if a.get("type") not in (NAMESPACE, OSP_TYPE)]
     if found:
         names = several(list(dict.fromkeys(str(a.get("type")) for a in found)))
@@ -286,7 +286,7 @@ def _tell_of_others(root: Any, reader: Reader) -> None:
 
 
 def _is_stray(node: Any) -> bool:
-    """Whether an element of ours, not inside another one, stands in no annotation of ours."""
+    """Whether an outermost element of ours is in no annotation of ours."""
     ancestors = list(node.iterancestors(etree.Element))
     within = any(namespace(a) == NAMESPACE for a in ancestors)
     return not within and not any(a.tag == f"{{{SSC}}}Annotation" and a.get("type") == NAMESPACE for a in ancestors)

@@ -58,7 +58,7 @@ def read_structure(sources: Sources, reader: Reader) -> Structure:
     if tag(node) != "SystemStructureDescription" or node.get("version") not in VERSIONS:
         text = f"is not an SSP description of version {' or '.join(VERSIONS)} (version='{node.get('version')}')"
         reader.problem(node, "version", text)
-        return EMPTY  # what another version means by its words would be a guess
+        return EMPTY  # the meaning of another version's words would be a guess
     reader.check_schema(node, "ssd")
     return parse_structure(node, sources, reader)
 

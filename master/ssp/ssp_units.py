@@ -12,7 +12,7 @@ from master.ssp.ssp_xml import SSC, Reader, child, children
 
 #: Exponents of kg, m, s, A, K, mol, cd, rad.
 Dimension = tuple[int, int, int, int, int, int, int, int]
-#: Relative difference that is no more than a matter of digits (0.27778 for 1/3.6).
+#: Relative difference that rounding explains (0.27778 for 1/3.6).
 _DIGITS: Final = 1e-5
 BASE_UNITS: Final = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
@@ -147,7 +147,7 @@ def parse_unit(node: Any, reader: Reader) -> Unit:
 
 
 def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
-    """Yield units that are declared otherwise before, or mean something else everywhere, and what that is.
+    """Yield units that an earlier declaration or common usage defines differently, and how.
 
     Of a unit that everybody knows only factor and offset are compared: whether angles have a dimension is a matter
     of taste, and so is whether a percentage is a hundredth.
@@ -165,7 +165,7 @@ def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
 
 
 def unusual(unit: Unit) -> str:
-    """Return how a unit that everybody knows is declared otherwise, empty if it is not."""
+    """Return how a common unit is declared differently, empty if it is not."""
     usual = COMMON.get(unit.name)
     if usual is None or unit.name == "%":
         return ""
@@ -188,7 +188,7 @@ def unlike(unit: Unit, other: Unit) -> str:
 
 
 def _agree(one: Unit, other: Unit) -> bool:
-    """Whether two declarations of a unit mean the same, but for the digits that were written."""
+    """Whether two declarations of a unit mean the same, up to the digits that were written."""
     near = math.isclose(one.factor, other.factor, rel_tol=_DIGITS)
     return near and math.isclose(one.offset, other.offset, rel_tol=_DIGITS, abs_tol=_DIGITS)
 

@@ -16,7 +16,7 @@ from master.ssp.ssv import Value
 from master.system.connections import Connection
 from master.system.contacts import Contact, find_contacts
 
-#: Share of a step by which the stop time may miss a whole number of steps for want of digits.
+#: Share of a step by which the stop time may miss a whole number of steps by rounding.
 _ROUNDING: Final = 1e-6
 
 
@@ -121,7 +121,7 @@ class System:
     settings : RunSettings
         Coupling, interval of interest, calibration, recording.
     warnings : tuple of str
-        What in the scenario can be run but may not be meant.
+        What in the scenario can be run but may not be intended.
     may_stop_early : bool
         Whether the stop time may lie before the end of the interval of interest: nothing is judged then.
     """
@@ -143,7 +143,7 @@ class System:
 
     @property
     def discrete(self) -> frozenset[str]:
-        """Names of exchanged outputs that are not Real, between whose values there is nothing."""
+        """Names of exchanged outputs that are not Real, whose values cannot be interpolated."""
         return frozenset(
             f"{c.name}.{n}" for c in self.components for n in c.outputs if c.fmu.variables[n].type != "Real"
         )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fnmatch import fnmatchcase
 from typing import Final
 
-#: The parameter that makes an FMU keep its energy balance, what it says then, and how often that is recorded [s].
+#: The parameter that makes an FMU keep its energy balance, what it then reports, and the period of recording that [s].
 ENERGY_MONITOR: Final = "monitor_energy"
 ENERGY_VARIABLES: Final = ("*.energy.*", "*contact.work")
 ENERGY_INTERVAL: Final = 0.05

@@ -1,4 +1,4 @@
-"""What a step of the line takes and gives: its state, the strips over it, the contacts found."""
+"""What a step of the line takes and returns: its state, the strips above it, the contacts found."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class CatenaryState:
     slack : ndarray of int
         Slack droppers.
     compensation : ndarray
-        What each of them lacks to the force that it would carry if it could push [N].
+        What each of them lacks of the force that it would carry if it could push [N].
     element : ndarray of int, shape (n_pantographs, n_sections)
-        Element of the contact wire met last.
+        Element of the contact wire last met.
     impact_velocity : ndarray, shape (n_pantographs, n_sections)
-        Velocity at impact of the closed contacts [m/s], 0 where open.
+        Velocity at impact of closed contacts [m/s], 0 for open ones.
     loaded : ndarray of int, shape (k, 2)
         Section and element of every force on a contact wire.
     load : ndarray, shape (k, 2)
@@ -70,14 +70,14 @@ class ContactResult:
 
 @dataclass
 class StripMotion:
-    """Strips at the end of a step, were there no contact force within it.
+    """Strips as they would be at the end of a step without contact force.
 
     Attributes
     ----------
     strip : ndarray, shape (n_pantographs, 2, 2, 3)
         End A, B; position, velocity; x, y, z.
     compliance : ndarray, shape (n_pantographs,)
-        How far a strip gives way within the step per force [m/N]; 0 for prescribed strips.
+        How far a strip yields within the step per unit force [m/N]; 0 for prescribed strips.
     """
 
     strip: FloatArray

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from master.batch.batch_session import BatchFiles, Runner, work_off
+from master.batch.batch_session import BatchFiles, Runner, run_tasks
 from master.batch.study.family import VARIANTS, Family, Variant, folder_name
 from master.batch.study.study_outcome import StudyOutcome, VariantResult, as_csv, as_data
 from master.batch.study.study_page import page
@@ -77,7 +77,7 @@ def study(
             show(done)
         return replace(state, done=(*state.done, done))
 
-    return work_off(StudyOutcome(family), family.variants, finish, FILES, folder)
+    return run_tasks(StudyOutcome(family), family.variants, finish, FILES, folder)
 
 
 def _results(family: Family, variant: Variant, runner: Runner, folder: Path, may: tuple[bool, bool]) -> Results | None:

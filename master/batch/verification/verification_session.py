@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
-from master.batch.batch_session import BatchFiles, work_off
+from master.batch.batch_session import BatchFiles, run_tasks
 from master.batch.verification.case import Case
 from master.batch.verification.case_runs import Runs
 from master.batch.verification.verification_outcome import CaseOutcome, Verification, as_data, judge_case
@@ -49,4 +49,4 @@ def verify(
         show(judged)
         return state.with_case(judged)
 
-    return work_off(Verification(len(cases)), cases, finish, FILES, folder)
+    return run_tasks(Verification(len(cases)), cases, finish, FILES, folder)

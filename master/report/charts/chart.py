@@ -1,8 +1,8 @@
-"""A chart as it is described, once: curves, bars, points and marks over two axes with units.
+"""The description of a chart: curves, bars, points and marks over two axes with units.
 
-Nothing here draws: `interactive_figure` makes of a chart what plotly.js shows on a page, `static_figure` what goes into
-a file. Curves differ in dash and width as well as in colour (the palette of Okabe and Ito, its blue lighter, so that it
-stands out on a dark page too), bars in hatching: charts survive a grey printer and colour-blind eyes.
+Nothing here draws: `interactive_figure` turns a chart into what plotly.js shows on a page, `static_figure` into a
+figure for a file. Curves differ in dash and width as well as in colour (the palette of Okabe and Ito, its blue lighter,
+so that it stands out on a dark page too), bars in hatching: charts survive a grey printer and colour-blind eyes.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class Axis:
     name, unit : str
         The unit is empty for names and numbers of things.
     limits : (float, float), optional
-        What is shown at first; as much as there is, if None.
+        The range shown at first; that of the data if None.
     is_logarithmic : bool
     ticks : tuple of float
-        Where the numbers stand, if it is not left to the renderer.
+        Positions of the numbers; left to the renderer if empty.
     """
 
     name: str
@@ -74,7 +74,7 @@ def fill(index: int) -> tuple[str, int]:
 
 @dataclass(frozen=True)
 class Curve:
-    """A line through points; NaN interrupts it.
+    """A line through points, interrupted where they are NaN.
 
     Attributes
     ----------
@@ -85,9 +85,9 @@ class Curve:
     is_shown : bool
         Whether it is drawn at first; a page shows it when its name is clicked, a file leaves it out.
     is_whole : bool
-        Whether all points are drawn; else those that can be seen (`kept_samples`).
+        Whether all points are drawn, or only those that can be seen (`kept_samples`).
     most : int
-        How many points are drawn at most.
+        Largest number of points drawn, unless it is whole.
     """
 
     name: str
@@ -100,7 +100,7 @@ class Curve:
 
     @property
     def points(self) -> tuple[FloatArray, FloatArray]:
-        """What is drawn of x and y."""
+        """The points of x and y that are drawn."""
         if self.is_whole:
             return self.x, self.y
         kept = kept_samples(self.y, self.most)
@@ -122,7 +122,7 @@ class Bars:
     width : float, optional
         In units of the abscissa.
     words : tuple of str
-        What a page says when a bar is pointed at, instead of its numbers.
+        Text that a page shows when a bar is pointed at, instead of its numbers.
     """
 
     name: str
@@ -148,7 +148,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Ticks:
-    """Upright strokes at places of the line, from the bottom up to a share of the chart's height."""
+    """Vertical strokes at positions along the line, from the bottom to a share of the chart's height."""
 
     name: str
     x: FloatArray
@@ -178,7 +178,7 @@ class Level:
 
     @property
     def colour(self) -> str:
-        """Red for limits, grey for what is only pointed out."""
+        """Red for limits, grey for other marks."""
         return MARK if self.is_upright else LIMIT
 
 
@@ -199,11 +199,11 @@ class Chart:
     parts : tuple
         What is drawn, from the back to the front.
     note : str
-        What a reader must know.
+        What a reader needs to know.
     height : int
         Pixels.
     group : str
-        Charts of a page whose abscissas are moved together.
+        Charts of one group on a page are zoomed together along the abscissa.
     """
 
     key: str
@@ -217,5 +217,5 @@ class Chart:
 
 
 def gapped(x: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the points of a curve of separate upright strokes."""
+    """Return the points of a curve that consists of separate vertical strokes."""
     return np.repeat(x, 3), np.column_stack((low, high, np.full(len(x), np.nan))).ravel()

@@ -1,4 +1,4 @@
-"""Charts of the contact force: over the track, its histogram and spectrum; where it acts on the strip and how high."""
+"""Charts of the contact: its force over the track, histogram and spectrum, its height and its place on the strip."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from master.report.charts.chart import GREY, Axis, Bars, Chart, Curve, Level, Pa
 from master.report.charts.line_charts import interval_band, line_marks
 from master.results.run_results import Results
 
-#: Abscissa of whatever is drawn where the contact is.
+#: Abscissa of charts over the position of the contact.
 TRACK: Final = Axis("track position of the contact", "m")
 FREQUENCY: Final = Axis("frequency", "Hz", (0.3, 100.0), True, (0.5, 1, 2, 5, 10, 20, 50, 100))
 DENSITY: Final = Axis("power spectral density", "N\u00b2/Hz", is_logarithmic=True)

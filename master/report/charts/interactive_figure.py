@@ -1,4 +1,4 @@
-"""A chart as plotly.js draws it on a page: plain dictionaries. Colours of paper, ink and grid are the page's."""
+"""The renderer for pages: charts as dictionaries for plotly.js. Colours of paper, ink and grid are left to the page."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from master.report.charts.sample_packing import packed
 Trace = dict[str, Any]
 
 _PATTERNS: Final = ("", "/", "x", "-", ".", "+")
-#: An invisible second ordinate from 0 to 1, which the ticks stand on.
+#: An invisible second ordinate from 0 to 1, to which the ticks belong.
 _SHARES: Final = {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}
 
 
@@ -90,7 +90,7 @@ def _shape(part: Band | Level) -> dict[str, Any]:
 
 
 def _transparent(colour: str, opacity: float) -> str:
-    """Return a colour as CSS has it with its opacity.
+    """Return a colour with its opacity in the notation of CSS.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The line in charts: its static geometry, and the marks of supports, droppers and interval under other curves."""
+"""The line in charts: its static geometry, and marks of supports, droppers and interval under other curves."""
 
 from __future__ import annotations
 

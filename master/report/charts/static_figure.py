@@ -1,4 +1,4 @@
-"""Charts as Matplotlib draws them into a file, one below the other; nothing is written here."""
+"""The renderer for files: charts in a Matplotlib figure, one below the other. It writes nothing."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from master.report.charts.chart import Axis, Band, Bars, Chart, Curve, Dash, Level, Points, Ticks, fill
 
 _WIDTH: Final = 9.0
-#: Pixels of a page that an inch of a file has.
+#: Pixels on a page that correspond to an inch in a file.
 _PIXELS: Final = 125.0
-#: Points that a legend has for its width, and needs for a row, a letter, and the line beside a name.
+#: Width available to a legend, and what a row, a letter and the line before a name need [points].
 _LEGEND_WIDTH, _LEGEND_ROW, _LETTER, _LINE = 610.0, 13.0, 3.8, 44.0
 _GRID: Final = "#e3e5e8"
 #: Curves are thinner on paper than on a screen.
@@ -56,7 +56,7 @@ def _draw_chart(axes: Any, chart: Chart) -> None:
 
 
 def _draw_legend(axes: Any) -> int:
-    """Draw the legend above the axes, where there is more than one thing to tell apart, and return its rows."""
+    """Draw the legend above the axes if there is more than one name, and return its number of rows."""
     _, labels = axes.get_legend_handles_labels()
     if len(labels) < 2:
         return 0
@@ -109,7 +109,7 @@ def _draw_level(axes: Any, level: Level) -> None:
 
 
 def _draw_bars(axes: Any, bars: Bars, number: int, count: int) -> None:
-    """Draw bars that stand beside the others of the chart."""
+    """Draw one set of bars beside the others of the chart."""
     is_named = isinstance(bars.x, tuple)
     x = np.arange(float(len(bars.x))) if is_named else np.asarray(bars.x)
     gap = float(np.diff(np.unique(x)).min()) if len(np.unique(x)) > 1 else 1.0

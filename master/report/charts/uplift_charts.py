@@ -23,7 +23,7 @@ _SHOWN: Final = 8
 
 
 def uplift_bars(results: Results) -> Chart | None:
-    """Return the largest uplift of every support, where it stands."""
+    """Return the largest uplift of every support at its position."""
     uplifts = results.uplifts
     if not uplifts:
         return None
@@ -51,7 +51,7 @@ def _place(u: Uplift) -> float:
 
 
 def support_axis(uplifts: Sequence[Uplift]) -> Axis:
-    """Return the axis that supports stand on: the track, or their numbers where no place is recorded."""
+    """Return the axis of supports: the track, or their numbers if no position is recorded."""
     if uplifts[0].x is None:
         return Axis("support number")
     return Axis(f"track position of the support{IN_LAP if uplifts[0].period else ''}", "m")

@@ -1,4 +1,4 @@
-"""The droppers of a line, hung between given points: all that is needed of them, made once."""
+"""The droppers of a line between given points: rows, lengths and stiffnesses, made once."""
 
 from __future__ import annotations
 
@@ -29,9 +29,8 @@ class DropperSet:
     compression_ratio : ndarray, shape (n_droppers,)
         Stiffness in compression over that in tension.
     slack_delay : ndarray, shape (n_droppers,)
-        How much of its rate counts with a dropper's elongation when it comes to slack [s]. Under the law "tension"
-        spring and damper go slack together, k (e + alpha e') < 0: alpha. Under "elastic_only" the spring does so alone:
-        0.
+        Weight of the rate of elongation in the condition for slack [s]: alpha under the law "tension", by which spring
+        and damper go slack together, k (e + alpha e') < 0; 0 under "elastic_only", by which the spring does alone.
     mass : ndarray, shape (n_droppers,)
         [kg].
     """

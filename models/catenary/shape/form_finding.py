@@ -1,9 +1,9 @@
 """Static equilibrium and form finding.
 
-Either the wanted geometry is prescribed (the contact wire's height at every dropper, the auxiliary wire's at every
-hanger) and the droppers' lengths follow, or a dropper's unstrained length is given and the height follows. The
-unknowns are displacements and dropper forces. For given reference points this is one linear saddle-point system;
-the points are then moved to the solution and the system is solved again, until the deformed mesh is its reference.
+Either the geometry is specified (the height of the contact wire at every dropper, of the auxiliary wire at every
+hanger) and the lengths of the droppers follow, or the unstrained length of a dropper is given and the height follows.
+The unknowns are displacements and dropper forces. For given reference points this is one linear saddle-point system;
+the points are then moved to the solution and the system is solved again, until the deformed mesh is its own reference.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.line_shape import LineShape, line_shape
 from models.catenary.shape.wire_intervals import attachments
 
-#: Form finding ends when no reference point moves by more than this [m].
+#: Form finding has converged when no reference point moves by more than this [m].
 _TOLERANCE = 1e-9
 _MAX_ITERATIONS = 30
-#: Given lengths: droppers are let slack only once the first guess of the shape, far from equilibrium, is left behind.
+#: Droppers of given length may go slack only after these iterations, as the first guess is far from equilibrium.
 _TAUT_ITERATIONS = 3
-#: A point that moves by more than this has no shape to settle to [m]; numbers would overflow soon.
+#: A point that moves by more than this diverges [m]; the numbers would soon overflow.
 _LOST = 1e5
-#: First guess of the droppers' forces [N]; only the path to the solution depends on it.
+#: First guess of the dropper forces [N]; it affects the path to the solution only.
 _FIRST_FORCE = 80.0
 
 
 class EquilibriumError(ValueError):
-    """The line has no static equilibrium of the wanted shape; says which droppers, where."""
+    """A line without a static equilibrium of the specified shape; the message names the droppers concerned."""
 
 
 @dataclass(frozen=True)
@@ -45,19 +45,19 @@ class StaticState:
     Attributes
     ----------
     shape : LineShape
-        The line about the reference points, which lie at the static shape.
+        The line about its reference points, which lie on the static shape.
     droppers : DropperSet
-        Hung between the static positions.
+        Droppers between the static positions.
     displacement : ndarray, shape (6 n,)
-        Static displacement from the reference: axial stretch, rotations of the wires [m, rad].
+        Static displacement from the reference points: axial stretch, rotations of the wires [m, rad].
     dropper_force, unstrained_length : ndarray, shape (n_droppers,)
-        Tension [N], and length without it [m].
+        Tension [N] and unstrained length [m].
     arm_force : ndarray, shape (n_arms,)
         Tension of the steady arms [N].
     elastic_force : ndarray, shape (n_droppers,)
-        Stiffness times stretch [N]: the tension, but negative where a given length leaves the dropper slack.
+        Stiffness times stretch [N]: the tension, or a negative value where a given length leaves the dropper slack.
     residual : float
-        Largest unbalanced nodal force over the line's weight.
+        Largest unbalanced nodal force relative to the weight of the line.
     """
 
     shape: LineShape
@@ -75,13 +75,13 @@ class StaticState:
         return _displaced(self.shape.points, self.displacement)
 
     def pendulum_stiffness(self) -> sp.csc_matrix:
-        """Return what the tension of droppers and steady arms holds them back by, as pendulums; 0 where they push."""
+        """Return the pendulum stiffness of droppers and steady arms under their tension, zero where they push."""
         mesh, tension = self.shape.mesh, np.concatenate([self.dropper_force, self.arm_force])
         return pendulum_stiffness(np.vstack([mesh.droppers, mesh.arms]), np.maximum(tension, 0.0), self.positions)
 
 
 def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState:
-    """Find the dropper lengths that give the wanted contact-wire profile, or the profile that given lengths give.
+    """Find the dropper lengths for the specified contact-wire profile, or the profile for given lengths.
 
     Returns
     -------
@@ -90,8 +90,8 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
     Raises
     ------
     EquilibriumError
-        If a dropper would have to push to give the wanted profile, if the equations are singular, or if the iteration
-        does not settle.
+        If a dropper would have to push to give the specified profile, if the equations are singular, or if the
+        iteration does not converge.
     """
     points = mesh.points.copy()
     movable = _movable(mesh)
@@ -102,9 +102,9 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
     for iteration in range(_MAX_ITERATIONS):
         shape = line_shape(definition, mesh, points)
         matrices = shape.matrices
-        # Moving a reference point re-defines a wire's length, so it does not stretch the wire.
+        # Moving a reference point redefines the length of the wire, so it does not stretch the wire.
         stretch = axial_stiffness(definition, mesh, points) @ sp.diags(unstretched.ravel())
-        # So do the guides act on moves of the reference alone, and vanish from the result with these.
+        # Likewise the guides act on moves of the reference only, and vanish from the result with them.
         guides = _swing(shape, force) @ sp.diags(unstretched.ravel())
         conditions = _conditions(shape, slack)
         displacement, force = _solve(shape, matrices.K - stretch + guides, conditions)
@@ -112,7 +112,7 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
         _check_move(shape, move)
         now_slack = _slack(mesh, _displaced(points, displacement))
         if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
-            # Without the guides: what is left of them is below the tolerance of the iteration, now it is gone.
+            # Solve once more without the guides, to remove what the tolerance of the iteration leaves of them.
             return _static_state(shape, *_solve(shape, matrices.K, conditions), slack)
         _straighten(mesh, points, move)
         points = points + move
@@ -126,14 +126,14 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
 
 
 def _displaced(points: FloatArray, displacement: FloatArray) -> FloatArray:
-    """Return where points are after a displacement of all degrees of freedom, shape (n, 3) [m]."""
+    """Return the positions of points after a displacement of all degrees of freedom, shape (n, 3) [m]."""
     return points + displacement.reshape(-1, NODE_DOFS)[:, :3]
 
 
 def _check_move(shape: LineShape, move: FloatArray) -> None:
-    """Stop where form finding leads nowhere."""
+    """Stop if form finding diverges."""
     size = np.abs(move).max(axis=1)
-    worst = int(size.argmax())  # the first that is not a number, if there is one
+    worst = int(size.argmax())  # the first NaN, if there is one
     if not size[worst] <= _LOST:
         raise EquilibriumError(
             f"line '{shape.definition.name}' has no static equilibrium of the wanted shape: form finding moves the "
@@ -145,9 +145,9 @@ def _check_move(shape: LineShape, move: FloatArray) -> None:
 def _movable(mesh: CatenaryMesh) -> np.ndarray:
     """Return which coordinates of the reference form finding may move.
 
-    Not x (the wires' stretch stays a displacement); not the lateral position of registered nodes, whose
-    displacement is what loads the steady arm; and not that of nodes between two attachments, which follow these on
-    a straight line.
+    Not x (the stretch of the wires remains a displacement); not the lateral position of registered nodes, whose
+    displacement loads the steady arm; and not that of nodes between two attachments, which follow these on a straight
+    line.
     """
     movable = ~mesh.fixed[:, :3]
     movable[:, 0] = False
@@ -157,7 +157,7 @@ def _movable(mesh: CatenaryMesh) -> np.ndarray:
 
 
 def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
-    """Move the inner nodes of every interval so that the reference stays straight in plan between attachments."""
+    """Move the inner nodes of every interval so that it stays straight in plan between its attachments."""
     held = attachments(mesh)
     for chain in mesh.chains:
         fixed, x = held[chain.nodes], points[chain.nodes, 0]
@@ -165,13 +165,13 @@ def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> Non
 
 
 def _carry_arms(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
-    """Move the registration ends with their wire, so that the arms keep angle and length."""
+    """Move the registration ends with the wire, so that the arms keep their angle and length."""
     points[mesh.arms[:, 0], 2] += move[mesh.arms[:, 1], 2]
 
 
 @dataclass(frozen=True)
 class _Conditions:
-    """What holds at every dropper: rows @ d - flexibility * N = right.
+    """The equation of every dropper: rows @ d - flexibility * N = right.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ class _Conditions:
 
 
 def _conditions(shape: LineShape, slack: np.ndarray) -> _Conditions:
-    """Return the droppers' conditions: wanted height of the lower end, or elongation of a given length by the force."""
+    """Return the droppers' conditions: height of the lower end, or elongation of a given length by the force."""
     mesh, droppers = shape.mesh, shape.droppers
     lower = mesh.droppers[:, 0]
     n = len(lower)
@@ -205,18 +205,18 @@ def _conditions(shape: LineShape, slack: np.ndarray) -> _Conditions:
 
 
 def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
-    """Return which droppers of given length are longer than the distance that they span."""
+    """Return which droppers of given length are longer than the distance they span."""
     with np.errstate(invalid="ignore"):
         result: np.ndarray = dropper_lengths(mesh, positions) < mesh.given_length
     return result
 
 
 def _solve(shape: LineShape, K: sp.csc_matrix, conditions: _Conditions) -> tuple[FloatArray, FloatArray]:
-    """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], R, D and right of the droppers' conditions."""
+    """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], with R, D and right from the droppers' conditions."""
     mesh, load = shape.mesh, shape.matrices.load
     free = np.flatnonzero(~mesh.fixed.ravel())
     B = shape.droppers.rows[:, free]
-    # Scaled so that the rows of the conditions compare with those of the stiffness.
+    # The scale makes the rows of the conditions comparable with those of the stiffness.
     scale = 1e4
     D = sp.diags(-(scale**2) * conditions.flexibility)
     system = sp.bmat([[K[free][:, free], scale * B.T], [scale * conditions.rows[:, free], D]], format="csc")
@@ -236,7 +236,7 @@ def _solve(shape: LineShape, K: sp.csc_matrix, conditions: _Conditions) -> tuple
 def _swing(shape: LineShape, force: FloatArray) -> sp.csc_matrix:
     """Return the stiffness N/L of the droppers across their axes, as pendulums.
 
-    It guides the iteration where nothing but the droppers holds a wire laterally.
+    This guides the iteration where only the droppers hold a wire laterally.
     """
     return pendulum_stiffness(shape.mesh.droppers, np.maximum(force, 1.0), shape.points)
 
@@ -281,7 +281,7 @@ def _check_tension(shape: LineShape, force: FloatArray) -> None:
 
 
 def _check_arms(shape: LineShape, force: FloatArray) -> None:
-    """Refuse steady arms that push; one that nothing but its own weight presses has the sign of no wire's pull."""
+    """Reject steady arms that push by more than their own weight, which says nothing about the pull of the wire."""
     arm = shape.definition.steady_arm
     if arm is None:
         return
@@ -292,7 +292,7 @@ def _check_arms(shape: LineShape, force: FloatArray) -> None:
             f"the arm at {a:.2f} m pushes with {-f:.1f} N" for a, f in list(zip(x, force[pushing], strict=True))[:8]
         )
         raise EquilibriumError(
-            f"line '{shape.definition.name}': {listed}: it must pull; change its side or the stagger"
+            f"line '{shape.definition.name}': {listed}: an arm must pull; change its side or the stagger"
         )
 
 

@@ -20,8 +20,8 @@ from models.catenary.shape.beam_elements import (
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
 
-#: What holds a wire without anchors along the track at every support [N/m]: soft enough to be of no account (a span of
-#: messenger wire on it has a period of half a minute), but the wire has a place.
+#: Stiffness that holds a wire without anchors along the track at every support [N/m]: soft enough not to matter (a span
+#: of messenger wire on it has a period of half a minute), but enough to fix the position of the wire.
 ANCHORAGE = 1.0
 
 
@@ -41,14 +41,14 @@ class BeamProperties:
 
 @dataclass(frozen=True)
 class Matrices:
-    """Matrices of the line's beams and supports, droppers excluded, over all degrees of freedom (fixed ones too).
+    """Matrices of the beams and supports of a line, without droppers, over all degrees of freedom (fixed ones too).
 
     Attributes
     ----------
     K, M, C : sparse, shape (6 n, 6 n)
         Stiffness, mass (with clamps and droppers) and damping.
     load : ndarray, shape (6 n,)
-        Gravity, line tensioning, and what keeps the kinks of the reference points from being stress-free.
+        Gravity, tensioning, and the load that keeps the kinks of the reference polygon from being stress-free.
     """
 
     K: sp.csc_matrix
@@ -62,7 +62,7 @@ def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamP
     table = np.array([_component(definition, name) for name in COMPONENTS])
     properties = BeamProperties(*table[mesh.component].T.copy())
     if definition.stitch_wire is not None:
-        # Balance along the track at the clamps: what the stitch wire pulls, the messenger wire between them lacks.
+        # Balance along the track at the clamps: the messenger wire between them lacks what the stitch wire pulls.
         properties.tension[mesh.beside_stitch] -= definition.stitch_wire.tension
     return properties
 
@@ -70,7 +70,7 @@ def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamP
 def assemble(
     definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, dropper_mass: FloatArray
 ) -> Matrices:
-    """Assemble the line's matrices and static loads about the reference positions ``points``.
+    """Assemble the matrices and the static load of a line about reference positions.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def assemble(
     M = _assembled(M_e, dofs, size) + lumped
     load = _gravity(M) + _tensioning(mesh, axes, properties.tension, size)
     load += _kinks(K_e, axes, dofs, properties.tension > 0.0, size)
-    # What of their damping is proportional to the droppers' stiffness is added with it.
+    # The part of the droppers' damping that is proportional to their stiffness is added together with it.
     C = _assembled(C_e, dofs, size) + definition.damping.of("dropper").beta * lumped
     support = definition.messenger_support
     K = _assembled(K_e, dofs, size)
@@ -107,13 +107,13 @@ def assemble(
 
 
 def _on_nodes(nodes: IntArray, axis: int, size: int) -> sp.csc_matrix:
-    """Return 1 on the diagonal at the displacements of some nodes along an axis."""
+    """Return a matrix with 1 on the diagonal at the displacements of some nodes along an axis."""
     dofs = nodes * NODE_DOFS + axis
     return sp.csc_matrix((np.ones(len(dofs)), (dofs, dofs)), shape=(size, size))
 
 
 def axial_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
-    """Return the part of K that is the beams' stiffness along their axes, EA/l."""
+    """Return the part of K that comes from the axial stiffness of the beams, EA/l."""
     start, end = mesh.beams.T
     axes, length = frames(points[start], points[end])
     EA = beam_properties(definition, mesh).EA
@@ -128,16 +128,16 @@ def element_dofs(nodes: IntArray) -> IntArray:
 
 
 def pendulum_stiffness(bars: IntArray, tension: FloatArray, points: FloatArray) -> sp.csc_matrix:
-    """Return the stiffness of bars across their axes, from their tension, over all degrees of freedom (fixed ones too).
+    """Return the stiffness of bars across their axes due to tension, over all degrees of freedom (fixed ones too).
 
     Parameters
     ----------
     bars : ndarray, shape (n, 2)
-        Their end nodes: droppers, steady arms.
+        End nodes of the bars: droppers, steady arms.
     tension : ndarray, shape (n,)
         [N].
     points : ndarray, shape (n_nodes, 3)
-        Where the nodes are [m].
+        Positions of the nodes [m].
 
     Returns
     -------
@@ -153,7 +153,7 @@ def pendulum_stiffness(bars: IntArray, tension: FloatArray, points: FloatArray) 
 
 
 def _translations(bars: IntArray) -> IntArray:
-    """Return the translations of the ends of bars among the degrees of freedom, shape (n, 6)."""
+    """Return the degrees of freedom that are translations of the ends of bars, shape (n, 6)."""
     return (bars[:, :, None] * NODE_DOFS + np.arange(3)).reshape(len(bars), 6)
 
 
@@ -167,7 +167,7 @@ def steady_arm_tension(
     points : ndarray, shape (n, 3)
         Reference positions [m].
     displacement : ndarray, shape (6 n,)
-        From there [m, rad].
+        Displacement from there [m, rad].
     """
     if definition.steady_arm is None:
         return np.zeros(0)
@@ -181,7 +181,7 @@ def steady_arm_tension(
 
 
 def _component(definition: CatenaryDefinition, name: str) -> list[float]:
-    """Return EA, EI, GJ, mass, J/A, tension, alpha, beta of a component type; zeros where the line has none."""
+    """Return EA, EI, GJ, mass, J/A, tension, alpha, beta of a component type; zeros if the line has none."""
     item = getattr(definition, name)
     if item is None or name == "dropper":
         return [0.0] * 8
@@ -214,14 +214,14 @@ def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray, size: int) -> sp.csc_mat
 
 
 def _gravity(M: sp.csc_matrix) -> FloatArray:
-    """Return the weights: the consistent mass times a uniform acceleration field."""
+    """Return the weight: the consistent mass times a uniform acceleration field."""
     field = np.zeros((M.shape[0] // NODE_DOFS, NODE_DOFS))
     field[:, 2] = -GRAVITY
     return np.asarray(M @ field.ravel())
 
 
 def _tensioning(mesh: CatenaryMesh, axes: FloatArray, tension: FloatArray, size: int) -> FloatArray:
-    """Return the constant tension of every wire element, pulling its two nodes together [2.9]."""
+    """Return the load of the constant tension in every wire element, which pulls its two nodes together [2.9]."""
     load = np.zeros((size // NODE_DOFS, NODE_DOFS))
     pull = tension[:, None] * axes[:, 0, :]
     np.add.at(load[:, :3], mesh.owner[mesh.beams[:, 0]], pull)
@@ -230,9 +230,9 @@ def _tensioning(mesh: CatenaryMesh, axes: FloatArray, tension: FloatArray, size:
 
 
 def _kinks(K_e: FloatArray, axes: FloatArray, dofs: IntArray, is_wire: np.ndarray, size: int) -> FloatArray:
-    """Return the load that makes rotations count from a straight wire, not from the chords of the mesh.
+    """Return the load that refers rotations to a straight wire, not to the chords of the mesh.
 
-    Without it the polygon through the reference points would be the wire's unbent shape.
+    Without it the polygon through the reference points would be the unbent shape of the wire.
     """
     rotation = np.zeros((len(axes), 12))
     along = axes[:, 0, :]

@@ -29,11 +29,11 @@ class Elasticity:
     Attributes
     ----------
     x : ndarray, shape (n,)
-        Where the force pushes [m].
+        Positions of the force [m].
     value : ndarray, shape (n,)
         Uplift per force [m/N].
     force : float
-        The force [N]; droppers go slack, so the elasticity depends on it.
+        The force [N], on which the elasticity depends, as droppers go slack.
     """
 
     x: FloatArray
@@ -64,14 +64,14 @@ def elasticity(model: CatenaryModel, x: FloatArray, force: float, section: int =
     x : ndarray, shape (n,)
         Positions along the track [m].
     force : float
-        Vertical force, one position after the other [N].
+        Vertical force, applied at one position after the other [N].
     section : int
-        Whose contact wire.
+        Section of the contact wire.
 
     Raises
     ------
     LocalSolutionError
-        If the slack droppers under the force are not found.
+        If the set of slack droppers under the force is not found.
     """
     response = _StaticResponse(model)
     wire = model.wires[section]
@@ -79,16 +79,16 @@ def elasticity(model: CatenaryModel, x: FloatArray, force: float, section: int =
 
 
 def positions_in_span(span: Span, between: int = 6) -> FloatArray:
-    """Return supports, droppers and points between them, ``between`` intervals to a gap [m]."""
+    """Return the positions of supports, droppers and points that divide every gap into ``between`` intervals [m]."""
     breaks = [span.start, *span.droppers, span.end]
     pieces = [np.linspace(a, b, between, endpoint=False) for a, b in pairwise(breaks)]
     return np.append(np.concatenate(pieces), span.end)
 
 
 class _StaticResponse:
-    """The line's static compliance, its slack droppers found exactly.
+    """Static compliance of the line, with the slack droppers found exactly.
 
-    At rest modes of intervals and attachments do not act on each other.
+    At rest the modes of the intervals and the attachments do not act on each other.
     """
 
     def __init__(self, model: CatenaryModel) -> None:

@@ -55,9 +55,10 @@ class ArmLoads:
     lateral : ndarray
         Lateral force of the contact wire on the arm [N], positive where the arm is in tension.
     lift : ndarray
-        Vertical force of the arm's tension on the contact wire [N], positive up; its weight comes on top.
+        Vertical force on the contact wire from the tension of the arm [N], positive upwards; the weight of the arm is
+        not included.
     pendulum : ndarray
-        What the arm resists motion across its axis with, N/l [N/m].
+        Stiffness of the arm against motion across its axis, N/l [N/m].
     """
 
     x: FloatArray
@@ -86,7 +87,7 @@ def profiles(model: CatenaryModel, section: int = 0) -> tuple[Profile, ...]:
 
 
 def within(profile: Profile, span: Span) -> BoolArray:
-    """Return which points of a wire lie in a span, its ends included (the wires' stretch moves points by 0.1 mm)."""
+    """Return which points of a wire lie in a span, its ends included (stretch moves points by 0.1 mm)."""
     return (profile.x >= span.start - 0.01) & (profile.x <= span.end + 0.01)
 
 

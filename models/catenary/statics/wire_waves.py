@@ -23,11 +23,11 @@ class Waves:
     Attributes
     ----------
     speed : float
-        Of the waves [m/s].
+        Wave speed C [m/s].
     train_speed : float
-        [m/s].
+        Train speed V [m/s].
     reflection : float
-        r, share of a wave that comes back from a dropper.
+        r, share of a wave that a dropper reflects.
     doppler : float
         alpha = (C - V) / (C + V).
     """
@@ -44,7 +44,7 @@ class Waves:
 
     @property
     def amplification(self) -> float:
-        """Return r / alpha; infinite from the wave speed on."""
+        """Return r / alpha, infinite at the wave speed and above."""
         return self.reflection / self.doppler if self.doppler > 0.0 else math.inf
 
 
@@ -61,7 +61,7 @@ def wave_speed(wire: Wire, length: float) -> float:
 
 
 def contact_wire_wave_speed(definition: CatenaryDefinition) -> float:
-    """Return the wave speed of a line's contact wire, taken for its longest span, where it is lowest [m/s]."""
+    """Return the wave speed of the contact wire in the longest span, where it is lowest [m/s]."""
     longest = max(span.length for section in definition.sections for span in section.spans)
     return wave_speed(definition.contact_wire, longest)
 
@@ -73,9 +73,9 @@ def reflection_factor(upper: Wire, contact: Wire) -> float:
 
 
 def waves(definition: CatenaryDefinition, speed: float, length: float) -> Waves:
-    """Return the wave figures of a line at a train speed [m/s]; ``length`` is the span's [m].
+    """Return the wave figures of a line at a train speed [m/s] in a span of some ``length`` [m].
 
-    The droppers' upper wire is the messenger wire, in a compound line the auxiliary wire.
+    The upper wire of the droppers is the messenger wire, or in a compound line the auxiliary wire.
     """
     C = wave_speed(definition.contact_wire, length)
     upper = definition.auxiliary_wire or definition.messenger_wire

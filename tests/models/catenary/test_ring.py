@@ -383,14 +383,14 @@ def test_responses_reach_round_the_seam(ring_maker):
         ({"steady_arm": None}, "steady_arm: a periodic line needs a table [steady_arm]: it has no anchors, and nothing "
          "else holds the contact wire"),
         ({"stagger": {"amplitude": [0.2, "m", "test"], "anchor": [0.1, "m", "test"]}},
-         "section[1].stagger.anchor: a periodic line has no anchors: take this value away"),
+         "section[1].stagger.anchor: a periodic line has no anchors: remove this value"),
         ({"stagger": {"listed": [[0.2, -0.2, 0.1], "m", "test"]}, "spans": 4},
          "section[1].stagger.listed: has 3 values where 4 are needed"),
         ({"type": "stitched", "stitch_wire": {
             "length": [18.0, "m", "test"], "area": [35.0, "mm2", "test"], "mass": [0.31, "kg/m", "test"],
             "youngs_modulus": [1e5, "MPa", "test"], "tension": [2.8, "kN", "test"]}},
-         "stitch_wire: a periodic line cannot have stitch wires: that of its first support would lie across the place "
-         "where it closes; take type 'simple' or 'compound'"),
+         "stitch_wire: a periodic line cannot have stitch wires: the one at its first support would lie across the "
+         "seam; take type 'simple' or 'compound'"),
     ],
 )  # fmt: skip
 def test_what_does_not_close_is_told(ring_maker, changes, sentence):
@@ -412,7 +412,7 @@ def _of_sections(section_maker, *extra):
     [
         ([{}, {}], "section: 2 sections: a periodic line has one; write one section, or no 'periodic'"),
         ([{"ends": {"spans": 1, "rise": [0.1, "m", "test"]}}],
-         "section[1].ends: a periodic line has no ends: take this table away"),
+         "section[1].ends: a periodic line has no ends: remove this table"),
         ([{"measured": {"positions": [[0.0, 200.0], "m", "test"], "heights": [[5.1, 5.0], "m", "test"]}}],
          "section[1].measured.heights: a periodic line ends as it begins: the last height must be the first, 5.1 m, "
          "not 5 m"),

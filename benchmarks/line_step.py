@@ -1,7 +1,8 @@
 """What a step of the line costs, and on what: ``python benchmarks/line_step.py [LINE]``.
 
 The bare model without a load and under a CX pantograph, both at 1 ms, and the same line as FMU called by fmpy; then
-what the steps under the pantograph are spent on, measured by clocks around the parts of a step.
+what the steps under the pantograph are spent on, measured by clocks around the parts of a step. Without kernels
+(``OPENPANTO_KERNEL=numpy``) also the line with its mass coupling stored by rows, not by dense blocks.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from unittest.mock import patch
 
 from clocks import Clocks, Parts
 from fmu_calls import stepped
@@ -16,6 +18,7 @@ from timing import by_turns, on_one_thread, table
 
 from models.catenary.contact_and_slack import local_problem
 from models.catenary.line_model import CatenaryModel
+from models.catenary.step import numpy_engine
 from models.coupled.monolithic import CoupledModel
 from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_model import LumpedModel
@@ -36,6 +39,8 @@ def main(name: str) -> None:
         "line under a pantograph, monolithic": under,
         "line as FMU, without contact": lambda: fmu(STEPS),
     }
+    if isinstance(model._step(STEP).engine, numpy_engine.NumpyEngine):
+        jobs["line, coupling by rows"] = without_load(by_rows(name))
     best = by_turns(jobs)
     each = {}
     for job, t in best.items():
@@ -60,6 +65,14 @@ def parts(model: CatenaryModel) -> Parts:
         "pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of")),
         "rest of the line": (CatenaryModel, ("step",)),
     }
+
+
+def by_rows(name: str) -> CatenaryModel:
+    """Return a line whose mass coupling is stored by rows, as that of a line with intervals of several sizes is."""
+    model = CatenaryModel(load_line(name))
+    with patch.object(numpy_engine, "_by_blocks", return_value=None):
+        model._step(STEP)
+    return model
 
 
 def without_load(model: CatenaryModel) -> Callable[[], None]:

@@ -32,7 +32,7 @@ from models.arrays import FloatArray, IntArray
 from models.catenary.definition.line_definition import COMPONENTS, SHEAR_RATIO
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
-from models.catenary.shape.line_matrices import beam_properties, compression_ratio, dropper_stiffness
+from models.catenary.shape.line_matrices import beam_properties
 
 #: Tags: one load pattern holds the weight, one a static force, those from the third on a moving force's histories.
 _WEIGHT, _POINT, _MOVING = 1, 2, 3
@@ -95,7 +95,7 @@ class WirePoints:
     def __init__(self, model: CatenaryModel, section: int = 0) -> None:
         self._nodes = model.mesh.contact_chains()[section].nodes
         self._x = model.static.positions[self._nodes, 0]
-        points = model.static.points[self._nodes]
+        points = model.static.shape.points[self._nodes]
         self._axes, self._length = frames(points[:-1], points[1:])
 
     def at(self, x: float) -> Point:
@@ -140,7 +140,7 @@ class OpenSeesLine:
     def _nodes(self) -> None:
         mesh = self.model.mesh
         for node, (point, fixed, mass) in enumerate(
-            zip(self.model.static.points.tolist(), mesh.fixed.tolist(), mesh.clamp_mass.tolist(), strict=True)
+            zip(self.model.static.shape.points.tolist(), mesh.fixed.tolist(), mesh.clamp_mass.tolist(), strict=True)
         ):
             ops.node(node, *point)
             if any(fixed):
@@ -177,11 +177,10 @@ class OpenSeesLine:
         Corotational trusses would too, but do not find the equilibrium from wires that are only being stretched.
         """
         mesh, static, definition = self.model.mesh, self.model.static, self.model.definition
-        stiffness = dropper_stiffness(definition, mesh, static.positions)
-        ratio = compression_ratio(definition, mesh)
+        stiffness, ratio = static.droppers.stiffness, static.droppers.compression_ratio
         per_length = np.where(mesh.is_hanger, getattr(definition.hanger, "mass", 0.0), definition.dropper.mass)
         for j, (lower, upper) in enumerate(mesh.droppers.tolist()):
-            length = math.dist(static.points[lower], static.points[upper])
+            length = math.dist(static.shape.points[lower], static.shape.points[upper])
             EA = float(stiffness[j]) * length
             tag = 2 * j + 1
             ops.uniaxialMaterial("Elastic", tag, EA, 0.0, float(ratio[j]) * EA)
@@ -196,7 +195,7 @@ class OpenSeesLine:
         """Hold droppers back across their axes; the first tags of materials and elements that are free are given."""
         mesh, static = self.model.mesh, self.model.static
         for j, (lower, upper) in enumerate(mesh.droppers.tolist()):
-            ops.uniaxialMaterial("Elastic", material + j, max(static.dropper_force[j], 0.0) / static.dropper_length[j])
+            ops.uniaxialMaterial("Elastic", material + j, max(static.dropper_force[j], 0.0) / static.droppers.length[j])
             materials = (material + j, material + j)
             ops.element("zeroLength", element + j, lower, upper, "-mat", *materials, "-dir", 1, 2)
 
@@ -222,7 +221,7 @@ class OpenSeesLine:
     def _weight(self) -> None:
         """Apply our static load but for the tension, which here is inside the elements."""
         axes, _ = self._frames()
-        mesh, load = self.model.mesh, self.model.static.matrices.load.reshape(-1, NODE_DOFS).copy()
+        mesh, load = self.model.mesh, self.model.static.shape.matrices.load.reshape(-1, NODE_DOFS).copy()
         pull = beam_properties(self.model.definition, mesh).tension[:, None] * axes[:, 0]
         np.add.at(load[:, :3], mesh.beams[:, 0], -pull)
         np.add.at(load[:, :3], mesh.beams[:, 1], pull)
@@ -237,7 +236,7 @@ class OpenSeesLine:
         """Let droppers hang upright between the stretched wires: the springs across them count from there."""
         mesh, static = self.model.mesh, self.model.static
         for j, (lower, upper) in enumerate(mesh.droppers.tolist()):
-            pull = static.dropper_force[j] / static.dropper_length[j] * (self._moved[upper] - self._moved[lower])
+            pull = static.dropper_force[j] / static.droppers.length[j] * (self._moved[upper] - self._moved[lower])
             load[lower, 0] -= pull
             load[upper, 0] += pull
 
@@ -260,7 +259,7 @@ class OpenSeesLine:
 
     def _frames(self) -> tuple[FloatArray, FloatArray]:
         start, end = self.model.mesh.beams.T
-        points = self.model.static.points
+        points = self.model.static.shape.points
         return frames(points[start], points[end])
 
     def heights(self, nodes: IntArray) -> FloatArray:

@@ -179,7 +179,7 @@ def at_speed(pantograph: Definition, speed: float | None) -> Definition:
 
 def speed_of(pantograph: Definition) -> float:
     """Return a pantograph's speed [m/s]."""
-    return pantograph.speed if isinstance(pantograph, LumpedDefinition) else pantograph.operation.speed
+    return pantograph.speed
 
 
 def system_of(line: CatenaryDefinition, pantograph: Definition) -> System:

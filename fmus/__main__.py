@@ -14,7 +14,7 @@ from fmus.builder.recipe import MAX_PORTS, BuildError, Recipe, UnknownFmuError, 
 from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
 from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
-from models.definition_files.toml_reader import printable
+from models.definition_files.message_text import printable
 
 DEFAULT_FOLDER = Path("build/fmus")
 

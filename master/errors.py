@@ -1,4 +1,4 @@
-"""What can go wrong, in words for the user: what, where, which value, what to do."""
+"""What can go wrong, in words for the user: what, where, which value, what to do about it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-#: Longest value or text that is told in full [characters], and most problems that are told at once.
+#: Longest value or text that is shown in full [characters], and most problems that are listed at once.
 _LONGEST: Final = 400
 _MOST: Final = 100
 
@@ -75,7 +75,7 @@ class Problem:
 
 
 class MasterError(Exception):
-    """A failure that is told to the user as one message, never as a traceback."""
+    """A failure that the user sees as one message, never as a traceback."""
 
 
 class ScenarioError(MasterError):
@@ -106,11 +106,11 @@ class ForeignResultsError(MasterError):
 
 
 class RequestError(MasterError):
-    """A command line that asks for what cannot be had: a name that is nowhere, a value out of range.
+    """A command line that asks for something impossible: a name that does not exist, a value out of range.
 
     The command has failed (exit code 1), as it has for a scenario or a file that cannot be used.
     """
 
 
 class UsageError(MasterError):
-    """A command line that was not understood: options that lack or exclude one another (exit code 2)."""
+    """A command line that was not understood: options that need or exclude one another (exit code 2)."""

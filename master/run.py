@@ -151,7 +151,7 @@ def _failure_noted(folder: RunFolder, description: dict[str, Any], stop_wanted: 
         cause = None if isinstance(error, KeyboardInterrupt) or is_interrupted else error
         start = description["settings"]["start"]
         outcome = RunOutcome("interrupted" if is_interrupted else "failed", 0, start, cause)
-        if folder.is_intact:
+        if folder.holds_this_run:
             folder.write_summary({**description, **run_summary.ending(outcome)})
         if is_interrupted:
             raise InterruptedRunError(_what_happened(outcome, folder.path)) from error
@@ -252,7 +252,7 @@ class RunSession:
             outcome, not_judged = self._judged(outcome, recordings[0])
             done = self._written(outcome, not_judged, recordings)
         except ForeignResultsError as error:
-            if self._folder.is_intact:
+            if self._folder.holds_this_run:
                 self._folder.write_summary({**self._description, "status": "failed", "reason": str(error)})
             raise ForeignResultsError(f"{outcome.error}. {error}" if outcome.error else str(error)) from error
         except MasterError as error:  # no room for the summary, say
@@ -266,7 +266,7 @@ class RunSession:
 
     def _recordings(self, is_complete: bool) -> tuple[Recording, ...]:
         """Read what was recorded, if it is still this run's."""
-        if not self._folder.is_intact:
+        if not self._folder.holds_this_run:
             text = f"the results in {self._folder.path} were removed or taken by another run"
             raise ForeignResultsError(f"{text} {RERUN_ADVICE}")
         return tuple(recorder.read_back(is_complete) for recorder in self._recorders)

@@ -17,12 +17,12 @@ import numpy as np
 
 from models.arrays import FloatArray
 
-#: Below this penetration velocity an impact has no velocity to refer to [m/s].
+#: Lowest impact velocity to which the damping of a contact refers [m/s].
 _SLOWEST_IMPACT = 1e-6
 
 
 class ContactParameters(Protocol):
-    """What a contact law needs."""
+    """Parameters of a contact law."""
 
     @property
     def stiffness(self) -> float:
@@ -38,7 +38,7 @@ class ContactParameters(Protocol):
 
 
 class NormalForce(NamedTuple):
-    """Normal force and its derivatives by penetration [N/m] and penetration velocity [N s/m]."""
+    """Normal force and its derivatives with respect to penetration [N/m] and penetration velocity [N s/m]."""
 
     force: float
     by_penetration: float
@@ -82,9 +82,9 @@ def continuous_contact(
 
 #: Penetration, its velocity, the velocity at impact, parameters -> normal force and its slopes.
 #:
-#: A law must be continuous in penetration and velocity, and give no force without penetration nor ever pull. A step
-#: looks for the force that the law gives at the penetration that this very force leaves; where a law jumps over it
-#: there is none, however short the step. So every law comes in through `register_contact_law`, which looks for jumps.
+#: A law must be continuous in penetration and velocity, give no force without penetration and never pull. A step solves
+#: for the force that the law gives at the penetration which this force leaves; where the law jumps there is no
+#: solution, however short the step. So every law is registered through `register_contact_law`, which looks for jumps.
 ContactLaw = Callable[[float, float, float, ContactParameters], NormalForce]
 _laws: dict[str, ContactLaw] = {}
 #: Contact laws by name.
@@ -92,38 +92,38 @@ CONTACT_LAWS: Final[Mapping[str, ContactLaw]] = MappingProxyType(_laws)
 
 
 class ContactLawError(ValueError):
-    """A contact law that no step could be solved with."""
+    """A contact law with which a step has no solution."""
 
 
 class _Trial(NamedTuple):
-    """Parameters that a law is tried with."""
+    """Parameters with which a law is tested."""
 
     stiffness: float
     exponent: float
     restitution: float
 
 
-#: What a law is tried with: parameters, penetrations [m] and velocities [m/s] of the order of a pantograph's.
+#: Test range of a law: parameters, penetrations [m] and velocities [m/s] typical of a pantograph.
 _TRIALS: Final = (_Trial(5e4, 1.0, 1.0), _Trial(2e5, 1.5, 0.7))
 _DEEPEST: Final = 0.02
 _FASTEST: Final = 1.0
 _IMPACT: Final = 0.3
 _PIECES: Final = 32
-#: Largest change of a force over a vanishing change of its arguments [N].
+#: Largest change of the force over a vanishing change of its arguments [N].
 _JUMP: Final = 1e-3
 _HALVINGS: Final = 48
 
 
 def register_contact_law(name: str, law: ContactLaw) -> None:
-    """Make a contact law known under a name.
+    """Register a contact law under a name.
 
     Raises
     ------
     ContactLawError
-        If the name is taken, or if the law jumps, pulls, is not finite or acts without penetration, with the place.
+        If the name is taken, or if the law jumps, pulls, is not finite or acts without penetration; says where.
     """
     if name in _laws:
-        raise ContactLawError(f"there is a contact law '{name}' already")
+        raise ContactLawError(f"there is already a contact law '{name}'")
     for trial in _TRIALS:
         for velocity in (-0.4, 0.0, 0.4):
             _check_sweep(name, _over_penetration(law, trial, velocity), -_DEEPEST, _DEEPEST, "penetration")
@@ -141,7 +141,7 @@ def _over_velocity(law: ContactLaw, trial: _Trial, penetration: float) -> Callab
 
 
 def _check_sweep(name: str, force: Callable[[float], float], low: float, high: float, what: str) -> None:
-    """Refuse a law that has no sound force somewhere between two values of an argument."""
+    """Reject a law whose force is invalid somewhere between two values of an argument."""
     at = [low + (high - low) * i / _PIECES for i in range(_PIECES + 1)]
     values = [force(x) for x in at]
     for x, value in zip(at, values, strict=True):
@@ -159,7 +159,7 @@ def _check_sweep(name: str, force: Callable[[float], float], low: float, high: f
 def _jump(
     force: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return by how much a force changes over the shortest piece of an interval that it changes most over, and where.
+    """Return the change of a force over the shortest piece of an interval with the largest change, and where it is.
 
     Examples
     --------
@@ -184,12 +184,12 @@ register_contact_law("continuous", continuous_contact)
 def application_point(force: FloatArray, point: FloatArray, strip: FloatArray) -> FloatArray:
     """Return where the resultant of the vertical forces on one strip acts, shape (3,) [m].
 
-    Without force it is the place where the strip crosses a wire, or else the strip's middle.
+    Without force it is the point where the strip crosses a wire, or else the middle of the strip.
 
     Parameters
     ----------
     force : ndarray, shape (n_sections,)
-        Per wire, none negative [N].
+        Force on each wire, none negative [N].
     point : ndarray, shape (n_sections, 3)
         Points of contact [m]; NaN where strip and wire do not cross.
     strip : ndarray, shape (2, 2, 3)
@@ -201,7 +201,7 @@ def application_point(force: FloatArray, point: FloatArray, strip: FloatArray) -
     >>> application_point(np.array([100.0, 50.0]), point, np.zeros((2, 2, 3))).round(6).tolist()
     [10.0, 0.1, 5.1]
     """
-    forces, points = force.tolist(), point.tolist()  # plain floats: for so few wires faster than arrays
+    forces, points = force.tolist(), point.tolist()  # plain floats are faster than arrays for so few wires
     total = sum(forces)
     if total > 0.0:
         moment_x = moment_y = moment_z = 0.0

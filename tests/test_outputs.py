@@ -35,7 +35,7 @@ WHOLE = {
     "master/results/parquet_export.py": {"_write"},
     "master/report/film_file.py": {"write_film"},
     "master/ssp/pack.py": {"pack"},
-    "models/commands/physics_files.py": {"write_whole", "write_csv", "write_figure"},
+    "models/commands/physics_files.py": {"write_atomically", "write_csv", "write_figure"},
     "models/numerics/kernel_cache.py": None,
     "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_atomically"},
     "fmus/loader/runtime.py": {"_archive", "_replace"},
@@ -164,13 +164,13 @@ def test_a_full_standard_output_is_named(monkeypatch, capsys):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
 @pytest.mark.parametrize(
-    ("write", "raised"), [(safe_files.write_atomically, MasterError), (physics_files.write_whole, OSError)]
+    ("write", "raised"), [(safe_files.write_atomically, MasterError), (physics_files.write_atomically, OSError)]
 )
 def test_what_is_no_file_is_not_replaced(tmp_path, write, raised):
     """Such as /dev/null, for everybody, when it is root who writes."""
     path = tmp_path / "device"
     os.mkfifo(path)
-    with pytest.raises(raised, match="is no file, and is left alone"):
+    with pytest.raises(raised, match="is not a file and is left alone"):
         write(path, b"new")
     assert path.is_fifo()
     assert [p.name for p in tmp_path.iterdir()] == ["device"]

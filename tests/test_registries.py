@@ -6,6 +6,7 @@ import argparse
 import ast
 import inspect
 import typing
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -28,14 +29,14 @@ from models.catenary.definition.line_definition import Contact
 from models.commands import physics_main
 from models.contact_law import CONTACT_LAWS, ContactLawError, NormalForce, continuous_contact, register_contact_law
 from models.definition_files.si_units import SI, to_si
-from models.pantograph.multibody import mechanism_definition
+from models.definition_files.toml_reader import DefinitionError
 from models.pantograph.multibody.elements import joints
-from models.pantograph.multibody.elements.force_elements import KNOWN_KINDS, ForceElements
+from models.pantograph.multibody.elements.force_elements import KNOWN, ForceElements
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble
-from models.pantograph.multibody.mechanism_definition import FORCE_KINDS, JOINT_KINDS
+from models.pantograph.multibody.mechanism_definition import FORCES, JOINTS, Force, PairJoint
 from tests.master.conftest import FakeSlave
-from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism_data, q
+from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism_data, mechanism_from, q
 
 ROOT = Path(__file__).parents[1]
 
@@ -133,7 +134,7 @@ def test_a_sound_law_is_registered_once(monkeypatch):
     monkeypatch.setattr(contact_law, "_laws", {})
     register_contact_law("mine", continuous_contact)
     assert contact_law._laws == {"mine": continuous_contact}
-    with pytest.raises(ContactLawError, match="there is a contact law 'mine' already"):
+    with pytest.raises(ContactLawError, match="there is already a contact law 'mine'"):
         register_contact_law("mine", continuous_contact)
 
 
@@ -142,32 +143,26 @@ def test_a_sound_law_is_registered_once(monkeypatch):
 POINTS = {"point_i": (0.5, 0.0, 0.0), "point_j": (-0.5, 0.0, 0.0)}
 
 
-@pytest.mark.parametrize("kind", sorted(set(JOINT_KINDS) - {"prescribed_motion"}))
+@pytest.mark.parametrize("kind", sorted(set(JOINTS) - {"prescribed_motion"}))
 def test_every_kind_of_joint_holds_something(kind):
     across = {"axis_i": (0.0, 1.0, 0.0), "axis_j": (0.0, 0.0, 1.0)}
     along = {"axis_i": (0.0, 1.0, 0.0), "axis_j": (0.0, 1.0, 0.0)}
     axes = across if kind in ("universal", "perpendicular", "revolute_prismatic") else along
     rod = body(2.0, (0.1, 0.2, 0.2), (1.0, 0.0, 0.0))
     data = mechanism_data({"rod": rod}, {"it": joint(kind, "base", "rod", **POINTS, **axes)})
-    data["joint"]["it"] = {k: v for k, v in data["joint"]["it"].items() if _wanted(kind, k)}
-    assert len(Mechanism(mechanism_definition.from_dict(data)).rows) >= 1
-
-
-def _wanted(kind, key):
-    if key.startswith("point"):
-        return kind in mechanism_definition._WITH_POINTS
-    if key.startswith("axis"):
-        return kind in (mechanism_definition._WITH_AXIS_I if key == "axis_i" else mechanism_definition._WITH_AXIS_J)
-    return True
+    wanted = {"kind", *(f.name for f in fields(JOINTS[kind]))}
+    data["joint"]["it"] = {k: v for k, v in data["joint"]["it"].items() if k in wanted}
+    assert len(Mechanism(mechanism_from(data)).rows) >= 1
 
 
 def test_kinds_of_joints_are_those_that_have_rows():
-    assert set(joints.JOINT_ROWS) | {"prescribed_motion"} == set(JOINT_KINDS)
+    assert set(joints.JOINT_ROWS) == {cls for cls in JOINTS.values() if issubclass(cls, PairJoint)}
+    assert {kind for kind, cls in JOINTS.items() if not issubclass(cls, PairJoint)} == {"prescribed_motion"}
 
 
 def test_a_kind_of_joint_without_rows_is_no_free_joint():
-    with pytest.raises(mechanism_definition.DefinitionError, match="is none of"):
-        mechanism_definition.from_dict(mechanism_data({}, {"it": joint("glued", "base", "base")}))
+    with pytest.raises(DefinitionError, match="is none of"):
+        mechanism_from(mechanism_data({}, {"it": joint("glued", "base", "base")}))
 
 
 #: Values with which each kind of force pushes on a rod that moves.
@@ -192,7 +187,7 @@ def pushed(kind):
     hinge = joint("revolute", "base", "rod", point_i=(0, 0, 0), point_j=(-0.5, 0, 0), **axes)
     rod = body(2.0, (0.01, 0.2, 0.2), (0.5, 0.0, 0.0))
     data = mechanism_data({"rod": rod}, {"hinge": hinge}, {"it": {"kind": kind, **given}})
-    mechanism = Mechanism(mechanism_definition.from_dict({**data, "gravity": q(0.0, "m/s2")}))
+    mechanism = Mechanism(mechanism_from({**data, "gravity": q(0.0, "m/s2")}))
     y = assemble(mechanism)
     r, p, v, w = mechanism.split(y)
     w = w.copy()
@@ -201,22 +196,32 @@ def pushed(kind):
     return mechanism.loads(moving, mechanism.kinematics(moving), Inputs())
 
 
-@pytest.mark.parametrize("kind", FORCE_KINDS)
+@pytest.mark.parametrize("kind", FORCES)
 def test_every_kind_of_force_pushes(kind):
     loads = pushed(kind)
     assert np.abs(loads[1]).max() > 0.1
     np.testing.assert_allclose(loads[0, :3], -loads[1, :3], atol=1e-12)  # action and reaction
 
 
+def leaves(cls):
+    """Yield the classes of the definition that nothing is derived from."""
+    below = [c for c in cls.__subclasses__() if c.__module__ == Force.__module__]
+    yield from (leaf for c in below for leaf in leaves(c))
+    if not below:
+        yield cls
+
+
 def test_kinds_of_forces_are_the_same_in_every_list():
-    assert set(FORCE_KINDS) == KNOWN_KINDS == set(GIVEN)
-    reader = mechanism_definition._Reader(mechanism_definition.Table.from_dict({}))
-    assert set(reader._force_readers) == set(FORCE_KINDS) - {"joint_friction"}
+    assert set(FORCES) == set(GIVEN)
+    assert set(KNOWN) == set(leaves(Force))
 
 
 def test_a_kind_of_force_that_nobody_computes_is_refused():
-    with pytest.raises(ValueError, match="force 'it': nothing is known of its kind 'magnet'"):
-        ForceElements([mechanism_definition.Force("it", "magnet")], {}, np.zeros((0, 3, 3)), None)
+    class Magnet(Force):
+        pass
+
+    with pytest.raises(ValueError, match="force 'it': nothing computes a Magnet"):
+        ForceElements([Magnet(name="it")], [], {}, np.zeros((0, 3, 3)), None)
 
 
 # Quantities, charts, verbs, units

@@ -138,7 +138,7 @@ static void clean(char *text) {
 
 /* ---- Reporting ------------------------------------------------------------------------------------------------ */
 
-static void tell(const Callbacks *host, String name, Status status, String category, String message) {
+static void report(const Callbacks *host, String name, Status status, String category, String message) {
     if (!host || !host->logger) return;
     const char *fallback = status >= ERROR ? "logStatusError" : status == WARNING ? "logStatusWarning" : "logAll";
     host->logger(host->environment, name, status, category && *category ? category : fallback, message);
@@ -148,7 +148,7 @@ static void *refuse(const Callbacks *host, String name, Problem *problem) {
     clean(problem->text);
     fprintf(stderr, "%s: %s\n", name, problem->text);
     fflush(stderr);
-    tell(host, name, ERROR, NULL, problem->text);
+    report(host, name, ERROR, NULL, problem->text);
     return NULL;
 }
 
@@ -181,7 +181,7 @@ static void pass_message(void *environment, String name, Status status, String c
     clean(text);
     if (status == FATAL) status = ERROR; /* other instances are not touched by it */
     if (status > instance->worst) instance->worst = status;
-    if (instance->logging || status >= ERROR) tell(&instance->host, name, status, category, text);
+    if (instance->logging || status >= ERROR) report(&instance->host, name, status, category, text);
     free(text);
 }
 
@@ -725,7 +725,7 @@ static void compare_versions(const Instance *instance, const char *folder) {
     if (call_opening("other_versions", wanted, setting(&about, "content"), answer, sizeof answer) && *answer) {
         clean(answer);
         fprintf(stderr, "%s: %s\n", instance->name, answer);
-        tell(&instance->host, instance->name, WARNING, NULL, answer);
+        report(&instance->host, instance->name, WARNING, NULL, answer);
     }
     free(about.text);
 }

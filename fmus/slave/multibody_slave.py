@@ -10,7 +10,8 @@ from fmus.slave.adapter import Adapter
 from fmus.slave.lumped_slave import pantograph_ports
 from fmus.slave.ports import Ports
 from models.arrays import FloatArray
-from models.pantograph.multibody.mechanism_definition import MechanismDefinition, load
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.multibody.mechanism_reading import load_mechanism
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 
 
@@ -30,7 +31,7 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
     )
 
     def _read_definition(self, path: Path) -> MechanismDefinition:
-        return load(path)
+        return load_mechanism(path)
 
     def _make_part(self, definition: MechanismDefinition) -> MultibodyPantographPart:
         return MultibodyPantographPart(definition)

@@ -1,7 +1,7 @@
-"""What verification and study have in common: runs, one after the other, and a state that is on disk after each.
+"""The skeleton of verification and study: tasks are run one after the other, and the state is on disk after each.
 
-A batch is a state, a row of tasks, and what a task adds to the state. Whatever ends it, its folder holds what was
-finished until then, and says so: page and JSON are written before the first task and after each.
+A batch consists of a state, a sequence of tasks, and a function that adds the result of a task to the state. Its files
+are written before the first task and after each, so whatever ends it, the folder shows what was finished and says so.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from master.scenario.overrides import Overrides
 from master.system.components import System
 from master.system.step_rounding import adjustments
 
-#: Makes the observers of one run, and takes them away after it.
+#: Makes the observers of a run and removes them afterwards.
 ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
 
@@ -37,14 +37,14 @@ def no_observers(_: System) -> Iterator[Sequence[Observer]]:
 
 @dataclass(frozen=True)
 class Runner:
-    """How runs are made.
+    """Opens scenarios and makes runs.
 
     Attributes
     ----------
     observers : callable
         System -> context manager that yields the observers of its run (progress).
     tell : callable
-        Shows the user what takes time, and what FMUs warn of.
+        Shows the user what takes time and the warnings of FMUs.
     build : bool
         Whether missing or stale FMUs are built.
     """
@@ -80,14 +80,14 @@ def _now() -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchState:
-    """What every batch knows of itself.
+    """The part of the state that all batches share.
 
     Attributes
     ----------
     date : str
         When it began.
     versions : dict
-        Of what computed.
+        Versions of the programs that compute it.
     status : str
         running, complete or interrupted.
     """
@@ -103,12 +103,12 @@ Task = TypeVar("Task")
 
 @dataclass(frozen=True)
 class BatchFiles(Generic[State]):
-    """What a batch leaves in its folder.
+    """The files that a batch leaves in its folder.
 
     Attributes
     ----------
     kind, generator : str
-        What it is called in messages and in its JSON file, by which a later one knows the folder.
+        Its name in messages, and in the JSON file, by which a later batch recognises the folder.
     json : str
         Name of the JSON file.
     data : callable
@@ -124,16 +124,16 @@ class BatchFiles(Generic[State]):
     texts: Mapping[str, Callable[[State], str]]
 
     def write(self, state: State, folder: Path) -> None:
-        """Write what there is so far."""
+        """Write the files of a state."""
         results_folder.write_json(folder / self.json, {"generator": self.generator, **self.data(state)})
         for name, text in self.texts.items():
             results_folder.write_text(folder / name, text(state))
 
 
-def work_off(
+def run_tasks(
     state: State, tasks: Iterable[Task], finish: Callable[[State, Task], State], files: BatchFiles[State], folder: Path
 ) -> State:
-    """Finish tasks one after the other, and return the last state.
+    """Run tasks one after the other and return the last state.
 
     Parameters
     ----------
@@ -141,10 +141,10 @@ def work_off(
         Before the first task.
     tasks : iterable
     finish : callable
-        State and task -> the state with what the task has found.
+        State and task -> the state with the result of the task.
     files : BatchFiles
     folder : Path
-        Made, or taken over if it is an earlier batch's of the same kind.
+        Created, or taken over from an earlier batch of the same kind.
 
     Raises
     ------

@@ -179,12 +179,12 @@ def run_shown(system: System, folder: Path, quiet: bool, options: RunOptions = _
     console = Terminal(stderr=True)  # that of the progress bar, which then stays below
     for text in adjustments(system, options.checkpoint_every):
         say(f"warning: {text}", console)
-    cautions = FmuWarningObserver(lambda caution: say(str(caution), console))
+    warnings = FmuWarningObserver(lambda warning: say(str(warning), console))
     if options.real_time is not None:  # drawing takes more time than a step has
         say(f"running for {(system.stop - system.start) / options.real_time:g} s by the wall clock")
-        return run(system, folder, [cautions], options)
+        return run(system, folder, [warnings], options)
     progress = ProgressObserver(console, system.start, system.stop)
     try:
-        return run(system, folder, [cautions, progress], options)
+        return run(system, folder, [warnings, progress], options)
     finally:
         progress.finish()

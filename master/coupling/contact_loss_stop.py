@@ -19,7 +19,7 @@ class ContactLossStop:
     Parameters
     ----------
     contacts : sequence of Contact
-        Whom to watch.
+        The contacts to watch.
     network : Network
         The network that will be run.
     longest : float
@@ -36,7 +36,7 @@ class ContactLossStop:
         self._longest = longest
 
     def begin(self, time: float, network: Network) -> None:
-        """Nothing is lost before it was found."""
+        """Nothing is lost before contact was made."""
 
     def observe(self, index: int, time: float, network: Network) -> None:
         """Look at the forces."""
@@ -54,7 +54,7 @@ class ContactLossStop:
         return list(self._last)
 
     def restore(self, memory: Sequence[float | None]) -> None:
-        """Go on from what another watch of the same contacts has seen."""
+        """Continue from what another observer of the same contacts has seen."""
         self._last = list(memory)
 
     def _lost(self, contact: Contact, last: float, network: Network) -> str:

@@ -1,8 +1,8 @@
 """How well the coupling conserves energy: the power residual at the interfaces.
 
-At a contact the catenary gives the force F and is told the strip's velocity v', the pantograph is told F'
+At a contact the catenary gives the force F and receives the strip's velocity v', the pantograph receives F'
 and gives v. What the pantograph loses, F' v, and what the catenary gains, F v', differ, because values are
-exchanged only once per step. The difference is power that the coupling makes up; its time integral is the
+exchanged only once per step. The difference is power that the coupling creates; its time integral is the
 energy added to the system (positive) or taken from it. Components that extrapolate their inputs within the
 step do better than this says: it is judged by the values at the communication points alone.
 """
@@ -46,18 +46,18 @@ _Values = TypeVar("_Values", float, FloatArray)
 
 
 def power_residual(
-    force_given: _Values, force_told: _Values, velocity_given: _Values, velocity_told: _Values
+    force_given: _Values, force_received: _Values, velocity_given: _Values, velocity_received: _Values
 ) -> _Values:
     """Return the power that the coupling adds [W].
 
     Parameters
     ----------
-    force_given, force_told : float, or ndarray, shape (n,)
+    force_given, force_received : float, or ndarray, shape (n,)
         Contact force that the catenary computed and that the pantograph used [N].
-    velocity_given, velocity_told : float, or ndarray, shape (n,)
+    velocity_given, velocity_received : float, or ndarray, shape (n,)
         Upward strip velocity that the pantograph computed and that the catenary used [m/s].
     """
-    return force_given * velocity_told - force_told * velocity_given
+    return force_given * velocity_received - force_received * velocity_given
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,11 @@ class _Port:
 
     contact: int
     given: tuple[int, int, int]
-    told: tuple[int, int, int]
+    received: tuple[int, int, int]
 
 
 class CouplingPowerObserver:
-    """Observer that sums up what is given and told at each contact.
+    """Observer that sums up what is given and received at each contact.
 
     Parameters
     ----------
@@ -95,12 +95,14 @@ class CouplingPowerObserver:
 
     def observe(self, index: int, time: float, network: Network) -> None:
         """Add the exchanged values of a step."""
-        given, told = network.outputs.item, network.inputs.item
+        given, received = network.outputs.item, network.inputs.item
         for port, sums in zip(self._ports, self._sums, strict=True):
             # The strip's middle stands for the point of contact.
-            (f, a, b), (f_told, a_told, b_told) = port.given, port.told
+            (f, a, b), (f_received, a_received, b_received) = port.given, port.received
             force, velocity = given(f), 0.5 * (given(a) + given(b))
-            residual = power_residual(force, told(f_told), velocity, 0.5 * (told(a_told) + told(b_told)))
+            residual = power_residual(
+                force, received(f_received), velocity, 0.5 * (received(a_received) + received(b_received))
+            )
             sums[0] += residual
             sums[1] += abs(force * velocity)
             sums[2] += residual * residual
@@ -110,11 +112,11 @@ class CouplingPowerObserver:
         """Nothing to close."""
 
     def save(self) -> list[float | None]:
-        """Return the sums, from which another observer of the same contacts goes on."""
+        """Return the sums, from which another observer of the same contacts continues."""
         return [float(self._count), *(value for sums in self._sums for value in sums)]
 
     def restore(self, memory: Sequence[float | None]) -> None:
-        """Go on from the sums of another observer."""
+        """Continue from the sums of another observer."""
         count, *values = (value or 0.0 for value in memory)
         self._count = round(count)
         self._sums = [values[i : i + 3] for i in range(0, len(values), 3)]
@@ -131,9 +133,9 @@ class CouplingPowerObserver:
 def _port(contact: Contact, outputs: dict[str, int], inputs: dict[str, int]) -> _Port | None:
     port = contact.prefix.removesuffix(".contact")
     given = (contact.force, contact.end("A", "vz"), contact.end("B", "vz"))
-    told = (contact.force_input, f"{port}.A.vz", f"{port}.B.vz")
-    if any(n not in outputs for n in given) or any(n not in inputs for n in told):
+    received = (contact.force_input, f"{port}.A.vz", f"{port}.B.vz")
+    if any(n not in outputs for n in given) or any(n not in inputs for n in received):
         return None
     f, a, b = (outputs[n] for n in given)
-    f_told, a_told, b_told = (inputs[n] for n in told)
-    return _Port(contact.index, (f, a, b), (f_told, a_told, b_told))
+    f_received, a_received, b_received = (inputs[n] for n in received)
+    return _Port(contact.index, (f, a, b), (f_received, a_received, b_received))

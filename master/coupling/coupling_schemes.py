@@ -1,4 +1,4 @@
-"""Coupling schemes: who is told what, and when, within a macro step.
+"""Coupling schemes: which slave receives what, and when, within a macro step.
 
 To add one, write a class with ``name`` and ``step`` and put it into `ALGORITHMS`, its name into
 ``master.ssp.run_settings.Scheme`` and its options into ``OPTIONS`` there: `tests/test_registries.py` walks all three.
@@ -32,18 +32,18 @@ class Algorithm(Protocol):
         """Advance all slaves from ``time`` to ``time + step``.
 
         On entry ``network.outputs`` holds the outputs at ``time``, on return those at ``time + step``;
-        ``network.inputs`` holds what the slaves were told for this step.
+        ``network.inputs`` holds what the slaves received for this step.
         """
 
     def save(self) -> FloatArray:
-        """Return what it remembers from step to step, as a flat array."""
+        """Return what the scheme keeps from step to step, as a flat array."""
 
     def restore(self, memory: FloatArray) -> None:
-        """Take such a memory back."""
+        """Restore what `save` returned."""
 
 
 class _Stateless:
-    """A scheme that remembers nothing from step to step."""
+    """A scheme that keeps nothing from step to step."""
 
     def save(self) -> FloatArray:
         """See `Algorithm.save`."""
@@ -68,7 +68,7 @@ class Jacobi(_Stateless):
 
 
 class GaussSeidel(_Stateless):
-    """Slaves step one after the other, each told the latest outputs, also those of the step's end.
+    """Slaves step one after the other; each receives the latest outputs, also those of the step's end.
 
     Parameters
     ----------
@@ -100,8 +100,8 @@ class GaussSeidel(_Stateless):
 class Iterative:
     """The step is repeated from restored states until the exchanged values settle: the yardstick.
 
-    The slaves are told the outputs of the step's end (``weight`` 1), as components that recognise such values
-    and interpolate need it. For components that simply hold their inputs over the step, ``weight`` 1/2 tells
+    The slaves receive the outputs of the step's end (``weight`` 1), as components that recognise such values
+    and interpolate need it. For components that simply hold their inputs over the step, ``weight`` 1/2 gives
     them the mean of beginning and end, which makes the converged coupling second order in the step.
 
     Parameters
@@ -188,7 +188,7 @@ def make_algorithm(coupling: Coupling) -> Algorithm:
     Raises
     ------
     RunError
-        If there is none of this name.
+        If there is no scheme of this name.
     """
     if coupling.scheme not in ALGORITHMS:
         raise RunError(f"there is no coupling scheme '{coupling.scheme}' (known: {', '.join(ALGORITHMS)})")

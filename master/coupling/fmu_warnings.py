@@ -1,4 +1,4 @@
-"""What the FMUs of a run warn of, and values that cannot be.
+"""Warnings of the FMUs of a run, and values that cannot be right.
 
 An FMU is asked when initialization and the first step are over, and once more at the end.
 """
@@ -21,15 +21,15 @@ LARGEST: Final = 1e15
 
 @dataclass(frozen=True)
 class FmuWarning:
-    """What an FMU has warned of.
+    """A warning from an FMU.
 
     Attributes
     ----------
     component : str
     text : str
-        In the FMU's own words.
+        Its words.
     is_own : bool
-        Whether they are: how an FMU ended it does not say itself.
+        Whether the words are the FMU's; a failed termination is reported by the master.
     """
 
     component: str
@@ -38,12 +38,12 @@ class FmuWarning:
 
     def __str__(self) -> str:
         if not self.is_own:
-            return f"warning: {self.text}; what was computed is not touched by that"
+            return f"warning: {self.text}; this does not affect what was computed"
         return f"warning: component '{self.component}' says: {self.text}"
 
 
 class Excess(FmuWarning):
-    """What was seen in an FMU's values, which has not warned of it itself; the text begins with the variable."""
+    """A value of an FMU that cannot be right, which it has not warned of itself; the text begins with the variable."""
 
     def __str__(self) -> str:
         return f"warning: component '{self.component}': {self.text}"
@@ -74,24 +74,24 @@ class FmuWarningObserver:
         """Initialization is over."""
         self._network = network
         self._look(network)
-        self._weigh(start, network)
+        self._check_size(start, network)
 
     def observe(self, index: int, end: float, network: Network) -> None:
         """Look at the values, and once more at the warnings after the first step."""
         if max(map(abs, network.outputs.tolist()), default=0.0) > LARGEST:
-            self._weigh(end, network)
+            self._check_size(end, network)
         if not self._has_stepped:
             self._has_stepped = True
             self._look(network)
 
     def finish(self) -> None:
-        """Ask for what was said since the first step; one that cannot answer any more has said why it failed."""
+        """Ask for warnings since the first step; an FMU that can no longer answer has reported why."""
         if self._network is not None:
             with suppress(MasterError):
                 self._look(self._network)
 
     def add(self, found: FmuWarning) -> None:
-        """Take a warning that comes from elsewhere."""
+        """Add a warning from elsewhere."""
         if found not in self.warnings:
             self.warnings.append(found)
             self._tell(found)
@@ -101,8 +101,8 @@ class FmuWarningObserver:
             for text in slave.warnings() if isinstance(slave, WarningSource) else ():
                 self.add(FmuWarning(slave.name, text))
 
-    def _weigh(self, time: float, network: Network) -> None:
-        """Tell once of every output that has become larger than anything can be."""
+    def _check_size(self, time: float, network: Network) -> None:
+        """Warn once of every output that has become larger than anything can be."""
         for index in np.flatnonzero(np.abs(network.outputs) > LARGEST):
             name = network.output_names[index]
             if name not in self._seen:

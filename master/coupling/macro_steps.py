@@ -13,14 +13,14 @@ from master.arrays import FloatArray
 from master.coupling.coupling_schemes import Algorithm, initialise
 from master.coupling.network import Network
 from master.errors import MasterError, RunError
-from master.safety.interruption import heeded_at_once
+from master.safety.interruption import interruptible_at_once
 from master.safety.supervision import phase
 
 Status = Literal["complete", "interrupted", "failed", "incomplete"]
 
 
 class Observer(Protocol):
-    """Looks on; outside the loop's logic."""
+    """Watches the loop from outside."""
 
     def begin(self, time: float, network: Network) -> None:
         """After initialization, at the start time."""
@@ -63,7 +63,7 @@ class RunOutcome:
     Attributes
     ----------
     status : str
-        complete, interrupted, failed, or incomplete: it came to its end, and that is not enough to judge it.
+        complete, interrupted, failed, or incomplete: it reached its end, which is not enough to judge it.
     steps : int
         Completed macro steps.
     time : float
@@ -113,7 +113,7 @@ def _run(
 ) -> RunOutcome:
     index = grid.first
     try:
-        with phase("loading"), heeded_at_once():
+        with phase("loading"), interruptible_at_once():
             prepare(network, algorithm, grid)
         check_finite(network, grid.begin, None)
         check_inputs(network, grid.begin, None)
@@ -128,7 +128,7 @@ def _run(
     except KeyboardInterrupt:
         return RunOutcome("interrupted", index, grid.time(index))
     except MasterError as error:
-        # An FMU in Python takes the interruption for a failure of its own.
+        # An FMU in Python reports the interruption as if it had failed itself.
         if stop_wanted():
             return RunOutcome("interrupted", index, grid.time(index))
         return RunOutcome("failed", index, grid.time(index), error)
@@ -136,7 +136,7 @@ def _run(
 
 
 def _finish(observers: Sequence[Observer]) -> MasterError | None:
-    """Finish every observer, also after one that cannot; returns the first failure."""
+    """Finish every observer, also after one that fails; return the first failure."""
     first = None
     for observer in observers:
         try:
@@ -156,7 +156,7 @@ def _advance(
 ) -> None:
     algorithm.step(network, grid.time(index), grid.step)
     end = grid.time(index + 1)
-    # Cheap, at every step: not finite if a value is not (or if they are too large to be added).
+    # Cheap enough for every step: the sum is not finite if a value is not (or if they are too large to be added).
     if not math.isfinite(sum(network.outputs.tolist())):
         check_finite(network, end, previous)
     if not network.is_plain:
@@ -183,7 +183,7 @@ def check_finite(network: Network, time: float, last_good: FloatArray | None) ->
 
 
 def check_inputs(network: Network, time: float, last_good: FloatArray | None) -> None:
-    """Refuse outputs, finite themselves, that a connection's conversion turns into something that is not.
+    """Refuse finite outputs that the conversion of a connection turns into values that are not.
 
     Parameters
     ----------
@@ -212,6 +212,6 @@ def _not_finite(names: Sequence[str], values: FloatArray, last_good: FloatArray 
 
 
 def _remarks(network: Network) -> str:
-    """Return what the slaves themselves have said."""
+    """Return what the slaves themselves have reported."""
     said = ((slave.name, slave.remark()) for slave in network.slaves)
     return "; ".join(f"component '{name}' says: {text}" for name, text in said if text)

@@ -67,14 +67,14 @@ class Network:
     connections : sequence of Connection
         Wires; every input has exactly one.
     discrete : collection of str
-        Outputs that are not Real, between whose values there is nothing.
+        Outputs that are not Real, whose values cannot be interpolated.
 
     Attributes
     ----------
     inputs : ndarray, shape (n_inputs,)
-        What the slaves were last told.
+        What the slaves received last.
     outputs : ndarray, shape (n_outputs,)
-        What the slaves last said.
+        What the slaves returned last.
     input_names, output_names : tuple of str
         ``component.variable`` for each entry.
     is_plain : bool
@@ -107,8 +107,8 @@ class Network:
             self.inputs += self._offset
 
     def converted(self, outputs: FloatArray) -> FloatArray:
-        """Return what the inputs would be told if the outputs were these, shape (n_inputs,)."""
-        with np.errstate(over="ignore", invalid="ignore"):  # who asks looks whether it is finite
+        """Return what the inputs would be if the outputs were these, shape (n_inputs,)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # the caller checks whether the result is finite
             return np.take(outputs, self._from) * self._factor + self._offset
 
     def gather_for(self, index: int) -> None:

@@ -24,13 +24,13 @@ _RAISING: Final = ("raise_start", "raise_duration")
 class OffWireStop:
     """Observer that ends a run whose pantograph is not under the wire.
 
-    What is not told by an FMU is not looked at: where its wire ends, where a pantograph will be, when it is raised.
+    What an FMU does not give is not checked: where its wire ends, where a pantograph will be, when it is raised.
 
     Parameters
     ----------
     system : System
     contacts : sequence of Contact
-        Whom to watch.
+        The contacts to watch.
     network : Network
         The network that will be run.
     geometry : callable
@@ -78,7 +78,7 @@ class OffWireStop:
         """Nothing to close."""
 
     def _raised(self, contact: Contact) -> float:
-        """Return when a pantograph's uplift acts fully [s], infinite if its FMU does not tell."""
+        """Return when a pantograph's uplift acts fully [s], infinite if its FMU does not say."""
         pantograph = self._system.component(contact.pantograph)
         times = [parameter_value(pantograph, name) for name in _RAISING]
         return self._system.start + sum(math.inf if t is None else t for t in times)

@@ -1,8 +1,8 @@
-"""Running by the wall clock: each macro step begins when its time has come, and what comes too late is counted.
+"""Running by the wall clock: each macro step starts on time, and steps that finish late are counted.
 
-The results of step n, from t_n to t_n+1, have to be there, recorded, when the wall clock stands at t_n+1: this is its
-deadline. No step is left out and the clock is not put back: after a late step the next ones begin at once, until the
-run has caught up with the clock.
+The results of step n, from t_n to t_n+1, have to be recorded when the wall clock reaches t_n+1: this is its deadline.
+No step is left out and the clock is not reset: after a late step the next ones start at once, until the run has caught
+up with the clock.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from master.arrays import FloatArray
 from master.coupling.macro_steps import TimeGrid
 from master.coupling.network import Network
 
-#: Time before an appointment from which on the clock is watched instead of slept [s].
+#: Last stretch before a start that is spent polling the clock instead of sleeping [s].
 _WATCHFUL: Final = 2e-4
 
 
@@ -70,9 +70,9 @@ class Punctuality:
 
 
 class WallClockPacer:
-    """Observer that holds a run back to the wall clock; it has to be the last one, so that all others' work counts.
+    """Observer that paces a run by the wall clock; it has to be the last one, so that the work of all others counts.
 
-    Python's garbage collector rests while the run is paced: nothing in the loop makes reference cycles.
+    Python's garbage collector is off while the run is paced: nothing in the loop makes reference cycles.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class WallClockPacer:
     factor : float
         Simulated seconds per second of wall clock.
     clock, sleep : callable
-        The clock [s], and what waits for a number of seconds.
+        Return the time [s]; wait for a number of seconds.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class WallClockPacer:
         self._period = grid.step / factor
         self._factor = factor
         self._clock, self._sleep = clock, sleep
-        # For each step: how late it began, how long it took, how late it was done. Filled now: no page faults later.
+        # For each step: how late it began, how long it took, how late it ended. Filled now: no page faults later.
         self._rows: FloatArray = np.full((grid.count - grid.first, 3), np.nan)
         self._count = 0
         self._start = self._began = 0.0
@@ -109,7 +109,7 @@ class WallClockPacer:
         self._start = self._began = self._clock()
 
     def observe(self, index: int, time: float, network: Network) -> None:
-        """Note when the step's results were there, and wait until the next one is to begin."""
+        """Record when the step's results were ready, and wait for the start of the next one."""
         done = self._clock()
         planned = self._start + self._count * self._period
         deadline = planned + self._period
@@ -118,7 +118,7 @@ class WallClockPacer:
         self._wait(deadline)
 
     def finish(self) -> None:
-        """Let the garbage collector work again."""
+        """Turn the garbage collector on again."""
         if self._had_collector:
             gc.enable()
         gc.unfreeze()

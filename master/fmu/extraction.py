@@ -1,7 +1,7 @@
 """Extracted FMUs: a folder serves one instance at a time, and the next one again where that saves memory.
 
-Some libraries stay in the process for ever, whatever frees them: C++ with unique symbols, and so every FMU made with
-pythonfmu. From one place such a library is loaded once; unpacked to a new place for every instance, a thousand
+Some libraries stay in the process for ever, even when freed: C++ with unique symbols, and so every FMU made with
+pythonfmu. From one folder such a library is loaded once; extracted to a new folder for every instance, a thousand
 instances would keep a thousand copies of it. Other libraries are unloaded, and their folders removed.
 """
 
@@ -21,12 +21,12 @@ import fmpy
 from master.system.components import Fmu
 
 _Key = tuple[str, int, int, int]
-#: Folders that no instance uses now, by the FMU unpacked there.
+#: Folders that no instance uses now, by the FMU extracted there.
 _idle: Final[defaultdict[_Key, list[str]]] = defaultdict(list)
 
 
 class ExtractedFmu:
-    """An unpacked FMU, for one instance.
+    """An extracted FMU, for one instance.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class ExtractedFmu:
         self._platform = f"binaries/{fmpy.platform}/{fmu.identifier}{fmpy.sharedLibraryExtension}"
         self._is_released = False
         idle = _idle[self._key]
-        self.folder = idle.pop() if idle else _unpacked(fmu.path)
+        self.folder = idle.pop() if idle else _extracted(fmu.path)
 
     def release(self) -> None:
         """Keep the folder for the next instance if the library, freed, is still loaded; remove it otherwise."""
@@ -63,7 +63,7 @@ def _key(path: Path) -> _Key:
     return str(path.resolve()), stat.st_ino, stat.st_size, stat.st_mtime_ns
 
 
-def _unpacked(path: Path) -> str:
+def _extracted(path: Path) -> str:
     folder = tempfile.mkdtemp(prefix="fmu-")
     try:
         fmpy.extract(str(path), unzipdir=folder)

@@ -1,4 +1,4 @@
-"""The FMUs' own log messages, kept per instance so that errors can quote them."""
+"""The log messages of FMUs, kept per instance so that errors can quote them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from master.errors import one_line
 _KEPT: Final = 20
 _LONGEST: Final = 1 << 16
 
-#: FMI status of what is no more than information, and of a warning.
+#: FMI status of plain information, and of a warning.
 _OK: Final = 0
 _WARNING: Final = 1
 
@@ -52,12 +52,12 @@ CALLBACKS: Final = _callbacks()
 
 
 def clear(instance: str) -> None:
-    """Forget what an instance of this name has said."""
+    """Delete the messages of an instance of this name."""
     _messages.pop(instance, None)
 
 
 def last_words(instance: str) -> str:
-    """Return the last error message of an instance, its last warning if there is none, empty if it said nothing."""
+    """Return the last error message of an instance, its last warning if there is none, empty if there is none."""
     said = _messages.get(instance, ())
     errors = [text for status, text in said if status not in (_OK, _WARNING)]
     return [*(text for _, text in said), *errors][-1] if said else ""

@@ -18,7 +18,7 @@ from master.ssp.ssp_xml import XmlError, is_one_line, safe_root
 from master.system.components import Fmu, Variable
 
 _DESCRIPTION: Final = "modelDescription.xml"
-#: What FMPy raises without words of its own where it misses something.
+#: What FMPy raises without a message where something is missing.
 _UNWORDED: Final = (TypeError, AttributeError, LookupError, AssertionError)
 #: FMI 2.0 wants a C identifier; a path would lead out of the FMU.
 _IDENTIFIER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -67,7 +67,7 @@ def read_fmu(path: Path) -> Fmu:
 
 
 def lacking_binary(path: Path, identifier: str) -> str:
-    """Return in words that an FMU has no library for this machine, empty if it has one."""
+    """Return what is wrong with an FMU that has no library for this machine, empty if it has one."""
     with zipfile.ZipFile(path) as file:
         names = file.namelist()
     if f"binaries/{fmpy.platform}/{identifier}{fmpy.sharedLibraryExtension}" in names:
@@ -78,7 +78,7 @@ def lacking_binary(path: Path, identifier: str) -> str:
 
 
 def _tolerance(experiment: Any | None) -> float | None:
-    """Return the relative tolerance of the default experiment, None if it has none that means anything."""
+    """Return the relative tolerance of the default experiment, None if it has no meaningful one."""
     try:
         value = float(experiment.tolerance) if experiment is not None and experiment.tolerance is not None else 0.0
     except ValueError:
@@ -87,7 +87,7 @@ def _tolerance(experiment: Any | None) -> float | None:
 
 
 def _units(defined: Sequence[Any], file: str) -> dict[str, Unit]:
-    """Return the units that an FMU defines in SI units; of others it tells no more than the name."""
+    """Return the units that an FMU defines in SI units; of others it gives no more than the name."""
     found = {}
     for unit in defined or ():
         base = unit.baseUnit
@@ -109,7 +109,7 @@ def _check_variables(root: Any) -> None:
         if not (node.get("name") and reference.isascii() and reference.isdigit() and int(reference[:11]) < 2**32):
             text = f"a variable name='{node.get('name', '')}' with valueReference='{reference}' cannot be addressed"
             raise XmlError(int(node.sourceline or 0), text)
-        if not is_one_line(node.get("name")):  # FMI has names in one line, and so have the tables of a run
+        if not is_one_line(node.get("name")):  # FMI wants names on one line, and so do the tables of a run
             raise XmlError(int(node.sourceline or 0), f"the variable name {node.get('name')!r} is not one line of text")
 
 
@@ -143,7 +143,7 @@ def _variable(v: Any, is_difference: bool | None) -> Variable:
 
 
 def _differences(root: Any) -> dict[str, bool]:
-    """Return which variables say of themselves whether they are relative quantities: FMPy asks their types alone."""
+    """Return which variables state whether they are relative quantities; FMPy reads only their types."""
     reals = ((v.get("name"), v.find("Real")) for v in root.iter("ScalarVariable"))
     said = ((name, real.get("relativeQuantity")) for name, real in reals if real is not None)
     return {name: text in ("true", "1") for name, text in said if text is not None}

@@ -1,7 +1,7 @@
-"""Having the FMUs that a scenario names: asks ``python -m fmus`` for those that are missing or stale.
+"""Provide the FMUs that a scenario names; ``python -m fmus`` builds those that are missing or stale.
 
-This is the only thing the master wants from ``fmus``, and it does without: a foreign FMU, of which ``fmus``
-knows nothing, is used as it is.
+The master needs nothing else from ``fmus``, and works without it: a foreign FMU, which ``fmus`` does not know, is used
+as it is.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 #: Seconds after which asking for a fingerprint, or building, is given up.
 _ASK_SECONDS: Final = 60
 _BUILD_SECONDS: Final = 600
-#: What an FMU of ours is known by; see docs/interoperability.md.
+#: What identifies an FMU of ours; see docs/interoperability.md.
 _MARK: Final = "resources/openpanto.txt"
 _LONGEST_MARK: Final = 1 << 16
 #: What a damaged, encrypted or exotically compressed archive raises.
@@ -42,20 +42,20 @@ _UNREADABLE: Final = (
 def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = None) -> Path:
     """Build the FMU at ``path`` if it is missing, or ours and older than the sources it is built from.
 
-    What does not carry our mark, or was changed since it was built, is kept, and that is said.
+    An FMU without our mark, or changed since it was built, is kept, and ``tell`` is called.
 
     Parameters
     ----------
     path : Path
     tell : callable
-        Is told what takes time, and what is kept.
+        Called with what takes time, and what is kept.
     scratch : Path, optional
-        Folder to build into instead, where nothing may be written beside ``path``.
+        Folder to build into instead, where nothing may be written next to ``path``.
 
     Returns
     -------
     Path
-        Where the FMU to be used lies.
+        The FMU to use.
 
     Raises
     ------
@@ -66,13 +66,13 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
         return path
     origin = _origin(path)
     if origin is not None and not origin.definition.is_file():
-        tell(f"{path.name} is used as it is: {origin.definition}, which it was built from, is not there")
+        tell(f"{path.name} is used as it is: {origin.definition}, which it was built from, is missing")
         return path
     wanted = fingerprint(origin.definition.as_posix(), origin.pantographs) if origin else fingerprint(path.stem)
     if wanted is None or (path.is_file() and _matches(wanted, stored_guid(path))):
         return path
     if path.exists() and (why := why_not_ours(path)):
-        tell(f"{path.name} is used as it is: {why}; to have it built anew, remove it")
+        tell(f"{path.name} is used as it is: {why}; to have it rebuilt, remove it")
         return path
     place = scratch / path.name if scratch else path
     tell(f"building {path.name}" + (" again: its sources have changed" if path.is_file() else ""))
@@ -100,7 +100,7 @@ def read_mark(path: Path) -> dict[str, str]:
 
 
 def why_not_ours(path: Path) -> str:
-    """Return why an FMU may be somebody's own work; empty if it is ours, as we built it."""
+    """Return why an FMU may be the user's own work; empty if it is ours, as we built it."""
     mark, guid = read_mark(path), stored_guid(path)
     if not guid:
         return "it is not an FMU that could be read"
@@ -123,7 +123,7 @@ def _origin(path: Path) -> Origin | None:
 
 
 def _is_older_build(file: zipfile.ZipFile, name: str, guid: str) -> bool:
-    """Whether it was built before there was a mark: the script's name holds the GUID's beginning."""
+    """Whether it was built before marks existed: the script's name holds the beginning of the GUID."""
     script = f"{name}_{guid.strip('{}').replace('-', '')[:12]}"
     if {f"resources/{script}.py", "resources/slavemodule.txt"} <= set(file.namelist()):
         return file.read("resources/slavemodule.txt").decode("utf-8").strip() == script
@@ -141,7 +141,7 @@ def _content_hash(file: zipfile.ZipFile) -> str:
 
 
 def has_builder() -> bool:
-    """Whether ``python -m fmus`` can be asked; finds out without importing it."""
+    """Whether ``python -m fmus`` is available, without importing it."""
     spec = importlib.util.find_spec("fmus")
     folders = (spec.submodule_search_locations or ()) if spec is not None else ()
     return any((Path(folder) / "__main__.py").is_file() for folder in folders)
@@ -160,7 +160,7 @@ def fingerprint(name: str, pantographs: str = "") -> str | None:
     Raises
     ------
     ValueError
-        With the builder's own words, if it knows the name but cannot tell.
+        With the builder's own words, if it knows the name but cannot say.
     """
     try:
         answer = _fmus("fingerprint", "--if-known", *_ports(pantographs), "--", name, seconds=_ASK_SECONDS)
@@ -204,10 +204,10 @@ def write_runtime(folder: Path) -> None:
     Raises
     ------
     ValueError
-        With the builder's own words, if it cannot be made here.
+        With the builder's own words, if it cannot be made on this machine.
     """
     if not has_builder():
-        raise ValueError("it takes the package fmus, which is not installed")
+        raise ValueError("it needs the package fmus, which is not installed")
     try:
         answer = _fmus("runtime", "--out", str(folder), seconds=_BUILD_SECONDS)
     except subprocess.TimeoutExpired as error:
@@ -233,5 +233,5 @@ def _fmus(*arguments: str, seconds: float) -> subprocess.CompletedProcess[str]:
 
 
 def _places() -> list[str]:
-    """Return where modules come from, without FMUs that ran here: they leave their folders, with a pythonfmu each."""
+    """Return where modules come from, without the folders (each with a pythonfmu) that FMUs run here have left."""
     return [place for place in sys.path if not (Path(place) / "slavemodule.txt").is_file()]

@@ -1,7 +1,7 @@
 """An FMU instance: grouped reading and writing, parameters, steps, state, readable errors.
 
-Values pass through preallocated arrays that ctypes and NumPy share, and one FMI call moves a whole group: the
-price of an exchange is that of the FMI call itself.
+Values pass through preallocated arrays that ctypes and NumPy share, and one FMI call moves a whole group: an
+exchange costs no more than the FMI call itself.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Group:
         references = [instance.component.fmu.variables[name].reference for name in names]
         self._references = (c_uint * n)(*references)
         self._buffer = (c_double * n).from_buffer(self.values.data) if n else (c_double * 0)()
-        # Of the C types already: to convert and check the same arguments at every call would cost half of it again.
+        # Of the C types already: converting and checking the same arguments each time would cost half as much again.
         self._arguments = (c_void_p(instance.handle), self._references, c_size_t(n), self._buffer)
         self._get, self._set = instance.bare_function("fmi2GetReal"), instance.bare_function("fmi2SetReal")
         self._instance = instance
@@ -146,8 +146,8 @@ class Instance:
         """Set up the experiment, set the parameters, enter initialization mode."""
         self.time = start
         tolerance = self.component.tolerance
-        told = (0, 0.0) if tolerance is None else (1, tolerance)
-        self._call("setting up the experiment", "fmi2SetupExperiment", *told, start, 1, stop)
+        wanted = (0, 0.0) if tolerance is None else (1, tolerance)
+        self._call("setting up the experiment", "fmi2SetupExperiment", *wanted, start, 1, stop)
         for name, value in self.component.parameters.items():
             self._set(self.component.fmu.variables[name], value)
         self._call("entering initialization", "fmi2EnterInitializationMode")
@@ -199,7 +199,7 @@ class Instance:
             self.release(state)
 
     def _room(self, size: int) -> Any:
-        """Return room for a state of the size that the FMU claims."""
+        """Return a buffer for a state of the size that the FMU claims."""
         claim = f"component '{self.name}' ({self.component.fmu.path.name}) claims a state of {size} bytes"
         if size > LONGEST_STATE:
             raise SlaveError(f"{claim}, more than the {LONGEST_STATE} that are read; it cannot be checkpointed")
@@ -227,12 +227,12 @@ class Instance:
         return tuple(one_line(text) for text in fmi_log.warnings(self.name))
 
     def close(self) -> str:
-        """Terminate and free the instance and its files; an FMU that died is only forgotten.
+        """Terminate and free the instance and its files; an FMU that died is only dropped.
 
         Returns
         -------
         str
-            What went wrong, empty if nothing did: what was computed is not touched by how an FMU ends.
+            What went wrong, empty if nothing did: how an FMU ends does not affect what was computed.
         """
         said = ""
         if not self._dead:

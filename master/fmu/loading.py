@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from master.errors import RunError
 from master.fmu.instance import Instance
 from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
-from master.safety.interruption import heeded_at_once
+from master.safety.interruption import interruptible_at_once
 from master.safety.supervision import phase
 from master.system.components import Component
 
@@ -36,7 +36,7 @@ def loaded_fmus(
     if isolation is None:
         _check_single(components)
     try:
-        with phase("loading"), heeded_at_once():
+        with phase("loading"), interruptible_at_once():
             for component in components:
                 # One by one: those loaded so far must be freed on failure.
                 instance = Instance(component) if isolation is None else IsolatedInstance(component, isolation)
@@ -61,7 +61,7 @@ def _free(instances: Sequence[Instance | IsolatedInstance], troubles: dict[str, 
     interruption = None
     for instance in reversed(instances):
         try:
-            with heeded_at_once():
+            with interruptible_at_once():
                 said = instance.close()
         except KeyboardInterrupt as error:
             interruption = error

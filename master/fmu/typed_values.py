@@ -21,7 +21,7 @@ _C_TYPES: Final[dict[str, Any]] = {
     "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
 }
-#: Types that FMI reads and writes as another one.
+#: Types that FMI reads and writes as another type.
 _AS: Final = {"Enumeration": "Integer"}
 
 
@@ -97,16 +97,16 @@ class TypedValues:
     def write(self) -> None:
         """Set the FMU's variables to the values."""
         for part in self._parts:
-            told = self._values[part.places].tolist()
+            values = self._values[part.places].tolist()
             if part.kind == "String":
-                part.buffer[:] = [TEXTS.text(number) for number in told]
+                part.buffer[:] = [TEXTS.text(number) for number in values]
             else:
-                part.buffer[:] = told if part.kind == "Real" else [int(value) for value in told]
+                part.buffer[:] = values if part.kind == "Real" else [int(value) for value in values]
             self._call(f"fmi2Set{part.kind}", part.references, len(part.references), part.buffer)
 
     @staticmethod
     def _part(kind: str, fmi: Sequence[str], references: Sequence[int]) -> _Part:
         places = [i for i, other in enumerate(fmi) if other == kind]
         count = len(places)
-        told = (ctypes.c_uint * count)(*(references[i] for i in places))
-        return _Part(kind, np.array(places, dtype=np.intp), told, (_C_TYPES[kind] * count)())
+        chosen = (ctypes.c_uint * count)(*(references[i] for i in places))
+        return _Part(kind, np.array(places, dtype=np.intp), chosen, (_C_TYPES[kind] * count)())

@@ -1,7 +1,7 @@
 """The state of a whole system at a communication point, in a file from which a run continues bit for bit.
 
 The file is an array container (`master.safety.array_container`) that holds what the components gave as their serialised
-states, the exchanged values and what the coupling scheme remembers.
+states, the exchanged values, and what the coupling scheme and the observers keep from step to step.
 """
 
 from __future__ import annotations
@@ -47,21 +47,21 @@ class Checkpoint:
     index : int
         Macro steps done.
     components : dict
-        What has to be the same when the run goes on: GUID and parameters by component name.
+        What has to be the same when the run continues: GUID, parameters and tolerance by component name.
     states : dict
         Serialised states by component name.
     inputs, outputs : dict
         Exchanged values by ``component.variable``.
     memory : ndarray
-        What the coupling scheme remembers.
+        What the coupling scheme keeps from step to step.
     scheme : str
         Name of the coupling scheme.
     run : str
         Identity of the run that it comes from.
     observers : dict
-        What observers remember, by their names.
+        What observers keep from step to step, by their names.
     options : dict
-        What the coupling scheme goes by (`scheme_options`).
+        Options of the coupling scheme (`scheme_options`).
     """
 
     start: float
@@ -84,7 +84,7 @@ class Checkpoint:
 
 
 def scheme_options(system: System) -> dict[str, Any]:
-    """Return what the coupling scheme goes by, as JSON has it; an order left open is that of the file."""
+    """Return the options of the coupling scheme, as JSON has them; an order left open is that of the file."""
     options = dict(system.settings.coupling.options)
     if "order" in options:
         options["order"] = list(options["order"] or (c.name for c in system.components))
@@ -102,7 +102,7 @@ def read(path: Path) -> Checkpoint:
     Raises
     ------
     MasterError
-        If it is missing, damaged, or something else.
+        If it is missing, damaged, or not a checkpoint.
     """
     try:
         return unpack(path.read_bytes())
@@ -143,7 +143,7 @@ def unpack(data: bytes) -> Checkpoint:
     Raises
     ------
     ValueError
-        If the bytes are none, or were cut or changed.
+        If the bytes are not a checkpoint, or were cut or changed.
     """
     if data.startswith(_BEFORE):
         raise _of_another_format(data.partition(b"\n")[0].removeprefix(_BEFORE).decode("ascii", "replace"))
@@ -179,7 +179,7 @@ def _of_another_format(found: str) -> ValueError:
 
 
 def storable(slave: object) -> Storable:
-    """Return a slave whose state can be saved; RunError if it is none."""
+    """Return ``slave`` if its state can be saved; RunError otherwise."""
     if not isinstance(slave, Storable):
         raise RunError(f"component '{getattr(slave, 'name', slave)}' cannot be saved to a file")
     return slave

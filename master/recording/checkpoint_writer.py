@@ -1,4 +1,4 @@
-"""Writing checkpoints while a run goes on: when, what of, and the observer that does it."""
+"""Writing checkpoints during a run: when, of what, and by which observer."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from master.system.step_rounding import ROUNDING, steps_in
 
 
 class StatefulObserver(Protocol):
-    """An observer whose work has to go on where it was."""
+    """An observer that has to continue where it was."""
 
     name: str
 
     def save(self) -> list[float | None]:
-        """Return what it remembers from step to step."""
+        """Return what the observer keeps from step to step."""
 
     def restore(self, memory: Sequence[float | None]) -> None:
-        """Take such a memory back."""
+        """Restore what `save` returned."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class CheckpointSchedule:
 
 @dataclass(frozen=True)
 class CheckpointObserver:
-    """Observer that writes checkpoints, each in the place of the one before.
+    """Observer that writes checkpoints, each replacing the one before.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class CheckpointObserver:
         """Nothing to save yet."""
 
     def observe(self, index: int, time: float, network: Network) -> None:
-        """Write one if it is time."""
+        """Write a checkpoint if one is due."""
         if index in self.schedule:
             write(self.path, self.take(network, index))
 
@@ -85,7 +85,7 @@ def index_at(system: System, time: float) -> int:
     Raises
     ------
     RequestError
-        If that is no communication point of the run, or a component cannot be saved.
+        If this is not a communication point of the run, or a component cannot be saved.
     """
     steps = (time - system.start) / system.step
     index = round(steps)

@@ -1,4 +1,4 @@
-"""Starting from a checkpoint: whether it fits the system, and bringing the system to it."""
+"""Starting from a checkpoint: whether it matches the system, and restoring the system from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from master.system.step_rounding import ROUNDING
 
 @dataclass(frozen=True)
 class Continuation:
-    """A checkpoint to go on from.
+    """A checkpoint to continue from.
 
     Attributes
     ----------
@@ -26,9 +26,9 @@ class Continuation:
     file : str
         Where it was read.
     renewed : tuple of str
-        Components that are not taken from it but start anew at its time.
+        Components that are not taken from it but start afresh at its time.
     is_same_run : bool
-        Whether it is the run that made the checkpoint that goes on, in its own folder, not a new one.
+        Whether the run that made the checkpoint continues in its own folder, rather than a new run starting from it.
     """
 
     checkpoint: Checkpoint
@@ -45,7 +45,7 @@ class Continuation:
         return TimeGrid(c.time, system.step, count)
 
     def check(self, system: System) -> None:
-        """Refuse a system that the checkpoint does not belong to.
+        """Refuse a system that does not match the checkpoint.
 
         Raises
         ------
@@ -60,7 +60,7 @@ class Continuation:
         grid = self.grid(system)
         if self.is_same_run:
             found += self._changes(system)
-        # A run that was ended after its last step has its summary left to write.
+        # A run that was stopped after its last step still has to write its summary.
         if grid.count < grid.first or (grid.count == grid.first and not self.is_same_run):
             found.append(f"it was saved at {self.checkpoint.time:g} s, the run would end at {system.stop:g} s")
         if found:
@@ -68,7 +68,7 @@ class Continuation:
 
     def _changes(self, system: System) -> list[str]:
         c, scheme = self.checkpoint, system.settings.coupling.scheme
-        found = [f"a run that goes on in its own folder cannot renew '{name}'" for name in self.renewed]
+        found = [f"a run that continues in its own folder cannot renew '{name}'" for name in self.renewed]
         if (system.start, system.step) != (c.start, c.step):
             now = f"{system.step:g} s from {system.start:g} s on"
             found.append(f"its step was {c.step:g} s from {c.start:g} s on, is {now}")
@@ -77,7 +77,7 @@ class Continuation:
             return found
         wanted = scheme_options(system)
         found += [
-            f"the {name} of its scheme was {_told(c.options.get(name))}, is {_told(value)}"
+            f"the {name} of its scheme was {_as_text(c.options.get(name))}, is {_as_text(value)}"
             for name, value in wanted.items()
             if name in c.options and c.options[name] != value
         ]
@@ -86,7 +86,7 @@ class Continuation:
     def prepare(self, network: Network, algorithm: Algorithm, grid: TimeGrid) -> None:
         """Bring slaves, exchanged values and scheme to the checkpoint."""
         kept = [s for s in network.slaves if s.name not in self.renewed]
-        # Components that start anew do so at the checkpoint's time, the others where they once did.
+        # Renewed components start at the checkpoint's time, the others where they once did.
         starts = dict.fromkeys(self.renewed, self.checkpoint.time)
         initialise(network, self.checkpoint.start, grid.stop, starts)
         for slave in kept:
@@ -108,24 +108,24 @@ class Continuation:
                 )
 
 
-def _told(value: Any) -> str:
+def _as_text(value: Any) -> str:
     return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _differences(component: Component, saved: dict[str, Any] | None) -> list[str]:
     name = component.name
     if saved is None:
-        return [f"it holds no component '{name}' (--renew {name} starts it anew)"]
+        return [f"it holds no component '{name}' (--renew {name} starts it afresh)"]
     if saved["guid"] != component.fmu.guid:
-        return [f"the FMU of '{name}' is another one now (--renew {name} starts it anew)"]
-    told = (saved.get("tolerance"), component.tolerance)
-    if told[0] != told[1]:
-        was, now_is = ("none" if value is None else f"{value:g}" for value in told)
-        return [f"the tolerance that '{name}' is told was {was}, is {now_is} (--renew {name} starts it anew)"]
+        return [f"the FMU of '{name}' is a different one now (--renew {name} starts it afresh)"]
+    tolerances = (saved.get("tolerance"), component.tolerance)
+    if tolerances[0] != tolerances[1]:
+        was, now_is = ("none" if value is None else f"{value:g}" for value in tolerances)
+        return [f"the tolerance of '{name}' was {was}, is {now_is} (--renew {name} starts it afresh)"]
     now, then = component.parameters, saved["parameters"]
     changed = sorted(n for n in {*now, *then} if now.get(n) != then.get(n))
     return [
-        f"{name}.{n} was {then.get(n, 'not set')}, is {now.get(n, 'not set')} (--renew {name} starts it anew)"
+        f"{name}.{n} was {then.get(n, 'not set')}, is {now.get(n, 'not set')} (--renew {name} starts it afresh)"
         for n in changed
     ]
 

@@ -1,4 +1,4 @@
-"""Recording: one row per time at the end of each step, plus the start, written out as the run goes on."""
+"""Recording while a run goes on: one row at the start and one at the end of every step, or of every n-th."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from master.errors import ForeignResultsError, MasterError
 from master.recording.recording import NUMBER_FORMAT, Recording, header, load
 from master.safety.safe_files import AppendOnlyFile, safe_cell
 
-#: Rows kept back before they are written, and the simulated time that they may span [s].
+#: Rows held back before they are written, and the simulated time that they may span [s].
 ROWS_PER_FLUSH: Final = 250
 LONGEST_UNWRITTEN: Final = 1.0
 #: What a user can do about results that were changed by others.
@@ -24,7 +24,7 @@ RERUN_ADVICE: Final = "while the run was in progress; run it again, into another
 
 
 class RecordedValues:
-    """Where values of a recording come from: called when a row is due."""
+    """Values to be recorded together; ``read`` refreshes them when a row is due."""
 
     def __init__(self, names: Sequence[str], values: FloatArray, read: Callable[[], None] = lambda: None) -> None:
         self.names = tuple(names)
@@ -33,10 +33,10 @@ class RecordedValues:
 
 
 class Recorder:
-    """Observer that records sources every ``every``-th step in a CSV file, row by row as the run goes on.
+    """Observer that records sources every ``every``-th step in a CSV file, row by row.
 
     A row is written at the latest when `ROWS_PER_FLUSH` are waiting, or when waiting for the next one would leave more
-    than `LONGEST_UNWRITTEN` of simulated time unwritten, so that a process that is killed loses no more than that.
+    than `LONGEST_UNWRITTEN` of simulated time unwritten, so a process that is killed loses no more than that.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ class Recorder:
     every : int
         Steps between rows.
     keep : int, optional
-        Rows of a file that is there already to keep and to go on after, which makes the first of them the start.
+        Rows to keep of an existing file, which is then continued; the first of them is the start.
     is_steady : bool
-        Whether every row costs the same; otherwise many are made into text at once, which costs less in all.
+        Whether every row takes the same time; otherwise many are formatted at once, which takes less in all.
 
     Raises
     ------
     MasterError
-        If the file cannot be written, or what is to be kept is not there.
+        If the file cannot be written, or lacks rows that are to be kept.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Recorder:
         self._lines: list[bytes] = []
         self._count = 0  # rows not written yet, as numbers or as lines
         self._oldest = self._latest = -math.inf
-        self._goes_on = keep > 0
+        self._is_continued = keep > 0
         self._rows = keep
         titles = _title_line(self.names, self.units)
         self._file = AppendOnlyFile(path, _end_of_rows(path, titles, keep) if keep else 0)
@@ -86,8 +86,8 @@ class Recorder:
             self._file.write(titles.encode())
 
     def begin(self, time: float, network: Network) -> None:
-        """Record the start, unless it is the last row of a file that is gone on with."""
-        if not self._goes_on:
+        """Record the start, unless the file already ends with it."""
+        if not self._is_continued:
             self._record(time)
 
     def observe(self, index: int, time: float, network: Network) -> None:
@@ -159,7 +159,7 @@ class Recorder:
     def _write(self) -> None:
         self._format_rows()
         lines, self._count = b"".join(self._lines), 0
-        self._lines.clear()  # before writing: what cannot be written now is not tried again
+        self._lines.clear()  # before writing: what fails now is not tried again
         if lines:
             self._file.write(lines)
 
@@ -171,7 +171,7 @@ def _title_line(names: Sequence[str], units: Sequence[str]) -> str:
 
 
 def _end_of_rows(path: Path, titles: str, rows: int) -> int:
-    """Return how long a recording with these titles is up to and with its row number ``rows`` [bytes]."""
+    """Return the length [bytes] of a recording with these titles up to the end of row ``rows``."""
     try:
         with path.open("rb") as file:
             same = file.readline() == titles.encode()
@@ -179,7 +179,9 @@ def _end_of_rows(path: Path, titles: str, rows: int) -> int:
     except OSError as error:
         raise MasterError(f"{path} cannot be read ({error.strerror})") from error
     if not same:
-        raise MasterError(f"{path} holds other variables than this run records: it cannot be gone on with")
+        raise MasterError(f"{path} records other variables than this run does and cannot be continued")
     if len(sizes) < rows:
-        raise MasterError(f"{path} has {len(sizes)} rows, the run that is to go on had made {rows}: some are lost")
+        raise MasterError(
+            f"{path} has {len(sizes)} rows, fewer than the {rows} of the run that is to continue: some are lost"
+        )
     return len(titles.encode()) + sum(sizes)

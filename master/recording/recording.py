@@ -72,7 +72,7 @@ def load(path: Path) -> Recording:
     Raises
     ------
     MasterError
-        If the file is missing or is not such a recording.
+        If the file is missing or is not a recording.
     """
     try:
         text = path.read_text(encoding="utf-8")

@@ -26,7 +26,7 @@ class Readable(Protocol):
 
 @runtime_checkable
 class Recordable(Protocol):
-    """A slave with variables beside those that are exchanged."""
+    """A slave with more variables than those that are exchanged."""
 
     name: str
     stepping_time: float
@@ -52,7 +52,7 @@ class RecordingPlan:
 
 
 def recording_plans(system: System) -> tuple[RecordingPlan, ...]:
-    """Return what is recorded how often besides the exchanged outputs; the plan for every step comes first.
+    """Return what is recorded, and how often, besides the exchanged outputs; the plan for every step comes first.
 
     Exchanged outputs are always recorded at every step, all other outputs too unless an entry of the settings says
     otherwise, and local variables only if an entry names them; texts are not recorded.
@@ -84,7 +84,7 @@ def recording_name(plan: RecordingPlan, step: float) -> str:
 def make_recorder(
     system: System, network: Network, plan: RecordingPlan, folder: Path, made: int | None, is_steady: bool
 ) -> Recorder:
-    """Return the recorder of a plan; ``made`` are the steps whose rows are in its file already."""
+    """Return the recorder of a plan; ``made`` is the number of steps whose rows its file holds already."""
     sources = [_exchanged(system, network)] if plan.every == 1 else []
     units: dict[str, str] = {}
     for component, slave in zip(system.components, network.slaves, strict=True):
@@ -98,7 +98,7 @@ def make_recorder(
 
 
 def _exchanged(system: System, network: Network) -> RecordedValues:
-    """Return the exchanged outputs as a source; of texts there is no column."""
+    """Return the exchanged outputs; texts have no column."""
     texts = {f"{c.name}.{n}" for c in system.components for n in c.texts}
     places = [i for i, name in enumerate(network.output_names) if name not in texts]
     if len(places) == len(network.output_names):

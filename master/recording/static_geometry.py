@@ -1,4 +1,4 @@
-"""The calculated parameters of all components, read once and kept beside the recordings."""
+"""The calculated parameters of all components, read once and kept next to the recordings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class GeometryObserver:
     ----------
     system : System
     tell : callable
-        Is given them.
+        Called with them.
     """
 
     def __init__(self, system: System, tell: Callable[[Geometry], None] = lambda _: None) -> None:
@@ -27,7 +27,7 @@ class GeometryObserver:
         self.geometry: Geometry = {}
 
     def begin(self, time: float, network: Network) -> None:
-        """Read."""
+        """Read them."""
         for component, slave in zip(self._system.components, network.slaves, strict=True):
             variables = component.fmu.variables.values()
             names = [v.name for v in variables if v.causality == "calculatedParameter" and v.type == "Real"]

@@ -1,4 +1,4 @@
-"""Reports of two or more runs side by side; every contact of every run is a column."""
+"""The page that compares two or more runs; every contact of every run is a column."""
 
 from __future__ import annotations
 
@@ -14,18 +14,8 @@ from master.errors import MasterError
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_signals import Signals
 from master.report import html_markup
+from master.report.charts import force_charts as forces
 from master.report.charts.chart import Axis, Bars, Chart, Curve, stroke
-from master.report.charts.force_charts import (
-    DENSITY,
-    FREQUENCY,
-    SHARE,
-    TRACK,
-    common_edges,
-    extent,
-    force_axis,
-    shares,
-    spectrum_curve,
-)
 from master.report.charts.line_charts import line_marks
 from master.report.charts.uplift_charts import support_bars
 from master.report.result_tables import figure_rows
@@ -138,7 +128,7 @@ def _verdict(c: Column) -> str:
 
 
 def _filters(runs: Sequence[Results]) -> str:
-    """Return which filters the runs were evaluated with."""
+    """Return the filters with which the runs were evaluated."""
     return f"Filter: {html_markup.text('; '.join(dict.fromkeys(run.evaluation.filter.sentence for run in runs)))}."
 
 
@@ -159,7 +149,7 @@ def _difference(first: str, other: str) -> str:
 
 
 def comparison_charts(found: Sequence[Column]) -> list[Chart]:
-    """Return the curves of all columns, overlaid."""
+    """Return the charts in which the curves of all columns lie over one another."""
     charts = [_force_chart(found), _histogram(found), _spectrum(found), _bands(found)]
     if any(c.run.uplifts for c in found):
         charts.append(_uplift(found))
@@ -172,20 +162,20 @@ def _force_chart(found: Sequence[Column]) -> Chart:
         for i, c in enumerate(found)
     )
     first = found[0]
-    marks = line_marks(first.run, first.assessment.contact.catenary, extent([first.signals]))
-    y, note = force_axis([c.signals for c in found]), f"Supports and droppers of {first.name}."
-    return Chart("force", "Contact force", TRACK, y, (*curves, *marks), note, 440)
+    marks = line_marks(first.run, first.assessment.contact.catenary, forces.extent([first.signals]))
+    y, note = forces.force_axis([c.signals for c in found]), f"Supports and droppers of {first.name}."
+    return Chart("force", "Contact force", forces.TRACK, y, (*curves, *marks), note, 440)
 
 
 def _histogram(found: Sequence[Column]) -> Chart:
     cuts = [c.signals.filtered[c.signals.inside] for c in found]
-    edges = common_edges(cuts)
+    edges = forces.common_edges(cuts)
     curves = tuple(
-        Curve(c.name, *_staircase(edges, shares(cut, edges)), stroke(i))
+        Curve(c.name, *_staircase(edges, forces.shares(cut, edges)), stroke(i))
         for i, (c, cut) in enumerate(zip(found, cuts, strict=True))
     )
-    x = force_axis([c.signals for c in found])
-    return Chart("histogram", "Histogram", x, SHARE, curves, "Interval of interest of each run.", 340)
+    x = forces.force_axis([c.signals for c in found])
+    return Chart("histogram", "Histogram", x, forces.SHARE, curves, "Interval of interest of each run.", 340)
 
 
 def _staircase(edges: FloatArray, heights: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -195,9 +185,9 @@ def _staircase(edges: FloatArray, heights: FloatArray) -> tuple[FloatArray, Floa
 
 def _spectrum(found: Sequence[Column]) -> Chart:
     chosen = [(i, c) for i, c in enumerate(found) if np.count_nonzero(c.signals.inside) > 16]
-    curves = tuple(spectrum_curve(c.signals, c.name, stroke(i, 1.4)) for i, c in chosen)
+    curves = tuple(forces.spectrum_curve(c.signals, c.name, stroke(i, 1.4)) for i, c in chosen)
     note = "Force as computed, interval of interest of each run."
-    return Chart("spectrum", "Spectrum", FREQUENCY, DENSITY, curves, note)
+    return Chart("spectrum", "Spectrum", forces.FREQUENCY, forces.DENSITY, curves, note)
 
 
 def _bands(found: Sequence[Column]) -> Chart:
@@ -235,5 +225,5 @@ def _quality_section(runs: Sequence[Results]) -> list[str]:
     tables = [dict(quality_rows(run.summary)) for run in runs]
     names = list(dict.fromkeys(name for table in tables for name in table))
     rows = [(name, *(table.get(name, "-") for table in tables)) for name in names]
-    heads = ["what", *run_names([run.folder for run in runs])]
+    heads = ["item", *run_names([run.folder for run in runs])]
     return ["<h2>Numerical quality</h2>", html_markup.table(heads, rows, numbers=False)]

@@ -25,12 +25,12 @@ _HALF: Final = 75.0
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a film is made.
+    """The options of a film.
 
     Attributes
     ----------
     magnification : float
-        Of the wire's deformation.
+        Factor by which the deformation of the wire is drawn larger.
     speed : float
         Simulated seconds per second of film.
     start, end : float, optional
@@ -54,7 +54,7 @@ def write_film(movie: Movie, path: Path, options: FilmOptions) -> Path:
     writer = _writer(path)
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     line_axes, force_axes = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    # The writers tell the format by the ending, so what is written beside the film keeps it.
+    # The writers recognise the format by the ending, so the temporary file beside the film keeps it.
     with (
         atomic_file(path, _ELSEWHERE) as whole,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}.") as folder,
@@ -127,7 +127,7 @@ def _lowest(movie: Movie) -> float:
 
 
 def _moved(movie: Movie, index: int, frame: int, x: FloatArray, magnification: float) -> FloatArray:
-    """Return a section's contact wire's height with its deformation magnified."""
+    """Return the height of a section's contact wire with its deformation magnified."""
     section = movie.sections[index]
     points, values = list(section.points), list(section.displacement[frame])
     for rider in movie.riders:

@@ -1,6 +1,6 @@
-"""The moving picture of a run: what is needed to draw it, from recorded and static values alone.
+"""The data of a run's moving picture, from recorded and static values alone.
 
-Recorded are the wire's uplift at the supports and its height at the contacts, and at the droppers if
+The uplift of the wire is recorded at the supports, its height at the contacts, and its uplift at the droppers if
 ``dropper[j].lower.uplift`` is among the recorded variables. Between these points the deformation is drawn
 straight; the messenger wire is drawn at rest. A line that closes on itself is drawn once for every lap of the run.
 """
@@ -22,13 +22,13 @@ from master.recording.recording import Recording
 from master.report.charts.sample_packing import packed, packed_integers
 from master.results.run_results import Results
 
-#: Most frames, and the shortest time between two [s].
+#: Largest number of frames, and the shortest time between two [s].
 MOST_FRAMES: Final = 1500
 SHORTEST_FRAME: Final = 0.005
 #: Unit of packed displacements [m] and forces [N].
 DISPLACEMENT_UNIT: Final = 1e-5
 FORCE_UNIT: Final = 0.05
-#: Most laps on a line that closes on itself: every one is drawn, and its share of the page is that of a line.
+#: Largest number of laps on a line that closes on itself: each is drawn, and takes as much of the page as a line.
 MOST_LAPS: Final = 50
 
 
@@ -113,7 +113,7 @@ class Movie:
 
 
 def make_movie(results: Results, signals: Sequence[Signals]) -> Movie | None:
-    """Return the moving picture, None where geometry, uplift or contact are not recorded."""
+    """Return the moving picture, or None if geometry, uplift or contact was not recorded."""
     if not signals or signals[0].contact.point("z") not in results.recordings[0]:
         return None
     catenary, time = signals[0].contact.catenary, _frames(results.recordings[0].time)
@@ -147,7 +147,7 @@ def _section(
 
 
 def _line(values: Mapping[str, float], at: FloatArray) -> Line | None:
-    """Return a section at rest, once at every place that it is to be moved to."""
+    """Return a section at rest, repeated at every offset."""
     droppers = [_repeated(indexed(values, "dropper", n), at, n == "x") for n in ("x", "lower.z", "upper.z")]
     supports = [_repeated(indexed(values, "support", n), at, n == "x") for n in ("x", "z", "messenger_wire.z")]
     if not len(droppers[0]) or not len(supports[0]) or len({len(v) for v in droppers}) > 1:
@@ -158,7 +158,7 @@ def _line(values: Mapping[str, float], at: FloatArray) -> Line | None:
 
 
 def _repeated(values: FloatArray, at: FloatArray, is_place: bool) -> FloatArray:
-    """Return values once for every lap, and those that are places moved along."""
+    """Return values repeated for every lap, shifted along the track if they are positions."""
     return (values + at[:, None] * is_place).ravel()
 
 
@@ -173,9 +173,9 @@ def _frames(time: FloatArray) -> FloatArray:
 
 
 def _slack(results: Results, catenary: str, values: Mapping[str, float], time: FloatArray) -> list[BoolArray]:
-    """Return for every dropper when it is slack; one of which nothing is recorded never is."""
-    told = {s.name: s for s in slackness(results.recordings) if s.component == catenary}
-    droppers = [told.get(f"dropper[{i}]") for i in _numbers(values, "dropper")]
+    """Return when each dropper is slack; never for one of which nothing is recorded."""
+    found = {s.name: s for s in slackness(results.recordings) if s.component == catenary}
+    droppers = [found.get(f"dropper[{i}]") for i in _numbers(values, "dropper")]
     return [
         np.zeros(len(time), np.bool_) if s is None else np.interp(time, s.time, s.slack.astype(np.float64)) > 0.5
         for s in droppers
@@ -189,7 +189,7 @@ def _numbers(values: Mapping[str, float], kind: str) -> list[int]:
 def _histories(
     results: Results, catenary: str, values: Mapping[str, float], kind: str, form: str, time: FloatArray
 ) -> list[tuple[float, FloatArray | None]]:
-    """Return the position and the recorded variable (None if it is not) of all supports or droppers."""
+    """Return position and recorded variable (None if it is not recorded) of all supports or droppers."""
     return [
         (values[f"{kind}[{i}].x"], _at(results.recordings, f"{catenary}.{form.format(i)}", time))
         for i in _numbers(values, kind)
@@ -216,7 +216,7 @@ def _rider(recording: Recording, s: Signals, sections: Sequence[Section], time: 
 
 
 def _height(wire: FloatArray, x: FloatArray) -> FloatArray:
-    """Return a wire's height at rest, far up beyond its ends."""
+    """Return the height of a wire at rest; beyond its ends it is far up."""
     beyond = np.maximum(wire[0, 0] - x, x - wire[0, -1])
     return np.interp(x, *wire) + np.where(beyond > 0.0, 100.0 + beyond, 0.0)
 

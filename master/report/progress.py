@@ -1,4 +1,4 @@
-"""Progress of a run on the terminal: share done, time left, real-time factor, contact force."""
+"""The progress of a run on the terminal: share done, time left, real-time factor and contact force."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from master.system.components import System
 #: Steps between looks at the clock, and seconds between updates.
 _STEPS: Final = 16
 _SECONDS: Final = 0.1
-#: Forces that fit on the line.
+#: Number of forces that fit on the line.
 _MOST_FORCES: Final = 3
 
 
 class ProgressObserver:
-    """Observer that draws a progress bar on standard error, in one line of 80 columns."""
+    """Observer that shows a progress bar on standard error, in one line of 80 columns."""
 
     def __init__(self, console: Console, start: float, stop: float) -> None:
         self._progress = Progress(
@@ -44,13 +44,13 @@ class ProgressObserver:
         self._progress.start()
 
     def begin(self, start: float, network: Network) -> None:
-        """Initialization is over."""
+        """Start the clock: initialisation is over."""
         self._began = self._seen = time.perf_counter()
         self._forces = [i for i, n in enumerate(network.output_names) if n.endswith("contact.force")]
         self._progress.update(self._task, description="running", total=self._stop - self._start)
 
     def observe(self, index: int, end: float, network: Network) -> None:
-        """Update now and then."""
+        """Update the bar, but not more often than it can be read."""
         if index % _STEPS:
             return
         now = time.perf_counter()
@@ -62,12 +62,12 @@ class ProgressObserver:
         self._progress.update(self._task, completed=done, factor=done / (now - self._began), force=force)
 
     def finish(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         self._progress.stop()
 
 
 def force_text(forces: FloatArray) -> str:
-    """Return contact forces for a narrow line.
+    """Return contact forces as a short text.
 
     Examples
     --------
@@ -83,7 +83,7 @@ def force_text(forces: FloatArray) -> str:
 
 @contextmanager
 def progress_shown(console: Console, system: System) -> Iterator[Sequence[Observer]]:
-    """Yield the observer that shows the progress of a run, and take the bar away afterwards."""
+    """Yield the observer that shows the progress of a run, and remove the bar afterwards."""
     progress = ProgressObserver(console, system.start, system.stop)
     try:
         yield [progress]

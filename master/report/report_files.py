@@ -1,4 +1,4 @@
-"""What a run's folder is given to look at: ``report.html``, and every chart that goes to paper as PNG and SVG."""
+"""The files that a run's folder holds to be looked at: ``report.html``, and charts as PNG and SVG."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from master.results import results_folder
 from master.results.run_results import Results
 from master.safety.safe_files import atomic_file, write_atomically
 
-#: Endings of the charts' files, and what is asked of each format: no date, so that equal runs have equal files.
+#: Formats of the charts' files with their options: no date, so that equal runs leave equal files.
 _FORMATS: Final[dict[str, dict[str, Any]]] = {"svg": {"metadata": {"Date": None}}, "png": {"dpi": 130}}
 
 

@@ -1,4 +1,4 @@
-"""Figures and verdicts as rows, and as tables for a terminal of 80 columns."""
+"""Figures and verdicts as rows of tables, and as tables for a terminal 80 columns wide."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
@@ -16,7 +17,7 @@ from master.evaluation.filters import ForceFilter
 from master.evaluation.line_geometry import Uplift
 from master.results.run_results import Results
 
-#: A figure of an assessment, None where it has none.
+#: Reads a figure of an assessment, None if there is none.
 _Get = Callable[[Assessment], float | None]
 
 
@@ -28,7 +29,7 @@ def _scaled(value: float | None, scale: float) -> float | None:
     return None if value is None else scale * value
 
 
-#: Rows of the figures' table: title, unit, how to get it, decimals.
+#: Rows of the table of figures: title, unit, how to read it, decimals.
 _FIGURES: Final[tuple[tuple[str, str, _Get, int], ...]] = (
     ("mean force", "N", _of(lambda q: q.mean), 1),
     ("standard deviation", "N", _of(lambda q: q.sigma), 1),
@@ -44,8 +45,8 @@ _FIGURES: Final[tuple[tuple[str, str, _Get, int], ...]] = (
     ("longest loss", "ms", _of(lambda q: 1e3 * q.losses.longest), 1),
     ("share of loss", "%", _of(lambda q: q.losses.percentage), 2),
     ("contact height range", "mm", _of(lambda q: q.contact_height_range, 1e3), 1),
-    ("contact on strip, least", "mm", _of(lambda q: q.lateral_minimum, 1e3), 0),
-    ("contact on strip, greatest", "mm", _of(lambda q: q.lateral_maximum, 1e3), 0),
+    ("contact on strip, minimum", "mm", _of(lambda q: q.lateral_minimum, 1e3), 0),
+    ("contact on strip, maximum", "mm", _of(lambda q: q.lateral_maximum, 1e3), 0),
     ("uplift at supports, largest", "mm", lambda a: None if a.uplift is None else 1e3 * a.uplift.maximum, 1),
     ("slack droppers at passage", "%", lambda a: _scaled(a.slack, 1e2), 0),
 )
@@ -53,16 +54,16 @@ _FIGURES: Final[tuple[tuple[str, str, _Get, int], ...]] = (
 
 @dataclass(frozen=True)
 class Headline:
-    """One figure of the first screen.
+    """One of the figures that are seen first.
 
     Attributes
     ----------
     name, value, unit, limit : str
         As shown.
     passed : bool, optional
-        Whether the limit is kept, None where there is none.
+        Whether the limit is met, None where there is none.
     is_at_limit : bool
-        Whether it is kept only as being at the limit.
+        Whether it is met only because the figure is at the limit.
     """
 
     name: str
@@ -74,7 +75,7 @@ class Headline:
 
 
 def figure_rows(assessments: Sequence[Assessment]) -> list[tuple[str, ...]]:
-    """Return the figures' table: title with unit, then one value per contact."""
+    """Return the rows of the table of figures: title with unit, then one value per contact."""
     rows = []
     for title, unit, get, decimals in _FIGURES:
         values = [get(a) for a in assessments]
@@ -84,7 +85,7 @@ def figure_rows(assessments: Sequence[Assessment]) -> list[tuple[str, ...]]:
 
 
 def filter_rows(quality: Quality, chosen: ForceFilter) -> list[tuple[str, ...]]:
-    """Return sigma, maximum and minimum under every filter [N] if an extreme depends on it, else nothing."""
+    """Return sigma, maximum and minimum [N] with every filter if an extreme depends on the filter, else no rows."""
     if not quality.filter_dependent:
         return []
     own = Filtered(chosen.short, quality.mean, quality.sigma, quality.minimum, quality.maximum)
@@ -119,22 +120,22 @@ def headlines(assessment: Assessment, limits: LimitChoice) -> tuple[Headline, ..
 
 
 def _kept(criterion: Criterion | None) -> bool | None:
-    """Return whether a limit is kept, None where there is no verdict."""
+    """Return whether a limit is met, None where there is no verdict."""
     return None if criterion is None else criterion.passed
 
 
 def _headline(name: str, value: str, unit: str, criterion: Criterion | None) -> Headline:
-    """Return a figure with the limit that it is held to, if it is judged."""
+    """Return a figure with its limit, if it is judged."""
     limit = "" if criterion is None else criterion.limit.removesuffix(f" {unit}")
     return Headline(name, value, unit, limit, _kept(criterion), criterion is not None and criterion.is_at_limit)
 
 
 def verdict_table(assessment: Assessment, limits: LimitChoice) -> Table:
-    """Return the verdict of one contact for a terminal of 80 columns, with what it rests on."""
+    """Return the table of a contact's criteria, with the origin of each limit."""
     q = assessment.quality
     where = f"{q.start:.0f}-{q.end:.0f} m, {3.6 * q.speed:.0f} km/h"
     table = Table(title=escape(f"{limits.title}, {assessment.contact.pantograph}, {where}"), title_justify="left")
-    table.width, table.pad_edge = 78, False  # the longest verdict and limit fit in
+    table.width, table.pad_edge = 78, False  # wide enough for the longest verdict and limit
     for head in ("figure", "value", "limit", "origin", "verdict"):
         table.add_column(head, justify="left" if head in ("figure", "origin") else "right", no_wrap=True)
     for c in assessment.criteria:
@@ -148,9 +149,9 @@ _COLOURS: Final = {"passed": "green", "at the limit": "yellow", "failed": "red"}
 
 
 def figures_table(assessments: Sequence[Assessment], heads: Sequence[str], filters: Sequence[ForceFilter]) -> Table:
-    """Return the figures of several contacts or runs side by side for a terminal of 80 columns."""
-    told = "; ".join(dict.fromkeys(f"{f.band}, {f.short}" for f in filters))
-    table = Table(title=escape(f"Figures ({told})"), title_justify="left", width=78)
+    """Return the table of figures of several contacts or runs side by side."""
+    filtered = "; ".join(dict.fromkeys(f"{f.band}, {f.short}" for f in filters))
+    table = Table(title=escape(f"Figures ({filtered})"), title_justify="left", width=78)
     table.add_column("figure", no_wrap=True)
     for head in heads:
         table.add_column(escape(head), justify="right", overflow="fold")
@@ -160,7 +161,7 @@ def figures_table(assessments: Sequence[Assessment], heads: Sequence[str], filte
 
 
 def plain_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Return a table for a terminal of 80 columns; all columns but the first are numbers."""
+    """Return a table in which all columns but the first hold numbers."""
     table = Table(width=78)
     for i, head in enumerate(heads):
         table.add_column(escape(head), justify="right" if i else "left")
@@ -169,8 +170,16 @@ def plain_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     return table
 
 
+def ruled_table(title: str, caption: str = "", width: int = 80) -> Table:
+    """Return an empty table without a frame, its head underlined, for a terminal of a given width."""
+    table = Table(title=escape(title) or None, caption=escape(caption) or None, box=SIMPLE_HEAD, width=width - 1)
+    table.title_justify = table.caption_justify = "left"
+    table.pad_edge = False
+    return table
+
+
 def uplift_line(done: Results) -> str:
-    """Return one line on the largest uplift of the whole run, raising and all; empty if it is not recorded."""
+    """Return a line on the largest uplift of the whole run, raising included; empty if uplift is not recorded."""
     uplifts = done.uplifts
     return f"whole run: largest uplift {_place(max(uplifts, key=lambda u: u.maximum))}" if uplifts else ""
 
@@ -181,11 +190,11 @@ def _place(most: Uplift) -> str:
 
 
 def calibration_line(done: Results) -> str:
-    """Return how the mean force stands to the target of the calibration, which is no limit; empty if there is none."""
+    """Return how far the mean force is off the target of the calibration; empty if there is no target."""
     wanted = done.summary.get("settings", {}).get("calibration")
     found = [a for a in done.assessments() if wanted and a.quality.contact == wanted.get("contact", 1)]
     if not found:
         return ""
     target = wanted["mean_force"]
-    off = round(found[0].quality.mean - target, 1) + 0.0  # not minus nothing
+    off = round(found[0].quality.mean - target, 1) + 0.0  # no negative zero
     return f"target of the calibration (no limit): mean force {target:g} N; it is {off:+.1f} N off"

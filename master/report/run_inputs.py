@@ -1,4 +1,4 @@
-"""What went into a run, with its provenance: parameters, FMUs, versions, settings."""
+"""The inputs of a run with their provenance: parameters, FMUs, versions and settings."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Input:
 
 
 def inputs_of(component: Mapping[str, Any]) -> list[Input]:
-    """Return the parameters of a component of summary.json; of older runs only those that were set."""
+    """Return the parameters of a component in summary.json; of older runs only those that were set."""
     listed: Sequence[Mapping[str, Any]] = component.get("inputs") or [
         {"name": n, "value": v, "changed": True} for n, v in component.get("parameters", {}).items()
     ]
@@ -64,7 +64,7 @@ def split_source(description: str) -> tuple[str, str]:
 
 
 def number(value: Any) -> str:
-    """Return a value as short as its meaning allows.
+    """Return a value as text, with no more digits than are meant.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def _table(summary: Mapping[str, Any]) -> dict[str, str]:
 
 
 def scheme_options(coupling: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return the options that a run's coupling scheme went by, as name and text.
+    """Return the options of a run's coupling scheme, as name and text.
 
     Examples
     --------
@@ -120,17 +120,17 @@ def _option(value: Any) -> str:
 
 
 def quality_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return how well and how fast the run was computed."""
+    """Return rows on the accuracy and the speed of the computation."""
     settings, performance = summary.get("settings", {}), summary.get("performance", {})
     coupling = settings.get("coupling", {})
     rows = [
         ("coupling scheme", str(coupling.get("scheme", "-"))),
         ("macro step", f"{1e3 * (settings.get('step') or 0.0):g} ms"),
     ]
-    told = {c["name"]: c["tolerance"] for c in summary.get("components", []) if c.get("tolerance") is not None}
-    rows += [(f"tolerance told to the FMU of {name}", f"{value:g}") for name, value in told.items()]
+    tolerances = {c["name"]: c["tolerance"] for c in summary.get("components", []) if c.get("tolerance") is not None}
+    rows += [(f"tolerance passed to the FMU of {name}", f"{value:g}") for name, value in tolerances.items()]
     rows += [(f"{name} of the scheme", text) for name, text in scheme_options(coupling)]
-    rows += [("not as asked for", text) for text in summary.get("adjustments", [])]
+    rows += [("adjusted", text) for text in summary.get("adjustments", [])]
     for p in summary.get("interface_power", []):
         text = "not finite: the values exchanged were too large"
         if None not in (p["energy"], p["transferred"], p["rms"]):
@@ -152,7 +152,7 @@ def _performance_rows(performance: Mapping[str, Any]) -> list[tuple[str, str]]:
     steps = performance.get("component_time", {})
     rows += [(f"time in {name}", f"{t:.2f} s ({100.0 * t / wall if wall else 0.0:.0f} %)") for name, t in steps.items()]
     paced = performance.get("real_time")
-    # Isolated components step at the same time, and a paced run waits: then the difference means nothing.
+    # Isolated components step at the same time, and a paced run waits: the difference would be meaningless.
     if steps and wall and not performance.get("isolated") and not paced:
         rest = wall - sum(steps.values())
         rows.append(("time in the master", f"{rest:.2f} s ({100.0 * rest / wall:.0f} %): exchange, recording"))
@@ -169,7 +169,7 @@ def _identity(component: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def provenance_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return where and with what the run was computed."""
+    """Return when, and with which FMUs and versions, the run was computed."""
     rows = [("scenario", str(summary.get("scenario", ""))), ("date", str(summary.get("date", "")))]
     rows += [
         (f"FMU of {c['name']}", ", ".join([c.get("fmu", "-"), c.get("tool", ""), *_identity(c)]))

@@ -1,4 +1,4 @@
-"""The report of one run: a single HTML file that needs nothing else."""
+"""The report of one run: a single HTML file that needs no other."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def page(done: Results, measured: MeasuredComparison | None = None) -> str:
     done : Results
         The run, complete or not.
     measured : MeasuredComparison, optional
-        A measured contact force beside it.
+        A measured contact force to show beside it.
     """
     summary, signals, assessments = done.summary, done.signals, done.assessments()
     is_coupling = has_contacts(done)
@@ -71,7 +71,7 @@ def _subject(is_coupling: bool) -> str:
 
 
 def _outputs(done: Results, charts: list[Chart]) -> list[str]:
-    """Return the section of a run that has nothing but outputs."""
+    """Return the section of a run without a contact: its outputs."""
     table = f"<div class='scroll'>{html_markup.table(HEADS, output_rows(done))}</div>"
     return ["<section id='outputs'><h2>Outputs</h2>", table, *map(html_markup.chart, charts), "</section>"]
 
@@ -91,7 +91,7 @@ def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool 
 
 
 def _cautions(summary: dict[str, Any]) -> str:
-    """Return what FMUs have warned of, and what in the scenario may not be meant."""
+    """Return the warnings of the FMUs, and those on the scenario."""
     said = ((html_markup.text(w["component"]), html_markup.text(w["text"])) for w in summary.get("warnings", []))
     found = [f"<p class='warning'>{component} warns: {text}</p>" for component, text in said]
     of_files = (html_markup.text(text) for text in summary.get("scenario_warnings", []))
@@ -106,10 +106,10 @@ def status_note(summary: dict[str, Any]) -> str:
     reached, stop = summary.get("time_reached"), summary.get("settings", {}).get("stop")
     where = f" at t = {reached:.6g} s" if reached is not None else ""
     where += f" of {stop:.6g} s" if where and stop is not None else ""
-    words = {"running": "was not finished (still running, or killed)"}
-    how = words.get(status, f"is {status}")
-    reason = html_markup.text(summary.get("reason", ""))
-    note = f"<b>Incomplete.</b> This run {html_markup.text(how)}{where}. {reason} What follows is what was computed."
+    words = {"running": "was not finished (it is still running or was killed)", "failed": "failed"}
+    how = words.get(status, f"was {status}")
+    reason = f" {html_markup.text(summary['reason'])}." if summary.get("reason") else ""
+    note = f"<b>Incomplete.</b> This run {html_markup.text(how)}{where}.{reason} The results so far follow."
     return f"<p class='warning'>{note}</p>"
 
 
@@ -134,16 +134,17 @@ def _figures(done: Results, assessments: tuple[Assessment, ...]) -> str:
     )
 
 
-#: What is taken from where, for whoever reads the figures.
+#: From which part of the run each figure is taken, for the reader.
 INTERVAL_NOTE: Final = (
-    "Forces, losses and heights: while the strip is in the interval, which, where it has no beginning, begins "
-    f"{SETTLING:g} s after the first contact. Uplift: supports in it, its ends included, over the whole run. Slack "
-    "droppers: share of those in it that are slack for a moment as the pantograph passes, until the next one comes."
+    "Forces, losses and heights are taken while the strip is in the interval of interest, which, if no start is "
+    f"given, begins {SETTLING:g} s after the first contact. Uplift: of supports in the interval, its ends included, "
+    "over the whole run. Slack droppers: share of the droppers in the interval that go slack as the pantograph "
+    "passes, before the next one arrives."
 )
 
 
 def _filters(a: Assessment, chosen: ForceFilter) -> str:
-    """Return the figures under every filter where they depend on it."""
+    """Return the figures with every filter, if they depend on it."""
     rows = filter_rows(a.quality, chosen)
     name = html_markup.text(a.contact.pantograph)
     head = f"<h3>The extremes of {name} depend on the filter</h3>"
@@ -151,7 +152,7 @@ def _filters(a: Assessment, chosen: ForceFilter) -> str:
 
 
 def _spans(assessments: tuple[Assessment, ...]) -> str:
-    """Return the figures span by span, which tell whether the run has settled."""
+    """Return the figures span by span, which show whether the run has settled."""
     heads = ("span", "mean [N]", "sigma [N]", "maximum [N]", "minimum [N]")
     parts = []
     for a in assessments:
@@ -189,7 +190,7 @@ def _measured(found: MeasuredComparison, chart: Chart) -> list[str]:
     note = f"<p class='note'>Measured: {html_markup.text(found.source)}; {where}.</p>"
     note += "".join(f"<p class='warning'>Warning: {html_markup.text(w)}.</p>" for w in found.warnings)
     return [
-        "<section id='measured'><h2>Measured beside simulated</h2>",
+        "<section id='measured'><h2>Measured and simulated</h2>",
         note,
         rows,
         html_markup.chart(chart),
@@ -199,10 +200,10 @@ def _measured(found: MeasuredComparison, chart: Chart) -> list[str]:
 
 def _inputs(summary: dict[str, Any]) -> str:
     parts = ["<section id='inputs'><h2>Inputs and where they come from</h2>"]
-    parts.append("<p class='note'>A dot marks what the scenario or the command line has set.</p>")
+    parts.append("<p class='note'>A dot marks parameters set by the scenario or the command line.</p>")
     for component in summary.get("components", []):
         rows = "".join(_input_row(i) for i in inputs_of(component))
-        heads = "<tr><th>parameter</th><th class='n'>value</th><th>unit</th><th>what</th><th>source</th></tr>"
+        heads = "<tr><th>parameter</th><th class='n'>value</th><th>unit</th><th>description</th><th>source</th></tr>"
         head = (
             f"<summary>{html_markup.text(component['name'])}: {html_markup.text(component.get('fmu', '-'))}</summary>"
         )
@@ -220,8 +221,8 @@ def _input_row(i: Input) -> str:
 
 
 def _computed(summary: dict[str, Any]) -> str:
-    quality = html_markup.table(("what", "value"), quality_rows(summary), numbers=False)
-    provenance = html_markup.table(("what", "value"), provenance_rows(summary), numbers=False)
+    quality = html_markup.table(("item", "value"), quality_rows(summary), numbers=False)
+    provenance = html_markup.table(("item", "value"), provenance_rows(summary), numbers=False)
     return (
         "<section id='computed'><h2>How it was computed</h2><div class='columns'>"
         f"<div><h3>Numerical quality</h3>{quality}</div>"

@@ -68,7 +68,7 @@ class RunFolder:
         return self.path / CHECKPOINT
 
     @property
-    def is_intact(self) -> bool:
+    def holds_this_run(self) -> bool:
         """Whether the results that lie in the folder are still those of this run."""
         with suppress(MasterError):
             return identity(self.path) == self.run
@@ -222,7 +222,7 @@ def identity(folder: Path) -> str:
     MasterError
         If it is not a results folder of this tool.
     """
-    return str(_summary(folder).get("run", ""))
+    return str(summary_of(folder).get("run", ""))
 
 
 def made_by(path: Path, generator: str) -> bool:
@@ -256,7 +256,14 @@ def write_forces(folder: Path, signals: Sequence[Signals]) -> None:
     write_text(folder / FORCES, text.getvalue())
 
 
-def _summary(folder: Path) -> dict[str, Any]:
+def summary_of(folder: Path) -> dict[str, Any]:
+    """Return the summary of the run in a folder.
+
+    Raises
+    ------
+    MasterError
+        If it is not a results folder of this tool, or of a newer version.
+    """
     if not is_ours(folder):
         raise MasterError(f"{folder} is not a results folder: it has no {SUMMARY} written by this tool")
     found = summary_schema.read_summary(folder / SUMMARY)

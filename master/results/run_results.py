@@ -20,7 +20,7 @@ from master.evaluation.run_events import Event, find_events
 from master.recording.recording import TIMESERIES, Recording, load
 from master.recording.static_geometry import Geometry
 from master.results import summary_schema
-from master.results.results_folder import GEOMETRY, _summary
+from master.results.results_folder import GEOMETRY, summary_of
 from master.safety import folder_lock
 from master.system.contacts import Contact
 
@@ -150,14 +150,14 @@ def read(folder: Path) -> Results:
     folder_lock.check_free(folder)
     done = _read(folder)
     folder_lock.check_free(folder)
-    now = _summary(folder)
+    now = summary_of(folder)
     if (now.get("run"), now.get("status")) != (done.summary.get("run"), done.summary.get("status")):
         raise MasterError(f"{folder} was written while it was being read; try again")
     return done
 
 
 def _read(folder: Path) -> Results:
-    summary = _summary(folder)
+    summary = summary_of(folder)
     geometry = summary_schema.read_geometry(folder / GEOMETRY) if (folder / GEOMETRY).is_file() else {}
     coarse = sorted(p for p in folder.glob("timeseries*.csv") if p.name != TIMESERIES)
     recordings = tuple(load(p) for p in (folder / TIMESERIES, *coarse))

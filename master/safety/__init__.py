@@ -1,1 +1,4 @@
-"""Nothing is lost and nobody is stuck: safe files, locks of folders, signals, supervision. Imports `errors` alone."""
+"""Nothing is lost and nobody is stuck: safe files, arrays in bytes, locks of folders, signals, supervision.
+
+Imports the errors alone.
+"""

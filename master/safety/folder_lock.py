@@ -1,8 +1,8 @@
-"""Who works in a folder: one process at a time, known by name to those that have to wait.
+"""A lock on a folder: one process at a time works in it, known by name to those that have to wait.
 
-The lock is the kernel's, on the file `LOCK` in the folder, so it is gone with the process that holds it, however that
-ends; the file itself then stays, and means nothing. Who it is stands in a second file, for a locked one cannot be read
-everywhere.
+The lock is the kernel's, on the file `LOCK` in the folder, so it ends with the process that holds it, however that
+ends; the file itself may then stay, and means nothing. The owner's name is in a second file, because a locked file
+cannot be read on every system.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from master.errors import MasterError, one_line
 
 LOCK: Final = ".lock"
 OWNER: Final = ".owner.json"
-#: Seconds for which a folder is asked for again: if it is only looked at, or its owner is just dying, it is free soon.
+#: Seconds for which a claim is tried again: a folder that is only checked, or whose owner is ending, is free soon.
 _PATIENCE: Final = 1.0
 _POLL: Final = 0.02
-#: What a file system says that knows no locks.
+#: Errors of a file system without locks.
 _NO_LOCKS: Final = tuple(getattr(errno, n) for n in ("ENOSYS", "ENOTSUP", "EOPNOTSUPP", "ENOLCK") if hasattr(errno, n))
 
 #: How often this process, and which thread of it, has claimed a folder; a forked child has claimed none.
@@ -57,7 +57,8 @@ class Owner:
 def claimed(folder: Path, remedy: str = "choose another with --out") -> Iterator[None]:
     """Work alone in a folder that exists; the same thread may claim it several times.
 
-    Where the file system knows no locks, nobody is kept out: what a run certifies is compared with what it wrote.
+    A file system without locks keeps nobody out; so a run compares its files with what it wrote before it vouches for
+    them.
 
     Parameters
     ----------
@@ -88,7 +89,8 @@ def claimed(folder: Path, remedy: str = "choose another with --out") -> Iterator
     finally:
         del _held[key]
         with suppress(OSError):  # the folder is gone, or (Windows) the file is open
-            if os.path.samestat(os.fstat(lock), (folder / LOCK).stat()):  # not another's, in a folder made anew
+            # Not the lock of another process in a new folder of the same name.
+            if os.path.samestat(os.fstat(lock), (folder / LOCK).stat()):
                 (folder / OWNER).unlink()
                 (folder / LOCK).unlink()
         os.close(lock)
@@ -104,17 +106,17 @@ def check_free(folder: Path, remedy: str = "wait for it to end") -> None:
     """
     if _key(folder) in _held or not (folder / LOCK).is_file():
         return
-    with suppress(OSError):  # a folder of somebody else's: not to be locked, and so not to be known
+    with suppress(OSError):  # a folder of another user: it cannot be locked, so nothing is known of it
         os.close(_locked(folder, remedy))
 
 
 def _locked(folder: Path, remedy: str) -> int:
-    """Return a descriptor of the lock's file, locked; closing it gives the lock back."""
+    """Return a descriptor of the lock's file, locked; closing it releases the lock."""
     deadline = time.monotonic() + _PATIENCE
     while True:
         lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            if _is_got(lock, folder / LOCK):
+            if _is_acquired(lock, folder / LOCK):
                 return lock
         except BaseException:
             os.close(lock)
@@ -125,8 +127,8 @@ def _locked(folder: Path, remedy: str) -> int:
         time.sleep(_POLL)
 
 
-def _is_got(lock: int, path: Path) -> bool:
-    """Lock a file, and say whether that locks the folder: its owner may just have removed it."""
+def _is_acquired(lock: int, path: Path) -> bool:
+    """Lock a file and return whether that locks the folder: its owner may just have removed the file."""
     try:
         if not lock_descriptor(lock, blocking=False):
             return False
@@ -146,7 +148,7 @@ def _sign(folder: Path) -> None:
         "computer": socket.gethostname(),
         "since": datetime.now().astimezone().isoformat(" ", "seconds"),
     }
-    with suppress(OSError):  # what is missing then is a name in a refusal
+    with suppress(OSError):  # without it, a refusal cannot name the owner
         (folder / OWNER).write_text(json.dumps(owner) + "\n", encoding="utf-8")
 
 
@@ -155,7 +157,7 @@ def _owner(folder: Path) -> str:
         found = json.loads((folder / OWNER).read_text(encoding="utf-8"))
         owner = Owner(int(found["process"]), str(found["computer"]), str(found["since"]))
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return "by a process that has not left its name"
+        return "by a process that left no name"
     return one_line(str(owner))
 
 

@@ -1,8 +1,8 @@
-"""Signals that end a run: the first is a wish, the second an order.
+"""Signals that end a run: the first is a request, the second an order.
 
-A wish is heeded after the current step; where nothing would be lost it is heeded at once: while FMUs are loaded or
-initialised, and while the master waits for another process. What does not return at all, in native code, is ended from
-outside (`master.safety.supervision`).
+A request takes effect after the current step, or at once where nothing would be lost: while FMUs are loaded or
+initialised, and while the master waits for another process. Native code that never returns is ended from outside
+(`master.safety.supervision`).
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
-#: Those that end a run: the terminal's end is an order as good as its Ctrl-C.
+#: Those that end a run: closing the terminal counts as much as its Ctrl-C.
 _NAMES: Final = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class _State:
-    """What is wished for in this process, and whether it may be heeded at once."""
+    """Whether a stop is requested in this process, and whether it may take effect at once."""
 
     def __init__(self) -> None:
-        self.is_wished = False
+        self.is_stop_requested = False
         self.at_once = 0
 
     def handle(self, _number: int, _frame: FrameType | None) -> None:
-        is_second, self.is_wished = self.is_wished, True
+        is_second, self.is_stop_requested = self.is_stop_requested, True
         if is_second or self.at_once:
             raise KeyboardInterrupt
 
@@ -35,28 +35,28 @@ _state: Final = _State()
 
 
 def end_signals() -> tuple[signal.Signals, ...]:
-    """Return the signals that end a run; not the terminal's end if the program was started to outlive it (nohup)."""
+    """Return the signals that end a run; without that of the terminal if the program shall outlive it (nohup)."""
     known = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
     return tuple(s for s in known if s == signal.SIGINT or signal.getsignal(s) != signal.SIG_IGN)
 
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Turn the first signal into a wish to stop; the second raises KeyboardInterrupt. Gives the wish."""
+    """Turn the first signal into a request to stop, which is yielded; let the second raise KeyboardInterrupt."""
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
-    _state.is_wished, _state.at_once = False, 0
+    _state.is_stop_requested, _state.at_once = False, 0
     before = {number: signal.signal(number, _state.handle) for number in end_signals()}
     try:
-        yield lambda: _state.is_wished
+        yield lambda: _state.is_stop_requested
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
 @contextmanager
-def heeded_at_once() -> Iterator[None]:
+def interruptible_at_once() -> Iterator[None]:
     """Let the first signal raise KeyboardInterrupt too, within `interruptible`."""
     _state.at_once += 1
     try:
@@ -65,9 +65,9 @@ def heeded_at_once() -> Iterator[None]:
         _state.at_once -= 1
 
 
-def is_wished() -> bool:
-    """Whether the run that goes on is to stop."""
-    return _state.is_wished
+def is_stop_requested() -> bool:
+    """Whether the present run is to stop."""
+    return _state.is_stop_requested
 
 
 def raise_on_signals() -> None:

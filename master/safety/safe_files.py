@@ -13,11 +13,11 @@ from typing import Final
 
 from master.errors import MasterError
 
-#: What a file that is being written is called.
+#: How the name of a file ends while it is written.
 PART: Final = ".part"
-#: Where else the user can have it, for most files of ours.
+#: What to choose instead, for most of our files.
 _ELSEWHERE: Final = "another folder with --out"
-#: How a cell begins that a spreadsheet computes, behind what keeps it from doing so.
+#: How a cell begins that a spreadsheet would compute, after any quotes that prevent it.
 _FORMULA: Final = re.compile(r"'*[=+\-@\t\r]")
 #: Bytes that are read at once.
 _PIECE: Final = 1 << 20
@@ -38,9 +38,9 @@ def write_atomically(path: Path, data: bytes, elsewhere: str = _ELSEWHERE) -> No
 
 @contextmanager
 def atomic_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
-    """Give a file to write beside ``path``, which takes its place once it is complete and on the disk.
+    """Yield a file to write next to ``path``, which replaces it once complete and on the disk.
 
-    For those who write by name; what is at hand as bytes goes to `write_atomically`. The message of a failure names
+    For code that writes by a file's name; `write_atomically` takes bytes. The message of a failure names
     ``elsewhere`` as what to choose instead.
 
     Raises
@@ -50,8 +50,8 @@ def atomic_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
     """
     # A device, such as /dev/null, would be replaced by a file for all users of the computer.
     if path.exists() and not (path.is_file() or path.is_dir()):
-        raise MasterError(f"{path} is no file, and is left alone; choose {elsewhere}")
-    # Hidden, so that no archive takes it along, and each process has its own: two writers do not mix.
+        raise MasterError(f"{path} is not a file and is left alone; choose {elsewhere}")
+    # Hidden, so that no archive includes it; one per process, so that two writers do not mix.
     temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     try:
         yield temporary
@@ -67,7 +67,7 @@ def atomic_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
 
 
 def cannot_write(path: Path, error: OSError, elsewhere: str = _ELSEWHERE) -> MasterError:
-    """Return the error that tells the user which file cannot be written, why, and what to do."""
+    """Return the error that says which file cannot be written, why, and what to do."""
     remedy = "make room there, or choose" if error.errno in _NO_ROOM else "choose"
     return MasterError(f"{path} cannot be written ({error.strerror or error}); {remedy} {elsewhere}")
 
@@ -82,7 +82,7 @@ def _sync(path: Path) -> None:
 
 
 def safe_cell(text: str) -> str:
-    """Return text for a cell of a table that a spreadsheet does not take for a formula; `plain_cell` undoes it.
+    """Return text for a cell of a table that no spreadsheet takes for a formula; `plain_cell` undoes it.
 
     Examples
     --------
@@ -93,22 +93,22 @@ def safe_cell(text: str) -> str:
 
 
 def plain_cell(cell: str) -> str:
-    """Return the text of which `safe_cell` has made a cell."""
+    """Return the text that `safe_cell` was given."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 class AppendOnlyFile:
-    """A text file that grows by whole lines, handed to the system in one call each time.
+    """A text file that grows by whole lines, each batch handed to the system in one call.
 
     Nothing waits in the process after a call has returned, so a process that is killed leaves what it has written;
-    where the disk is full, the lines that still fit are kept and the rest of a line is taken away.
+    on a full disk the lines that still fit are kept and an incomplete one is removed.
 
     Parameters
     ----------
     path : Path
         The file.
     keep : int, optional
-        Bytes of an existing file to keep and to go on after; 0 for a new file.
+        Bytes of an existing file to keep and to append to; 0 for a new file.
 
     Raises
     ------

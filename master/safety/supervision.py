@@ -1,7 +1,7 @@
-"""A command under supervision: whatever ends it before it has finished is told, and counts as a failure.
+"""A command under supervision: whatever ends it before it has finished is reported, and counts as a failure.
 
 An FMU in the master's own process is native code: it may crash, call ``exit(0)``, or never return. So the command works
-in a child process, and its parent, which loads nothing, waits: it passes signals on, ends a child that does not heed
+in a child process, and its parent, which loads nothing, waits: it passes signals on, ends a child that ignores
 them, and turns an end that the child had not announced into exit code 1 and a sentence, with the results so far marked.
 Without ``fork`` (Windows), and for those who call the package from their own program, there is no supervision.
 """
@@ -25,17 +25,17 @@ from master.safety.interruption import end_signals, raise_on_signals
 
 #: prctl(2): the signal that a process gets when its parent ends.
 _PR_SET_PDEATHSIG: Final = 1
-#: Phases in which native code may keep the child from heeding a signal, and how long it may [s].
+#: Phases in which native code may keep the child from reacting to a signal, and how long it may [s].
 _PATIENCE: Final = {"loading": 2.0, "computing": 5.0, "stepping": 10.0, "closing": 10.0}
-#: Seconds that a child which has finished has to be gone.
+#: Seconds within which a child that has finished has to be gone.
 _ENDING_SECONDS: Final = 10.0
 
-#: Where the child tells its parent what it does; none if nobody supervises.
+#: Where the child reports to its parent what it does; None without supervision.
 _reports: int | None = None
 
 
 def supervised(work: Callable[[], int]) -> int:
-    """Do work in a child process; returns the exit code, 1 if the child ends without having finished.
+    """Do work in a child process; return the exit code, 1 if the child ends without having finished.
 
     Returns in both processes: the caller is to end with the code that it gets.
     """
@@ -45,12 +45,12 @@ def supervised(work: Callable[[], int]) -> int:
         return work()
     reports, _reports = os.pipe()
     parent = os.getpid()
-    # None may come before somebody is there to take it.
+    # No signal may arrive before a handler is there.
     signal.pthread_sigmask(signal.SIG_BLOCK, end_signals())
     child = os.fork()
     if child == 0:
         os.close(reports)
-        os.setpgid(0, 0)  # the terminal's Ctrl-C comes by way of the parent, and so only once
+        os.setpgid(0, 0)  # the terminal's Ctrl-C arrives through the parent, and so only once
         die_with(parent)
         return _worked(work)
     os.close(_reports)
@@ -58,7 +58,7 @@ def supervised(work: Callable[[], int]) -> int:
 
 
 def _fill_standard_streams() -> None:
-    """Open what the caller has closed (``>&-``): else the next file would be it, and take what FMUs print."""
+    """Open what the caller has closed (``>&-``): else the next file opened would receive what FMUs print."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
@@ -68,7 +68,7 @@ def _fill_standard_streams() -> None:
 
 
 def die_with(parent: int) -> None:
-    """End this process when its parent ends, even in an endless loop; elsewhere than on Linux only if it has ended."""
+    """End this process with its parent, even in an endless loop; on other systems than Linux only if that has ended."""
     if sys.platform == "linux":
         import ctypes
 
@@ -100,7 +100,7 @@ def unfinished(file: Path, key: str = "") -> Iterator[None]:
 
 def _tell(**report: Any) -> None:
     if _reports is not None:
-        with suppress(OSError):  # nobody listens any more
+        with suppress(OSError):  # the parent is gone
             os.write(_reports, (json.dumps(report) + "\n").encode())
 
 
@@ -125,14 +125,14 @@ def _worked(work: Callable[[], int]) -> int:
 
 
 class _Supervisor:
-    """The parent: waits for the child, and tells what has become of it.
+    """The parent: waits for the child, and reports what has become of it.
 
     Parameters
     ----------
     child : int
         Its process.
     reports : int
-        Where it tells what it does.
+        Where it reports what it does.
     """
 
     def __init__(self, child: int, reports: int) -> None:
@@ -180,7 +180,7 @@ class _Supervisor:
             os.kill(self._child, number)
 
     def _listen(self, seconds: float | None) -> None:
-        """Wait for a signal or a report, and take what has come."""
+        """Wait for a signal or a report, and process what has arrived."""
         ready, _, _ = select.select(self._sources, [], [], seconds)
         for source in ready:
             piece = os.read(source, 65536)
@@ -205,7 +205,7 @@ class _Supervisor:
             self._deadline = time.monotonic() + _ENDING_SECONDS
 
     def _hurry(self) -> None:
-        """Set how long the child may take, if it was told to end."""
+        """Set how long the child may take, if it was asked to end."""
         if self._code is None:
             patience = _PATIENCE.get(self._phase) if self._signals else None
             self._deadline = None if patience is None else time.monotonic() + patience
@@ -218,7 +218,7 @@ class _Supervisor:
             else:
                 self._send(number)
                 self._hurry()
-        elif number == signal.SIGTSTP:  # the terminal stops only the group in front, which the child does not belong to
+        elif number == signal.SIGTSTP:  # the terminal stops only the foreground group, which the child is not in
             self._send(signal.SIGSTOP)
             os.kill(os.getpid(), signal.SIGSTOP)
             self._send(signal.SIGCONT)
@@ -232,13 +232,13 @@ class _Supervisor:
         else:
             how = f"the process ended itself with exit code {status} before it had finished"
         if not self._is_ended_by_us and -status != signal.SIGKILL:
-            how += ", as an FMU does that crashes or exits: --isolate tells which"
+            how += ", as happens when an FMU crashes or exits; --isolate shows which one"
         folders = [str(Path(p).parent) for p in self._unfinished if _mark(Path(p), self._unfinished[p], marked, how)]
         return how + (f". What was computed is in {', '.join(folders)}, marked {marked}" if folders else "")
 
 
 def _wake_up(handle: Callable[[int, object], None]) -> int:
-    """Have signals handled, and return a descriptor that can be read from after each."""
+    """Handle signals, and return a descriptor that becomes readable after each."""
     ours, theirs = os.pipe()
     os.set_blocking(theirs, False)
     signal.set_wakeup_fd(theirs, warn_on_full_buffer=False)
@@ -249,7 +249,7 @@ def _wake_up(handle: Callable[[int, object], None]) -> int:
 
 
 def _mark(path: Path, key: str, status: str, reason: str) -> bool:
-    """Mark a JSON file of a run that has ended; returns whether it was its own and still open."""
+    """Mark the JSON file of a run that has ended; return whether it was this run's and still open."""
     from master.errors import MasterError
     from master.safety.folder_lock import claimed
     from master.safety.safe_files import write_atomically

@@ -1,1 +1,4 @@
-"""scenario."""
+"""From the files of a scenario to a system that can be run: opened, overridden, checked.
+
+Imports fmu, system, ssp and safety.
+"""

@@ -26,7 +26,7 @@ from master.system.components import Fmu, System, without
 DEFAULT_STEP = 1e-3
 #: Most macro steps of a run: ten thousand seconds in steps of 1 ms, whose recording still fits into memory.
 MAX_STEPS = 10**7
-#: Smallest step beside the times it leads to: rounding then leaves nine digits of it.
+#: Smallest step relative to the times it leads to: rounding then leaves nine digits of it.
 _RESOLUTION = 1e-7
 
 
@@ -55,11 +55,11 @@ def open_scenario(
     overrides : Overrides, optional
         Changes from the command line.
     tell : callable
-        Is told what takes time (building FMUs).
+        Called with what takes time (building FMUs).
     build : bool
         Whether missing or stale FMUs are built.
     is_check : bool
-        Whether nothing may be written: FMUs are built into a temporary folder, to be looked at only.
+        Whether nothing may be written: FMUs are built into a temporary folder, for inspection only.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def load_system(
     if text := text or value_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)
     system = without(system, overrides.absent)
-    if overrides.stop is None and _goes_on_until_end(structure):
+    if overrides.stop is None and _ends_with_interval(structure):
         system = _until_end(system)
     found = list(value_checks.problems(system, system.may_stop_early))
     if found:
@@ -118,8 +118,8 @@ def load_system(
     return system
 
 
-def _goes_on_until_end(structure: Structure) -> bool:
-    """Whether the end of the interval of interest ends the run, and not a stop time."""
+def _ends_with_interval(structure: Structure) -> bool:
+    """Whether the run ends with the interval of interest rather than at a stop time."""
     interval = structure.annotations.settings.interval
     if interval.until is None:
         return structure.stop is None and interval.end is not None
@@ -169,7 +169,7 @@ def _fmus(
 
 @dataclass(frozen=True)
 class _Provision:
-    """How FMUs are had: whether they may be built, who is told, and where to if not in their place."""
+    """How FMUs are provided: whether they may be built, who is informed, and where to if not in their place."""
 
     build: bool
     tell: Callable[[str], None]
@@ -191,14 +191,14 @@ def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) 
     start = structure.start
     stop = overrides.stop if overrides.stop is not None else structure.stop
     step = overrides.step if overrides.step is not None else structure.annotations.step or DEFAULT_STEP
-    if stop is None and _goes_on_until_end(structure):
+    if stop is None and _ends_with_interval(structure):
         return start, start + step, step  # until the system is known
     if stop is None:
-        text = "no stopTime in ssd:DefaultExperiment, nor an end in Interval to go on until; give --stop"
+        text = "no stopTime in ssd:DefaultExperiment, nor an end in Interval; give --stop"
         problems.append(Problem(SSD_NAME, 0, "stop", text))
         stop = start + step
     if math.isnan(start) or math.isnan(stop):
-        return 0.0, step, step  # told where it is written
+        return 0.0, step, step  # reported where it is written
     if not (math.isfinite(start) and start < stop < math.inf):
         problems.append(Problem(SSD_NAME, 0, "stop", f"stop time {stop:g} s must lie after start time {start:g} s"))
     elif text := _step_problem(start, stop, step):
@@ -207,18 +207,18 @@ def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) 
 
 
 def _step_problem(start: float, stop: float, step: float) -> str:
-    """Return why a run cannot be made in these steps, empty if it can."""
+    """Return why a run cannot use this step, empty if it can."""
     if not 0 < step <= stop - start:
         return f"must lie between 0 and {stop - start:g} s"
     if (stop - start) / step > MAX_STEPS:
         return f"makes {(stop - start) / step:.3g} steps, more than {MAX_STEPS:g}; take longer ones or stop earlier"
     if step < _RESOLUTION * max(abs(start), abs(stop)):
-        return f"is lost beside times up to {max(abs(start), abs(stop)):g} s; begin nearer to 0"
+        return f"is lost in rounding at times up to {max(abs(start), abs(stop)):g} s; start nearer to 0"
     return ""
 
 
 def _filter_problems(settings: RunSettings, step: float) -> Iterator[Problem]:
-    """Yield a problem if a filter is asked for that nothing of what is sampled is above."""
+    """Yield a problem if the wanted cutoff lies above all frequencies that are sampled."""
     cutoff = settings.filter.cutoff
     if "filter" in settings.model_fields_set and 2.0 * cutoff * step >= 1.0:
         half = f"half the sampling frequency, {0.5 / step:g} Hz at a macro step of {step:g} s"

@@ -14,10 +14,8 @@ from master.ssp.run_settings import DEFAULT_RECORDS, Record, RunSettings, Scheme
 from master.ssp.ssd import Structure
 from master.ssp.ssp_units import COMMON, conversion, split_quantity
 from master.system.components import Component, Fmu, Variable
+from master.system.step_rounding import MEASURED
 from master.system.variable_names import ENERGY_INTERVAL, ENERGY_MONITOR, ENERGY_VARIABLES, matcher
-
-#: Causalities of what can be recorded.
-_MEASURED = ("output", "local")
 
 
 @dataclass(frozen=True)
@@ -91,9 +89,9 @@ def effective_settings(
 
 
 def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterator[str]:
-    """Yield what the settings name and no component has; a pattern that fits nothing is a typing error."""
+    """Yield what the settings name and no component has; a pattern that matches nothing is a typing error."""
     variables = {f"{c.name}.{v.name}": v for c in components for v in c.fmu.variables.values()}
-    recordable = [n for n, v in variables.items() if v.type != "String" and v.causality in _MEASURED]
+    recordable = [n for n, v in variables.items() if v.type != "String" and v.causality in MEASURED]
     for record in settings.records:
         for pattern in record.variables if record not in DEFAULT_RECORDS else ():
             if not any(map(matcher(pattern), recordable)):
@@ -129,7 +127,7 @@ def with_energy(components: tuple[Component, ...], settings: RunSettings) -> tup
     """Make the components that can keep their energy balance do so, and record it."""
     able = [ENERGY_MONITOR in c.fmu.variables for c in components]
     if not any(able):
-        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{ENERGY_MONITOR}'; build them anew")
+        raise RequestError(f"--energy: no FMU of the scenario has the parameter '{ENERGY_MONITOR}'; build them again")
     watched = tuple(
         replace(c, parameters={**c.parameters, ENERGY_MONITOR: 1}) if can else c
         for c, can in zip(components, able, strict=True)
@@ -188,7 +186,7 @@ def _whole(full: str, text: str) -> int:
 
 
 def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
-    """Return a number in the FMU's unit from a text with or without a unit of its own."""
+    """Return a number in the FMU's unit from a text with or without a unit."""
     number, unit = split_quantity(text)
     if number is None:
         example = f", or a number with its unit ('{variable.start or 1} {variable.unit}')" if variable.unit else ""

@@ -1,9 +1,9 @@
-"""Limits with a physical meaning that the scenario's own numbers tell, before anything is run.
+"""Limits with a physical meaning that follow from the scenario's own numbers, before anything is run.
 
 The master knows no physics but what FMUs show: where a line and a pantograph have the parameters named here, as ours
 have, they are compared; of others nothing is said.
 
-`validate` tells these, for there no FMU is initialised. In a run the line's FMU speaks of the same limits, and is the
+`validate` reports these, for there no FMU is initialised. In a run the line's FMU speaks of the same limits, and is the
 better judge: it knows how fast the strips really come and how long the steps really are, whoever made the pantograph.
 So a run leaves these out, and nothing is said twice (`master.coupling.fmu_warnings`).
 """

@@ -1,7 +1,7 @@
-"""Checking a scenario as a whole: structure, FMUs, connections, units, start values.
+"""Checks of the structure: FMUs, connectors, connections, units, start values; the result is what is coupled.
 
 Problems are collected in a list (file, line, rule, text) instead of stopping at the first, and what only follows from
-one of them is not told besides.
+one of them is not reported besides.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _CAUSALITIES = {
 }
 #: Types of variables that can be connected.
 _EXCHANGED: Final = ("Real", "Integer", "Boolean", "String", "Enumeration")
-#: A pantograph's input that tells it the force, and a line's inputs that tell it the strip.
+#: A pantograph's input for the force, and a line's inputs for the strip.
 _FORCE: Final = re.compile(r"contact\.(?:force|[xyz])")
 _STRIP: Final = re.compile(r"(?P<port>(?:pantograph\[\d+\]\.)?)[AB]\.v?[xyz]")
-#: Unconnected inputs of a component that are told by name.
-_MOST_TOLD: Final = 5
+#: Unconnected inputs of a component that are listed by name.
+_MOST_LISTED: Final = 5
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class _Endpoint:
 
 
 class ScenarioChecks:
-    """Turns a structure and its FMUs into components and connections, collecting problems on the way.
+    """Turn a structure and its FMUs into components and connections, collecting problems on the way.
 
     Parameters
     ----------
@@ -74,12 +74,12 @@ class ScenarioChecks:
         self._fmus = fmus
         self._problems = problems
         self._warnings = [] if warnings is None else warnings
-        # The first of a name counts; that there is a second one is reported elsewhere.
+        # The first of a name counts; a second one is reported elsewhere.
         self._named = {c.name: c for c in reversed(structure.components)}
         self._connectors = {(c.name, x.name): x for c in self._named.values() for x in reversed(c.connectors)}
         self._units = UnitChecks(structure, fmus.values(), problems)
         self._faulty: set[Connector] = set()
-        self._ill_typed: set[int] = set()  # lines of connections that have been told
+        self._ill_typed: set[int] = set()  # lines of connections that have been reported
 
     def connections(self) -> tuple[SystemConnection, ...]:
         """Return the connections that are sound, in the order of the SSD."""
@@ -117,22 +117,22 @@ class ScenarioChecks:
         self._check_aliases(c, {x.input: _told(x) for x in connections if x.target == c.name}, "take")
         return SystemComponent(c.name, fmu, given, tuple(inputs), tuple(outputs), fmu.tolerance)
 
-    def _check_aliases(self, c: Component, told: Mapping[str, str], verb: str) -> None:
-        """Report names of one variable of the FMU that are told different things: the last one would count."""
+    def _check_aliases(self, c: Component, given: Mapping[str, str], verb: str) -> None:
+        """Report names of one variable of the FMU that are given different values: the last one would count."""
         first: dict[tuple[str, int], str] = {}
-        for name, what in told.items():
+        for name, what in given.items():
             variable = self._fmus[c.name].variables[name]
             place = ("Integer" if variable.type == "Enumeration" else variable.type, variable.reference)
             other = first.setdefault(place, name)
-            if what != told[other]:
+            if what != given[other]:
                 text = f"'{other}' and '{name}' of component '{c.name}' are one variable in the FMU, but {verb}"
-                self._report(c.line, "alias", f"{text} {told[other]} and {what}; leave out one of them")
+                self._report(c.line, "alias", f"{text} {given[other]} and {what}; leave out one of them")
 
     def _report(self, line: int, rule: str, text: str, file: str = SSD_NAME) -> None:
         self._problems.append(Problem(file, line, rule, text))
 
     def _check_names(self) -> None:
-        # Elements of one system with one name are told where they are read.
+        # Elements of one system with one name are reported where they are read.
         known = any(p.rule == "name" for p in self._problems)
         counts = Counter() if known else Counter(c.name for c in self._structure.components)
         for name, count in counts.items():
@@ -206,7 +206,7 @@ class ScenarioChecks:
                 self._units.convert(units[0], units[1], f"{names[0]} to {names[1]}", joint.line)
             return
         self._ill_typed.add(joint.line)
-        self._faulty.update(x for c, x in ends if not c)  # what it is connected to else is no second mistake
+        self._faulty.update(x for c, x in ends if not c)  # its other connections are no second mistake
 
     def _known_items(self, connector: Connector, variable: Variable | None) -> Items | None:
         if variable is not None and variable.items:
@@ -217,7 +217,7 @@ class ScenarioChecks:
         source = self._endpoint(c.start_element, c.start_connector, c.line)
         target = self._endpoint(c.end_element, c.end_connector, c.line)
         if source is None or target is None or self._faulty & {source.connector, target.connector}:
-            return None  # what is wrong with a connector is told there
+            return None  # what is wrong with a connector is reported there
         if source.connector.kind == "input" and target.connector.kind == "output":
             source, target = target, source
         kinds = (source.connector.kind, target.connector.kind)
@@ -255,16 +255,16 @@ class ScenarioChecks:
     def _has_one_type(
         self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
     ) -> bool:
-        """Whether both ends are of the same type, which can be exchanged; reports what is not so."""
+        """Whether both ends are of the same, exchangeable type; report what is not."""
         ends = [(end, v.type if v else end.connector.type) for end, v in zip((source, target), variables, strict=True)]
-        told = [kind for _, kind in ends if kind]
+        kinds = [kind for _, kind in ends if kind]
         if self._ill_typed.intersection((c.line, *(leg.line for leg in c.before))):
             return False
-        if len(set(told)) > 1:
+        if len(set(kinds)) > 1:
             text = " and ".join(f"'{end.full_name}' is {kind}" for end, kind in ends)
             self._report(c.line, "type", f"{text}; only variables of the same type can be connected")
             return False
-        kind = told[0] if told else "Real"
+        kind = kinds[0] if kinds else "Real"
         if kind not in _EXCHANGED:
             self._report(c.line, "unsupported", f"'{source.full_name}' is {kind}, which cannot be exchanged")
             return False
@@ -289,7 +289,7 @@ class ScenarioChecks:
         self, c: Connection, source: _Endpoint, target: _Endpoint, variables: list[Variable | None]
     ) -> Conversion:
         where = f"'{source.full_name}' to '{target.full_name}'"
-        # The FMU's own unit is what the number is in; the connector's unit is what the SSD talks in.
+        # The number is in the FMU's own unit; the SSD uses the connector's unit.
         fmu_units = [v.unit if v else "" for v in variables]
         written = [end.connector.unit or u for end, u in zip((source, target), fmu_units, strict=True)]
         is_difference = any(v is not None and v.is_difference for v in variables)
@@ -330,21 +330,21 @@ class ScenarioChecks:
         outside = {(f.element, f.connector): f.stops[0].full_name for f in self._structure.feeds if not f.is_fed}
         for component in components:
             open_inputs = [x for c, x in self._inputs() if c.name == component.name and (c.name, x.name) not in touched]
-            # What is wrong with a connector is told already.
+            # What is wrong with a connector is reported already.
             sound = [x for x in open_inputs if x not in self._faulty]
             free = [x for x in sound if not self._is_own_port(component, x)]
             self._warn_of(component, [x for x in free if (component.name, x.name) not in outside])
             self._warn_of_outside(component, [x for x in free if (component.name, x.name) in outside], outside)
 
     def _is_own_port(self, component: SystemComponent, connector: Connector) -> bool:
-        """Report an input by which a pantograph and its line are coupled; returns whether it is one."""
+        """Report an input by which a pantograph and its line are coupled; return whether it is one."""
         name, strip = connector.name, _STRIP.fullmatch(connector.name)
         partner = f"{strip['port']}contact.force" if strip else "A.z" if _FORCE.fullmatch(name) else ""
         variable = component.fmu.variables.get(partner)
         if variable is None or variable.causality != "output":
             return False
         if any(p.rule == "connection" for p in self._problems):
-            return True  # a connection that is not sound may be the one
+            return True  # a faulty connection may be the one
         text = f"input '{component.name}.{name}' is declared but not connected; pantograph and line need each other"
         self._report(connector.line, "connection", text)
         return True
@@ -354,9 +354,9 @@ class ScenarioChecks:
             what = f"input '{component.name}.{free[0].name}' is declared but not connected; it keeps"
             self._warn(free[0].line, f"{what} {_start(component, free[0])}")
         elif free:
-            told = ", ".join(f"'{x.name}' {_start(component, x)}" for x in free[:_MOST_TOLD])
-            more = f" and {len(free) - _MOST_TOLD} more" if len(free) > _MOST_TOLD else ""
-            self._warn(free[0].line, f"inputs of '{component.name}' are declared but not connected; {told}{more}")
+            listed = ", ".join(f"'{x.name}' {_start(component, x)}" for x in free[:_MOST_LISTED])
+            more = f" and {len(free) - _MOST_LISTED} more" if len(free) > _MOST_LISTED else ""
+            self._warn(free[0].line, f"inputs of '{component.name}' are declared but not connected; {listed}{more}")
 
     def _warn_of_outside(
         self, component: SystemComponent, free: list[Connector], outside: Mapping[tuple[str, str], str]
@@ -372,14 +372,14 @@ class ScenarioChecks:
 
 
 def _told(c: SystemConnection) -> str:
-    """Return in words what an input is told."""
+    """Return in words what an input receives."""
     factor, offset = c.conversion.factor, c.conversion.offset
     converted = "" if c.conversion.is_identity else f" x {factor:g} + {offset:g}"
     return f"'{c.source}.{c.output}'{converted}"
 
 
 def _start(component: SystemComponent, connector: Connector) -> str:
-    """Return in words which value an input keeps, and whose it is."""
+    """Return in words which value an input keeps, and where it comes from."""
     if connector.name in component.parameters:
         value = component.parameters[connector.name]
         return f"its start value {str(value).lower() if isinstance(value, bool) else value} of the scenario"

@@ -20,7 +20,7 @@ from master.system.components import Fmu, Variable
 _GIVEN = ("parameter", "input", "structuralParameter")
 #: Values of `initial` with which the others take one before initialization [FMI 2.0.4, section 2.2.7].
 _GUESSED = ("exact", "approx")
-#: Which SSP types a variable of a type accepts, if not its own alone.
+#: Which SSP types a variable of a type accepts, if more than its own.
 _ACCEPTED = {"Real": ("Real", "Integer"), "Enumeration": ("Enumeration", "Integer")}
 _TAKING = ("input", "parameter")
 
@@ -34,7 +34,7 @@ class Given:
 
 
 class StartValues:
-    """Finds the start values of components, collecting problems and warnings on the way.
+    """Find the start values of components, collecting problems and warnings on the way.
 
     A component's own bindings count least, then those of the systems around it from the inside out [SSP 1.0,
     ParameterBindings]; what a connector of a system is bound to goes along its connections, and counts most, as what
@@ -69,7 +69,7 @@ class StartValues:
         return values
 
     def _of_connectors(self) -> dict[str, Given]:
-        """Return what is bound to connectors of systems, of which the outermost binding counts."""
+        """Return what is bound to connectors of systems; the outermost binding counts."""
         found: dict[str, Given] = {}
         reached = {stop.full_name for feed in self._structure.feeds for stop in feed.stops}
         components = tuple(f"{c.name}." for c in self._structure.components)
@@ -108,7 +108,7 @@ class StartValues:
             return
         given = self._at_systems[stop.full_name]
         if feed.connector not in self._fmus[component.name].variables:
-            return  # told where the connector is declared
+            return  # reported where the connector is declared
         value = self._value(component, feed.connector, given, partial(self._along, component, given, stop))
         if value is not None:
             values[feed.connector] = value
@@ -153,7 +153,7 @@ class StartValues:
         return found.then(p.transformation)
 
     def _along(self, component: Component, given: Given, stop: Stop, variable: Variable, where: str) -> Conversion:
-        """Return the conversion of a value that is bound to a system's connector, in whose unit it is from there on."""
+        """Return the conversion of a value that is bound to a system's connector, whose unit it has from there on."""
         p, legs = given.parameter, stop.legs
         unit, is_difference = stop.connector.unit or p.unit, variable.is_difference
         first = Conversion()
@@ -216,11 +216,11 @@ def out_of_range(variable: Variable, value: float) -> str:
         return f"= {value:g} is not finite"
     if variable.items and value not in dict(variable.items).values():
         return f"= {value:g} is no item of its type ({listed(dict(variable.items))})"
-    told = f"{value:g} {variable.unit}".strip()
+    shown = f"{value:g} {variable.unit}".strip()
     if variable.minimum is not None and value < variable.minimum:
-        return f"= {told} is below its minimum {variable.minimum:g}{_hint(variable)}"
+        return f"= {shown} is below its minimum {variable.minimum:g}{_hint(variable)}"
     if variable.maximum is not None and value > variable.maximum:
-        return f"= {told} is above its maximum {variable.maximum:g}{_hint(variable)}"
+        return f"= {shown} is above its maximum {variable.maximum:g}{_hint(variable)}"
     return ""
 
 

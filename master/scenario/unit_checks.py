@@ -13,7 +13,7 @@ from master.system.components import Fmu
 
 
 class UnitChecks:
-    """Finds conversions; what it cannot convert becomes a problem, an unknown unit once.
+    """Find conversions; what cannot be converted becomes a problem, an unknown unit once.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class UnitChecks:
             return Conversion()
         found = conversion(known[source], known[target])
         if found is None:
-            # A connection that many components are reached by is told once.
+            # A connection that reaches many components is reported once.
             if (file, line, source, target) not in self._unlike:
                 self._report(line, f"{where}: '{source}' and '{target}' do not measure the same thing", file)
             self._unlike.add((file, line, source, target))
@@ -103,7 +103,7 @@ def unit_problems(structure: Structure, fmus: Mapping[str, Fmu]) -> Iterator[Pro
 
 
 def _among_fmus(structure: Structure, fmus: Mapping[str, Fmu], declared: Collection[str]) -> Iterator[Problem]:
-    """Yield a problem for every unit that is used and of which FMUs, or an FMU and everybody, think differently."""
+    """Yield a problem for every unit that is used and which FMUs, or an FMU and common usage, define differently."""
     first: dict[str, tuple[Unit, str]] = {}
     seen: set[Unit] = set()
     for c in structure.components:

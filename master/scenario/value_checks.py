@@ -1,4 +1,4 @@
-"""What the numbers of a scenario rule out before anything is run.
+"""Checks of values: what the numbers of a scenario rule out before anything is run.
 
 A stop time that does not cover the interval of interest, a pantograph that starts beyond it or that nothing lifts. The
 master knows no physics but what FMUs show: a pantograph whose FMU has the parameters ``speed`` and ``start_position``,
@@ -16,15 +16,15 @@ from master.system.components import Component, System
 from master.system.pantograph_motion import final_position, pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
-#: What a run goes on for after the last pantograph has left the interval [s]: the filter looks that far ahead, and the
-#: waves that supports are lifted by leave late.
+#: How long a run continues after the last pantograph has left the interval [s]: the filter looks that far ahead, and
+#: the waves that lift supports leave late.
 AFTER_INTERVAL: Final = 0.5
 #: Parameters that lift a pantograph, in N or N.m.
 _LIFTS: Final = ("static_force", "static_moment")
 
 
 def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
-    """Yield what cannot be meant, a sentence each.
+    """Yield what cannot be intended, a sentence each.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def half_empty_rows(system: System, empty: Sequence[str], absent: Sequence[str])
     """Return what is wrong with a table's row that fills some cells of a pantograph, or none of any pantograph.
 
     A pantograph without values takes no part; one with some would run with the scenario's values for the others, and
-    without any pantograph there is nothing to tell of a run.
+    without any pantograph a run has nothing to show.
     """
     trains = [p.name for p in pantographs(system)]
     half = [name for name in empty if name.partition(".")[0] in trains and name.partition(".")[0] not in absent]
@@ -69,15 +69,15 @@ def stop_after_interval(system: System) -> float | str:
     """
     end = system.settings.interval.end
     if end is None:
-        return "the interval of interest has no end that the run could go on until; give it one, or a stop time"
+        return "the interval of interest has no end that the run could end at; give it one, or a stop time"
     found = pantographs(system)
     if not found:
-        return "no pantograph is told a contact force whose run could go on until the interval ends; give a stop time"
+        return "no pantograph receives a contact force, so none can pass the interval and end the run; give a stop time"
     times = []
     for pantograph in found:
         start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
         if start is None or speed is None:
-            return f"the FMU of '{pantograph.name}' tells no start_position and speed: give a stop time"
+            return f"the FMU of '{pantograph.name}' gives no start_position and speed; give a stop time"
         if speed <= 0.0:
             return f"{pantograph.name}.speed = {speed:g} m/s never leads to the end of the interval, {end:g} m"
         times.append((end - start) / speed)

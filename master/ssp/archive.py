@@ -138,7 +138,7 @@ class Sources:
     root : Path
         The scenario's own folder, to which URIs are relative.
     outside : tuple of Path
-        Folders beside it that the user has allowed.
+        Further folders that the user has allowed.
     archive : Path, optional
         The archive that the folder was extracted from: what lies beside it is named as from a folder in its place.
     """

@@ -13,7 +13,7 @@ from master.ssp.ssp_xml import Reader
 
 #: Owner (its path, empty for the whole) and connector.
 _Place = tuple[str, str]
-#: Kinds of connectors whose values go on during the run, and of those that have theirs before it.
+#: Kinds of connectors whose values change during the run, and of those that have theirs before it.
 _SIGNALS = ("input", "output")
 _PARAMETERS = ("parameter", "calculatedParameter")
 _GIVING = ("output", "calculatedParameter")
@@ -106,7 +106,7 @@ def _connections(systems: dict[str, SystemNode], reader: Reader) -> tuple[list[C
 
 
 def _leads_out(c: Connection, inside: set[str], system: str, reader: Reader) -> bool:
-    """Report a connection with an element inside another system: from outside one connects that system."""
+    """Report a connection to an element inside another system; only that system itself can be connected."""
     for element in (c.start_element, c.end_element):
         if "." in element and element not in inside:
             text = f"'{element}' is not a component or system in system '{system}'; connect the system that holds it"
@@ -134,7 +134,7 @@ def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Read
             text = f"connects '{name}' of kind '{connector.kind}', which is not supported"
             reader.report(c.line, "unsupported", text)
             return None
-        # Seen from inside, a system's own input gives values and its own output takes them.
+        # From the inside, a system's own input gives values and its own output takes them.
         ends.append((place, connector, (connector.kind in _GIVING) == bool(element)))
     (first, one, first_gives), (second, other, second_gives) = ends
     if (one.kind in _PARAMETERS) != (other.kind in _PARAMETERS):
@@ -231,13 +231,13 @@ def _joint(edge: _Edge, systems: dict[str, SystemNode]) -> Joint:
 def _report_ends(edges: list[_Edge], systems: dict[str, SystemNode], reader: Reader) -> None:
     """Report connectors of systems that several connections feed, or that feed themselves, wherever they lead."""
     into = {place: before for place, before in _into(edges).items() if place[0] in systems}
-    told: set[_Place] = set()
+    reported: set[_Place] = set()
     for place, before in into.items():
         if len(before) > 1:
             text = f"has {len(before)} connections; one is allowed"
-        elif place not in told and place in (circle := _ahead(place, into)):
+        elif place not in reported and place in (circle := _ahead(place, into)):
             text = "is fed by itself: the connections of systems form a circle, into which no component leads"
-            told.update(circle)
+            reported.update(circle)
         else:
             continue
         where = f"connector '{place[1]}' of system '{place[0] or systems[''].name}'"

@@ -32,8 +32,8 @@ OSP_TYPE: Final = "com.opensimulationplatform"
 
 Scheme = Literal["jacobi", "gauss-seidel", "iterative"]
 SCHEMES: Final[tuple[Scheme, ...]] = get_args(Scheme)
-#: Options of each scheme: the settings of `Coupling` that it uses. `coupling_schemes` makes it with just these, the
-#: summary, comparisons and checkpoints show just these.
+#: Options of each scheme: the settings of `Coupling` that it uses. `coupling_schemes` makes it with these alone, and
+#: the summary, comparisons and checkpoints show these alone.
 OPTIONS: Final[dict[Scheme, tuple[str, ...]]] = {
     "jacobi": (),
     "gauss-seidel": ("order",),
@@ -59,7 +59,7 @@ class Coupling(_Settings):
     max_iterations : int
         iterative: repetitions of a step before the run stops with an error.
     weight : float
-        iterative: weight of the step's end in what the components are told (`coupling_schemes.Iterative`).
+        iterative: weight of the step's end in what the components receive (`coupling_schemes.Iterative`).
     """
 
     scheme: Scheme = "jacobi"
@@ -75,9 +75,9 @@ class Coupling(_Settings):
 
 
 class EvaluationInterval(_Settings):
-    """Interval of interest along the track [m]; from where the contact has settled and to the end, if not told.
+    """Interval of interest along the track [m]; from where the contact has settled and to the end, if not given.
 
-    ``until="end"`` lets the run go on until the last pantograph has left the interval, whatever stop time the scenario
+    ``until="end"`` lets the run last until the last pantograph has left the interval, whatever stop time the scenario
     has for other tools; ``until="stop"`` until the stop time. Not given, it is the stop time if there is one.
     """
 
@@ -112,7 +112,7 @@ class Filter(_Settings):
 
 
 class Limits(_Settings):
-    """By which limits the figures are judged: those of EN 50367 for a supply system, and the scenario's own, SI.
+    """Limits by which the figures are judged: those of EN 50367 for a supply system, and the scenario's own, in SI.
 
     Attributes
     ----------
@@ -209,8 +209,8 @@ def parse_annotations(nodes: list[Any], reader: Reader) -> Annotations:
     ours = [a for a in entries if a.get("type") == NAMESPACE]
     steps = [s for a in entries if a.get("type") == OSP_TYPE if (s := parse_osp(a, reader)) is not None]
     if len(set(steps)) > 1:
-        told = " and ".join(f"{s:g} s" for s in steps)
-        reader.problem(entries[0], "step", f"macro steps of {told} are asked for; one is needed")
+        listed = " and ".join(f"{s:g} s" for s in steps)
+        reader.problem(entries[0], "step", f"macro steps of {listed} are asked for; one is needed")
     for extra in ours[1:]:
         reader.problem(extra, "annotation", f"a second annotation of type {NAMESPACE}; one is enough")
     settings = parse_run(ours[0], reader) if ours else RunSettings()
@@ -254,7 +254,7 @@ def parse_run(annotation: Any, reader: Reader) -> RunSettings:
 
 
 def _check_plain(node: Any, reader: Reader, name: str) -> None:
-    """Report an element that is not the one expected, or has attributes, of which it knows none."""
+    """Report an element that is not the one expected, or has attributes, of which it has none."""
     if (tag(node), namespace(node)) != (name, NAMESPACE):
         reader.problem(node, "annotation", f"unknown element '{tag(node)}' (expected: {name} of {NAMESPACE})")
     for attribute in node.attrib:
@@ -262,7 +262,7 @@ def _check_plain(node: Any, reader: Reader, name: str) -> None:
 
 
 def check_places(root: Any, read: list[Any], reader: Reader) -> None:
-    """Report annotations of ours that stand where nobody reads them, and elements of ours in those of others."""
+    """Report our annotations in places where they are not read, and our elements in annotations of others."""
     for node in root.iter(f"{{{SSC}}}Annotation"):
         if node.get("type") == NAMESPACE and node.getparent() not in read:
             text = "is not read here; put it into the ssd:Annotations of the description or its DefaultExperiment"
@@ -277,16 +277,16 @@ def check_places(root: Any, read: list[Any], reader: Reader) -> None:
 
 
 def _tell_of_others(root: Any, reader: Reader) -> None:
-    """Note which tools' annotations are not read: they may hold steps, solvers or events of those tools."""
+    """Note which tools' annotations are not read; they may hold steps, solvers or events of those tools."""
     found = [a for a in root.iter(f"{{{SSC}}}Annotation") if a.get("type") not in (NAMESPACE, OSP_TYPE)]
     if found:
         names = several(list(dict.fromkeys(str(a.get("type")) for a in found)))
-        text = f"annotations of type {names} are not read; what they tell of steps, solvers and events has no effect"
+        text = f"annotations of type {names} are not read; what they say of steps, solvers and events has no effect"
         reader.warn(int(found[0].sourceline or 0), NOTE, text)
 
 
 def _is_stray(node: Any) -> bool:
-    """Whether an element of ours, not inside another one, stands in no annotation of ours."""
+    """Whether an outermost element of ours is in no annotation of ours."""
     ancestors = list(node.iterancestors(etree.Element))
     within = any(namespace(a) == NAMESPACE for a in ancestors)
     return not within and not any(a.tag == f"{{{SSC}}}Annotation" and a.get("type") == NAMESPACE for a in ancestors)

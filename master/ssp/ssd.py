@@ -58,7 +58,7 @@ def read_structure(sources: Sources, reader: Reader) -> Structure:
     if tag(node) != "SystemStructureDescription" or node.get("version") not in VERSIONS:
         text = f"is not an SSP description of version {' or '.join(VERSIONS)} (version='{node.get('version')}')"
         reader.problem(node, "version", text)
-        return EMPTY  # what another version means by its words would be a guess
+        return EMPTY  # the meaning of another version's words would be a guess
     reader.check_schema(node, "ssd")
     return parse_structure(node, sources, reader)
 
@@ -216,9 +216,9 @@ def _is_plain(node: Any, holder: Any | None, kind: str, reader: Reader) -> bool:
     """Whether a binding or mapping is of the type that is read, in a file or else once inside ``holder``."""
     what, inside = tag(node), list(elements(holder))
     if reader.text(node, "sourceBase", "SSD") != "SSD":
-        reader.problem(node, "unsupported", "sourceBase='component' is not supported; put the file beside the SSD")
-    elif (told := reader.text(node, "type", kind)) != kind:
-        reader.problem(node, "unsupported", f"the {what} is of type '{told}'; only {kind} is supported")
+        reader.problem(node, "unsupported", "sourceBase='component' is not supported; put the file next to the SSD")
+    elif (stated := reader.text(node, "type", kind)) != kind:
+        reader.problem(node, "unsupported", f"the {what} is of type '{stated}'; only {kind} is supported")
     elif inside and node.get("source"):
         text = f"the {what} has a source, '{node.get('source')}', and content as well; remove one of them"
         reader.problem(inside[0], "binding", text)

@@ -11,7 +11,7 @@ from master.ssp.ssp_units import Conversion
 from master.ssp.ssp_xml import SSC, SSM, Reader, child, children
 from master.ssp.ssv import Parameter, ParameterSet
 
-#: Rule of what is only worth knowing: it is no problem of a strict check either.
+#: Rule of a mere note, which is no problem in a strict check either.
 NOTE: Final = "note"
 _REFUSED: Final = (
     "BooleanMappingTransformation",
@@ -78,7 +78,7 @@ def _check_targets(entries: tuple[Entry, ...], reader: Reader) -> None:
 
 
 def apply(entries: tuple[Entry, ...], given: ParameterSet, prefix: str, reader: Reader) -> tuple[Parameter, ...]:
-    """Return the parameters that a mapping makes of a set; what it does not name is not used.
+    """Return the parameters that a mapping makes of a set; parameters that it does not name are not used.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ def apply(entries: tuple[Entry, ...], given: ParameterSet, prefix: str, reader: 
     prefix : str
         Put before the names of the set's parameters.
     reader : Reader
-        Is told of transformations of what is no number, and warned, in one sentence each, of entries without a
-        parameter and of parameters without an entry.
+        Receives a problem for every transformation of what is no number, and one warning each for entries without a
+        parameter and for parameters without an entry.
     """
     mapped = []
     _check_targets(entries, reader)

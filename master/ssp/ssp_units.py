@@ -12,7 +12,7 @@ from master.ssp.ssp_xml import SSC, Reader, child, children
 
 #: Exponents of kg, m, s, A, K, mol, cd, rad.
 Dimension = tuple[int, int, int, int, int, int, int, int]
-#: Relative difference that is no more than a matter of digits (0.27778 for 1/3.6).
+#: Relative difference that rounding explains (0.27778 for 1/3.6).
 _DIGITS: Final = 1e-5
 BASE_UNITS: Final = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
@@ -147,7 +147,7 @@ def parse_unit(node: Any, reader: Reader) -> Unit:
 
 
 def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
-    """Yield units that are declared otherwise before, or mean something else everywhere, and what that is.
+    """Yield units that an earlier declaration or common usage defines differently, and how.
 
     Of a unit that everybody knows only factor and offset are compared: whether angles have a dimension is a matter
     of taste, and so is whether a percentage is a hundredth.
@@ -156,7 +156,7 @@ def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
     for unit in declared:
         other = first.setdefault(unit.name, unit)
         where = f"{other.file}, line {other.line}" if other.line else other.file
-        if other.dimension != unit.dimension and other.line:  # many tools tell no more of an FMU's unit than its name
+        if other.dimension != unit.dimension and other.line:  # many tools give no more of an FMU's unit than its name
             yield unit, f"measures something else in {where}"
         elif other.dimension == unit.dimension and not _agree(other, unit):
             yield unit, f"is declared with {_scale(unit)} here, with {_scale(other)} in {where}"
@@ -165,7 +165,7 @@ def contradictions(declared: Iterable[Unit]) -> Iterator[tuple[Unit, str]]:
 
 
 def unusual(unit: Unit) -> str:
-    """Return how a unit that everybody knows is declared otherwise, empty if it is not."""
+    """Return how a common unit is declared differently, empty if it is not."""
     usual = COMMON.get(unit.name)
     if usual is None or unit.name == "%":
         return ""
@@ -177,7 +177,7 @@ def unusual(unit: Unit) -> str:
 
 
 def unlike(unit: Unit, other: Unit) -> str:
-    """Return how two FMUs' units of one name differ, empty if they do not; many tools tell no more than the name."""
+    """Return how two FMUs' units of one name differ, empty if they do not; many tools give no more than the name."""
     if unit.dimension[:-1] != other.dimension[:-1]:  # but for angles
         return "measures something else" if any(unit.dimension) and any(other.dimension) else ""
     return (
@@ -188,7 +188,7 @@ def unlike(unit: Unit, other: Unit) -> str:
 
 
 def _agree(one: Unit, other: Unit) -> bool:
-    """Whether two declarations of a unit mean the same, but for the digits that were written."""
+    """Whether two declarations of a unit mean the same, up to the digits that were written."""
     near = math.isclose(one.factor, other.factor, rel_tol=_DIGITS)
     return near and math.isclose(one.offset, other.offset, rel_tol=_DIGITS, abs_tol=_DIGITS)
 

@@ -32,11 +32,11 @@ SCHEMAS: Final = {
 _VERSIONED: Final = ("SystemStructureDescription", "ParameterSet", "ParameterMapping")
 #: What 2.0 calls the types that 1.0 has; its further types are refused.
 _RENAMED: Final = {"Float64": "Real", "Int32": "Integer"}
-#: What 2.0 may say about a file or an element beside what is run.
+#: What 2.0 may add to a file or an element that has no effect on the run.
 _REMARKS: Final = (f"{{{SSC}}}MetaData", f"{{{SSC}}}Signature")
 #: What XML Schema leaves out around a value.
 _BLANKS: Final = " \t\r\n"
-#: Types of which XML Schema says no more than that a value is none.
+#: Types of which XML Schema says only that a value is not of it.
 _TYPE_ERROR: Final = re.compile(r"is not a valid value of the (?:local )?atomic type")
 
 
@@ -119,12 +119,12 @@ class Reader:
             root = _as_first_version(root)
         schema = _schema(kind)
         schema.validate(root)
-        told: set[tuple[int, str]] = set()
+        reported: set[tuple[int, str]] = set()
         for entry in schema.error_log:
             where = (int(entry.line), str(entry.path))
-            if where in told and _TYPE_ERROR.search(entry.message):
+            if where in reported and _TYPE_ERROR.search(entry.message):
                 continue  # the same value again: first which rule it breaks, then that it is none of the type
-            told.add(where)
+            reported.add(where)
             self.problems.append(Problem(self.file, entry.line, "schema", _plain(entry.message)))
 
     def text(self, node: Any, name: str, default: str = "") -> str:
@@ -217,7 +217,7 @@ def elements(node: Any | None) -> Iterator[Any]:
 
 
 def _in_first_words(root: Any) -> Any:
-    """Give types of version 2.0 the names that they had in 1.0, and leave out what it says beside; in place."""
+    """Give types of version 2.0 the names that they had in 1.0, and leave out its remarks; in place."""
     if root.get("version") != "2.0":
         return root
     for node in list(root.iter(etree.Element)):

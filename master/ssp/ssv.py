@@ -61,7 +61,7 @@ class Parameter:
 class ParameterSet:
     """A parameter set with the units and enumerations it declares.
 
-    ``unreadable`` are the names of parameters whose values could not be read, which has been told.
+    ``unreadable`` are the names of parameters whose values could not be read, which has been reported.
     """
 
     name: str

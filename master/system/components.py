@@ -16,7 +16,7 @@ from master.ssp.ssv import Value
 from master.system.connections import Connection
 from master.system.contacts import Contact, find_contacts
 
-#: Share of a step by which the stop time may miss a whole number of steps for want of digits.
+#: Share of a step by which the stop time may miss a whole number of steps by rounding.
 _ROUNDING: Final = 1e-6
 
 
@@ -25,7 +25,7 @@ class Variable:
     """A variable of an FMU, as its modelDescription.xml declares it.
 
     ``initial`` is that of the standard where the file leaves it open; ``items`` are those of an enumeration;
-    ``is_difference`` tells a relative quantity, to which the offset of its unit does not apply.
+    ``is_difference`` marks a relative quantity, to which the offset of its unit does not apply.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Fmu:
 class Component:
     """An FMU in the system: its name, parameter values (in the FMU's units) and exchanged variables.
 
-    ``tolerance`` is what the FMU is told when the experiment is set up, None for nothing.
+    ``tolerance`` is passed to the FMU when the experiment is set up; None for none.
     """
 
     name: str
@@ -121,7 +121,7 @@ class System:
     settings : RunSettings
         Coupling, interval of interest, calibration, recording.
     warnings : tuple of str
-        What in the scenario can be run but may not be meant.
+        What in the scenario can be run but may not be intended.
     may_stop_early : bool
         Whether the stop time may lie before the end of the interval of interest: nothing is judged then.
     """
@@ -143,7 +143,7 @@ class System:
 
     @property
     def discrete(self) -> frozenset[str]:
-        """Names of exchanged outputs that are not Real, between whose values there is nothing."""
+        """Names of exchanged outputs that are not Real, whose values cannot be interpolated."""
         return frozenset(
             f"{c.name}.{n}" for c in self.components for n in c.outputs if c.fmu.variables[n].type != "Real"
         )

@@ -20,12 +20,12 @@ def parameter_value(component: Component, name: str) -> float | None:
 
 
 def pantographs(system: System) -> tuple[Component, ...]:
-    """Return the components that are told a contact force, each once."""
+    """Return the components that receive a contact force, each once."""
     names = dict.fromkeys(c.pantograph for c in system.contacts)
     return tuple(system.component(name) for name in names)
 
 
 def final_position(system: System, pantograph: Component) -> float | None:
-    """Return where a pantograph is at the stop time [m], None if its FMU does not tell start and speed."""
+    """Return where a pantograph is at the stop time [m], None if its FMU does not give start and speed."""
     start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
     return None if start is None or speed is None else start + speed * (system.stop - system.start)

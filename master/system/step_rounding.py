@@ -1,4 +1,4 @@
-"""What was asked for in seconds and is not a whole number of macro steps: what the run makes of it, in words."""
+"""Times in seconds that are not a whole number of macro steps: what the run does instead, in words."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from master.system.variable_names import matcher
 
 #: Causalities of what is recorded besides the exchanged outputs.
 MEASURED: Final = ("output", "local")
-#: Share of a step by which a time may miss a whole number of steps for want of digits.
+#: Share of a step by which a time may miss a whole number of steps by rounding.
 ROUNDING: Final = 1e-6
 
 
 def adjustments(system: System, checkpoint_every: float | None = None) -> tuple[str, ...]:
-    """Return a sentence for every time that the run cannot keep to: its end, rates of recording, checkpoints.
+    """Return a sentence for every time that the run cannot meet: its end, rates of recording, checkpoints.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def _no_multiple(step: float) -> str:
 
 
 def _changed(period: float, step: float) -> str:
-    """Return what becomes of a period, empty if it is kept; 0 stands for every step."""
+    """Return what a period becomes, empty if it is kept; 0 stands for every step."""
     kept = steps_in(period, step) * step
     return f"{kept:.9g} s, not {period:.9g} s, {_no_multiple(step)}" if period and _differs(kept, period, step) else ""
 
@@ -55,7 +55,7 @@ def _differs(kept: float, period: float, step: float) -> bool:
 
 
 def steps_in(period: float, step: float) -> int:
-    """Return the whole number of steps that comes nearest to a period, at least one."""
+    """Return the whole number of steps nearest to a period, at least one."""
     return max(1, round(period / step))
 
 
@@ -75,6 +75,6 @@ def is_recordable(component: Component, variable: Variable) -> bool:
 
 
 def record_of(name: str, records: Sequence[Record]) -> Record | None:
-    """Return the last entry that a variable's full name fits, None if there is none."""
+    """Return the last entry that matches a variable's full name, None if there is none."""
     fits = [r for r in records if any(matcher(p)(name) for p in r.variables)]
     return fits[-1] if fits else None

@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from fnmatch import fnmatchcase
 from typing import Final
 
-#: The parameter that makes an FMU keep its energy balance, what it says then, and how often that is recorded [s].
+#: The parameter that makes an FMU keep its energy balance, what it then reports, and the period of recording that [s].
 ENERGY_MONITOR: Final = "monitor_energy"
 ENERGY_VARIABLES: Final = ("*.energy.*", "*contact.work")
 ENERGY_INTERVAL: Final = 0.05
 
 
 def matcher(pattern: str) -> Callable[[str], bool]:
-    """Return a test for names; ``*`` stands for anything, brackets for themselves.
+    """Return a test for names; ``*`` stands for anything, every other character, brackets too, for itself.
 
     Examples
     --------
     >>> matcher("*.dropper[*].force")("catenary.dropper[12].force")
     True
     """
-    first, *others = pattern.split("*")
-    if not others:
-        return lambda name: name == pattern
-    *inner, last = others
-
-    def fits(name: str) -> bool:
-        # From left to right, each part as early as it can be: a regular expression may try for ages.
-        if not (name.startswith(first) and name.endswith(last)):
-            return False
-        place, end = len(first), len(name) - len(last)
-        for part in inner:
-            found = name.find(part, place, end)
-            if found < 0:
-                return False
-            place = found + len(part)
-        return place <= end
-
-    return fits
+    literal = re.sub(r"[\[?]", r"[\g<0>]", pattern)  # to fnmatch, brackets are a set of characters
+    return lambda name: fnmatchcase(name, literal)

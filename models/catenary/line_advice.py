@@ -1,6 +1,6 @@
-"""Limits with a physical meaning: what a run may still do, but whose results deserve a second look.
+"""Physical limits beyond which a run still works, but its results deserve a second look.
 
-Every function returns a sentence for the user, empty where there is nothing to say.
+Every warning is a sentence for the user, empty if there is nothing to say.
 """
 
 from __future__ import annotations
@@ -11,18 +11,16 @@ from typing import Final, Protocol
 
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition, Contact
-from models.catenary.statics.elasticity import OPERATION_LIMIT, contact_wire_wave_speed
+from models.catenary.statics.wire_waves import OPERATION_LIMIT, contact_wire_wave_speed
 
 #: Contact force at which the stiffness of a law with an exponent is taken [N].
 _REFERENCE_FORCE: Final = 200.0
-#: Largest step over the relaxation time of wire and contact spring, and fewest steps per period of a mass on it.
+#: Largest step relative to the relaxation time of wire and contact spring; fewest steps per period of a mass on it.
 _LARGEST_SHARE: Final = 0.25
 _STEPS_PER_PERIOD: Final = 20.0
-#: Most droppers that are named one by one.
+#: Largest number of droppers named one by one.
 _NAMED: Final = 8
-
-
-#: Longest delay of slack [s], and the rate of a dropper's elongation that it is told for [m/s].
+#: Longest delay of slack [s], and the rate of elongation of a dropper at which the warning quotes its effect [m/s].
 _LONGEST_DELAY: Final = 1e-3
 _STRETCHING: Final = 0.5
 
@@ -40,43 +38,44 @@ class Named(Protocol):
 
 
 def speed_warning(definition: CatenaryDefinition, speed: float) -> str:
-    """Say so if a train is too fast for the waves in the contact wire.
+    """Return a warning if a train is too fast for the waves in the contact wire.
 
-    Lines are operated up to 0.7 of the wave speed; from the wave speed on no wave runs ahead of the strip, and the
-    wire's deflection grows as it would under a supersonic source. The wave speed is that of the longest span, the
-    lowest of the line.
+    Lines are operated at up to 0.7 of the wave speed. From the wave speed on, no wave runs ahead of the strip, and the
+    deflection of the wire grows as it would under a supersonic source. The wave speed is taken for the longest span,
+    where it is lowest.
 
     Parameters
     ----------
     definition : CatenaryDefinition
     speed : float
-        Of the train, either way [m/s].
+        Speed of the train in either direction [m/s].
     """
     C = contact_wire_wave_speed(definition)
     ratio = abs(speed) / C
     if ratio <= OPERATION_LIMIT:
         return ""
-    told = f"the train's {3.6 * abs(speed):.0f} km/h are {ratio:.2f} of the contact wire's wave speed"
-    told += f", {3.6 * C:.0f} km/h"
+    text = f"the train's {3.6 * abs(speed):.0f} km/h are {ratio:.2f} of the contact wire's wave speed"
+    text += f", {3.6 * C:.0f} km/h"
     if ratio < 1.0:
-        return f"{told}: lines are operated up to {OPERATION_LIMIT:g} of it (EN 50119)"
-    return f"{told}: no wave runs ahead of the strip, which small displacements do not describe; run slower"
+        return f"{text}: lines are operated at up to {OPERATION_LIMIT:g} of it (EN 50119)"
+    return f"{text}: no wave runs ahead of the strip, which small displacements do not describe; run slower"
 
 
 def longest_step(definition: CatenaryDefinition, head_mass: float = math.inf) -> float:
-    """Return the longest step for which exchanging force and position once per step is harmless [s].
+    """Return the longest step at which exchanging force and position once per step does no harm [s].
 
-    Seen from the contact, a long wire is a damper: a force sends transverse waves both ways, F = 2 sqrt(T rho) v.
-    With the contact spring K it forms a system of relaxation time 2 sqrt(T rho) / K. Force and position that are
-    one step H apart act like a damping -K H across that spring, so their ratio H K / (2 sqrt(T rho)) says how much of
-    the wire's own damping is lost; a quarter is allowed. On the other side the collector head's mass m oscillates on
-    the spring with the period 2 pi sqrt(m / K), which twenty steps resolve (a phase error of less than one per cent).
+    Seen from the contact, a long wire is a damper: a force sends transverse waves in both directions,
+    F = 2 sqrt(T rho) v. With the contact spring K it forms a system with the relaxation time 2 sqrt(T rho) / K. Force
+    and position one step H apart act like a damping of -K H across that spring, so the ratio H K / (2 sqrt(T rho)) is
+    the share of the wire's damping that is lost; a quarter is allowed. On the other side the mass m of the collector
+    head oscillates on the spring with the period 2 pi sqrt(m / K), which twenty steps resolve (with a phase error
+    below one per cent).
 
     Parameters
     ----------
     definition : CatenaryDefinition
     head_mass : float
-        Mass next to the contact; without it only the wire counts [kg].
+        Mass next to the contact [kg]; by default only the wire counts.
     """
     K = tangent_stiffness(definition.contact)
     wire = definition.contact_wire
@@ -86,7 +85,7 @@ def longest_step(definition: CatenaryDefinition, head_mass: float = math.inf) ->
 
 
 def tangent_stiffness(contact: Contact) -> float:
-    """Return dF/dp of F = K p^n at a usual contact force [N/m].
+    """Return dF/dp of F = K p^n at a typical contact force [N/m].
 
     Examples
     --------
@@ -98,7 +97,7 @@ def tangent_stiffness(contact: Contact) -> float:
 
 
 def step_warning(definition: CatenaryDefinition, step: float, head_mass: float = math.inf) -> str:
-    """Say so if a step, of the coupling or inside a part, is longer than `longest_step` [s]."""
+    """Return a warning if a step of the coupling, or one inside a part, is longer than `longest_step` [s]."""
     longest = longest_step(definition, head_mass)
     if step <= longest:
         return ""
@@ -109,7 +108,7 @@ def step_warning(definition: CatenaryDefinition, step: float, head_mass: float =
 
 
 def slack_warning(droppers: Sequence[Named], force: FloatArray) -> str:
-    """Say which droppers are slack at rest.
+    """Return a warning that names the droppers that are slack at rest.
 
     Parameters
     ----------
@@ -128,7 +127,7 @@ def slack_warning(droppers: Sequence[Named], force: FloatArray) -> str:
 
 
 def slack_law_warning(definition: CatenaryDefinition) -> str:
-    """Say so if droppers pull well before they are taut: N = max(0, k e + alpha k e') with a large alpha."""
+    """Return a warning if droppers pull well before they are taut: N = max(0, k e + alpha k e') with a large alpha."""
     alpha = definition.damping.of("dropper").alpha
     hung = (("dropper", definition.dropper), ("hanger", definition.hanger))
     named = [f"[{name}]" for name, item in hung if item is not None and item.slack_law == "tension"]

@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray, Snapshot
-from models.catenary.line_model import CatenaryModel, CatenaryState, ContactResult, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.sparse_products import Product, inner
 from models.numerics.energy_ledger import Ledger
 

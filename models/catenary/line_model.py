@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
-from models.arrays import BoolArray, FloatArray, IntArray, Snapshot
+from models.arrays import BoolArray, FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.dropper_law import DropperLaw
 from models.catenary.contact_and_slack.local_problem import (
@@ -20,21 +20,14 @@ from models.catenary.contact_and_slack.local_problem import (
 )
 from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.compliance import Compliance
-from models.catenary.linear_motion.interval_modes import IntervalModes, slower_than
 from models.catenary.linear_motion.line_motion import LineMotion
-from models.catenary.linear_motion.mode_finding import interval_modes
+from models.catenary.linear_motion.mode_finding import line_modes
 from models.catenary.linear_motion.sparse_products import Product, inner
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_form
-from models.catenary.shape.line_matrices import (
-    compression_ratio,
-    dropper_rows,
-    dropper_stiffness,
-    pendulum_stiffness,
-    slack_delay,
-)
 from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.shape.wire_intervals import (
     Interval,
@@ -42,7 +35,6 @@ from models.catenary.shape.wire_intervals import (
     intervals,
     plan_angles,
     plan_rotation,
-    without_rounding,
 )
 from models.catenary.step.engine_choice import make_engine
 from models.catenary.step.step_engine import AppliedForce, StepEngine
@@ -53,81 +45,6 @@ from models.numerics.newmark import Newmark
 _KEPT_STEPS = 3
 #: No forces on the contact wires.
 _NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
-
-
-@dataclass
-class CatenaryState:
-    """State of a line, changed in place by a step.
-
-    Attributes
-    ----------
-    motion : LineMotion
-    slack : ndarray of int
-        Slack droppers.
-    compensation : ndarray
-        What each of them lacks to the force that it would carry if it could push [N].
-    element : ndarray of int, shape (n_pantographs, n_sections)
-        Element of the contact wire met last.
-    impact_velocity : ndarray, shape (n_pantographs, n_sections)
-        Velocity at impact of the closed contacts [m/s], 0 where open.
-    loaded : ndarray of int, shape (k, 2)
-        Section and element of every force on a contact wire.
-    load : ndarray, shape (k, 2)
-        Its place on the element, xi, and its value [N].
-    """
-
-    motion: LineMotion
-    slack: IntArray
-    compensation: FloatArray
-    element: IntArray
-    impact_velocity: FloatArray
-    loaded: IntArray
-    load: FloatArray
-
-    def snapshot(self) -> Snapshot:
-        """Return copies of all arrays."""
-        return {name: getattr(self, name).copy() for name in self._arrays()} | self.motion.snapshot()
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Take over the arrays of a snapshot."""
-        self.motion.restore(snapshot)
-        for name in self._arrays():
-            setattr(self, name, snapshot[name].copy())
-
-    def _arrays(self) -> Iterator[str]:
-        return (item.name for item in fields(self) if item.name != "motion")
-
-
-@dataclass
-class ContactResult:
-    """Contacts of one step.
-
-    Attributes
-    ----------
-    force : ndarray, shape (n_pantographs, n_sections)
-        Contact force [N].
-    point : ndarray, shape (n_pantographs, n_sections, 3)
-        Point of contact on the wire, NaN where strip and wire do not cross [m].
-    """
-
-    force: FloatArray
-    point: FloatArray
-
-
-@dataclass
-class StripMotion:
-    """Strips at the end of a step, were there no contact force within it.
-
-    Attributes
-    ----------
-    strip : ndarray, shape (n_pantographs, 2, 2, 3)
-        End A, B; position, velocity; x, y, z.
-    compliance : ndarray, shape (n_pantographs,)
-        How far a strip gives way within the step per force [m/N]; 0 for prescribed strips.
-    """
-
-    strip: FloatArray
-    compliance: FloatArray
 
 
 @dataclass(frozen=True)
@@ -161,11 +78,11 @@ class CatenaryModel:
         self.static: StaticState = find_form(definition, self.mesh)
         attached = attachments(self.mesh)
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
-        self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.points)
+        self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.shape.points)
         #: Coordinates of the line.
         with self._solvable("move in modes of its intervals"):
-            self.modes = self._modes([part for parts in by_wire for part in parts])
-        self.dropper_law = self._dropper_law()
+            self.modes = line_modes(self.static, [part for parts in by_wire for part in parts], self._angles)
+        self.dropper_law = DropperLaw(self.static, self.modes.attached)
         self.wires = tuple(self._wires(by_wire))
         self.uplift_places = self.modes.place[self.mesh.support_nodes * NODE_DOFS + 2]
         self._law = CONTACT_LAWS[definition.contact.law]
@@ -339,29 +256,6 @@ class CatenaryModel:
         modal[1], attached[1] = modes.coordinates(nodal)
         momentum[...] = modal[1] + modes.coupling @ (modes.turn @ attached[1])
 
-    def _modes(self, parts: Sequence[Interval]) -> IntervalModes:
-        """Return the line's coordinates and matrices, droppers included."""
-        static, Q = self.static, plan_rotation(self._angles)
-        stretch = dropper_rows(self.mesh, static.positions)
-        droppers = stretch.T @ sp.diags(dropper_stiffness(self.definition, self.mesh, static.positions)) @ stretch
-        damping = self.definition.damping
-        C = static.matrices.C + damping.of("dropper").alpha * droppers
-        stiffness = static.matrices.K + droppers
-        if self.definition.dynamics.geometric_stiffness:
-            stiffness = stiffness + self._pendulums()  # not in C: alpha times it would be a damping that nothing has
-        K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (stiffness, static.matrices.M, C))
-        K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
-        rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
-        modes = interval_modes((K, M, C), parts, rates, self._angles, self.mesh.fixed.ravel(), self.mesh.owner)
-        highest = self.definition.dynamics.highest_frequency
-        return slower_than(modes, highest) if highest else modes
-
-    def _pendulums(self) -> sp.csc_matrix:
-        """Return what the static tension of droppers and steady arms holds them back by; none where they are slack."""
-        mesh, static = self.mesh, self.static
-        tension = np.concatenate([static.dropper_force, static.arm_force])
-        return pendulum_stiffness(np.vstack([mesh.droppers, mesh.arms]), np.maximum(tension, 0.0), static.positions)
-
     @contextmanager
     def _solvable(self, doing: str) -> Iterator[None]:
         """Explain matrices that are not positive definite: parts of the line differ too much, or it buckles."""
@@ -371,19 +265,6 @@ class CatenaryModel:
             raise EquilibriumError(
                 f"line '{self.definition.name}' cannot {doing}: {error}; check masses, tensions and stiffnesses"
             ) from error
-
-    def _dropper_law(self) -> DropperLaw:
-        definition, mesh, static = self.definition, self.mesh, self.static
-        # The attachments' displacements are in global axes.
-        return DropperLaw(
-            B=dropper_rows(mesh, static.positions)[:, self.modes.attached].tocsr(),
-            stiffness=dropper_stiffness(definition, mesh, static.positions),
-            alpha=definition.damping.of("dropper").alpha,
-            unilateral=1.0 - compression_ratio(definition, mesh),
-            slack_delay=slack_delay(definition, mesh),
-            elastic_force=static.elastic_force,
-            force=static.dropper_force,
-        )
 
     def _wires(self, by_wire: Sequence[Sequence[Interval]]) -> Iterator[ContactWire]:
         spans = iter(self.modes.spans)

@@ -9,9 +9,11 @@ import numpy as np
 from models.arrays import FloatArray, IntArray, Snapshot
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_energy import LineBalance
-from models.catenary.line_model import CatenaryModel, CatenaryState, ContactResult, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
-from models.catenary.statics.elasticity import contact_wire_wave_speed, elasticity
+from models.catenary.statics.elasticity import elasticity
+from models.catenary.statics.wire_waves import contact_wire_wave_speed
 from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
 from models.contact_law import application_point
 from models.numerics.energy_ledger import NO_BALANCE

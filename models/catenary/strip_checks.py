@@ -1,4 +1,4 @@
-"""Strips that a line cannot be meant for: they would begin inside the wire, or miss it where it is staggered."""
+"""Reject strips that cannot be meant for a line: they start inside the wire, or miss it where it is staggered."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 from models.arrays import BoolArray, FloatArray
 from models.definition_files.parameter import ParameterError
 
-#: Contact force at the first instant that is warned of, and that no line is meant for [N]: EN 50367 allows 400 N
-#: at most while running, and a strip that is pushed into the wire on purpose is so by a few centimetres.
+#: Contact force at the first instant above which a warning is given, and above which the strip is rejected [N]:
+#: EN 50367 allows at most 400 N in service, and a strip pushed into the wire on purpose is there by a few centimetres.
 LARGEST_USUAL: Final = 500.0
 LARGEST_AT_REST: Final = 2000.0
-#: A strip farther below the wire than this is no strip at work (an unconnected port, a lowered pantograph) [m].
+#: A strip farther below the wire than this is not in service (an unconnected port, a lowered pantograph) [m].
 _REACH: Final = 3.0
 
 
 class WireAtRest(NamedTuple):
-    """Static shape of one contact wire, and between which places it is at its working height [m].
+    """Static shape of one contact wire, and the stretch over which it is at its working height [m].
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class WireAtRest(NamedTuple):
 
 
 def check_strips(wires: Sequence[WireAtRest], strips: FloatArray, force: FloatArray) -> None:
-    """Refuse strips that the line cannot be meant for.
+    """Reject strips that cannot be meant for the line.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def check_strips(wires: Sequence[WireAtRest], strips: FloatArray, force: FloatAr
     Raises
     ------
     ParameterError
-        For the first of these strips, with what to do.
+        For the first such strip, with a remedy.
     """
     for number, (strip, found) in enumerate(zip(strips, force.tolist(), strict=True), 1):
         text = _inside_wire(wires, strip, found, LARGEST_AT_REST) or _beside_wire(wires, strip)
@@ -55,7 +55,7 @@ def check_strips(wires: Sequence[WireAtRest], strips: FloatArray, force: FloatAr
 
 
 def start_warning(wires: Sequence[WireAtRest], strips: FloatArray, force: FloatArray) -> str:
-    """Return which strip begins inside a wire, empty if none does; the arguments are those of `check_strips`."""
+    """Return a sentence about the first strip that starts inside a wire, empty if none does; see `check_strips`."""
     found = zip(strips, force.tolist(), strict=True)
     texts = [_inside_wire(wires, strip, value, LARGEST_USUAL) for strip, value in found]
     return next((f"the strip of pantograph {i} {text}" for i, text in enumerate(texts, 1) if text), "")
@@ -91,7 +91,7 @@ def _beside_wire(wires: Sequence[WireAtRest], strip: FloatArray) -> str:
 
 
 def _missed(wire: WireAtRest, x: float, right: float, left: float) -> BoolArray:
-    """Return which points of a wire at work ahead of ``x`` lie beside the strip, shape (n,)."""
+    """Return which points of a wire at its working height ahead of ``x`` lie beside the strip, shape (n,)."""
     along, across = wire.points[:, 0], wire.points[:, 1]
     ahead = (along >= max(x, wire.working[0])) & (along <= wire.working[1])
     beside: BoolArray = ahead & ((across < right) | (across > left))
@@ -99,7 +99,7 @@ def _missed(wire: WireAtRest, x: float, right: float, left: float) -> BoolArray:
 
 
 def _is_met(wires: Sequence[WireAtRest], point: FloatArray, right: float, left: float) -> bool:
-    """Whether the strip meets another wire where it misses one, as in an overlap."""
+    """Return whether the strip meets another wire where it misses one, as in an overlap."""
     x = float(point[0])
     return any(right <= float(np.interp(x, *w.points[:, :2].T)) <= left for w in wires if _spans(w, x))
 

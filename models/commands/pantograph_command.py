@@ -20,7 +20,7 @@ from models.library.catalogue import load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
-from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
 
 #: Significant digits of the tables: all that a double has.
 _DIGITS: Final = 17
@@ -28,7 +28,7 @@ _DIGITS: Final = 17
 
 @dataclass(frozen=True)
 class Characteristics:
-    """What the command tells of a pantograph.
+    """What the command reports on a pantograph.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Char
 
 def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -> Characteristics:
     rig = Rig(definition)
-    reference = definition.operation.reference_height
+    reference = definition.reference_height
     statics = rig.statics(_heights(arguments, reference), arguments.force)
     height = arguments.height if arguments.height is not None else reference
     dynamics = rig.dynamics(height, _frequencies(), arguments.force)
@@ -162,7 +162,7 @@ def friction_warning(
     analysed : callable
         Gives the dynamics of the definition without it.
     """
-    rubbing = [f for f in definition.forces if f.kind == "joint_friction" and f.friction > 0.0]
+    rubbing = [f for f in definition.forces if isinstance(f, JointFriction) and f.level > 0.0]
     if not rubbing:
         return ""
     names = {f"force.{f.name}.{key}" for f in rubbing for key in ("force", "moment")}

@@ -1,4 +1,8 @@
-"""Files that the verbs write: each replaces the old one as a whole or leaves it, and every error names its file."""
+"""Files that the verbs write: each replaces the old one as a whole or leaves it, and every error names its file.
+
+`master.recording.safe_files` writes a run's files by the same rules; the packages do not import each other's tools, so
+the few lines stand in both.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ from models.definition_files.parameter import ParameterError
 _PART: Final = ".part"
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, data: bytes) -> None:
     """Write a file in one go: readers see the old one or the new one, never half of it.
 
     Raises
@@ -30,7 +34,7 @@ def write_whole(path: Path, data: bytes) -> None:
     """
     # A device, such as /dev/null, would be replaced by a file for all users of the computer.
     if path.exists() and not (path.is_file() or path.is_dir()):
-        raise OSError(errno.EEXIST, "this is no file, and is left alone; choose another", str(path))
+        raise OSError(errno.EEXIST, "this is not a file and is left alone; choose another", str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART}")  # two commands do not mix
     try:
         with temporary.open("wb") as file:
@@ -46,7 +50,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one go."""
-    write_whole(path, text.encode())
+    write_atomically(path, text.encode())
 
 
 def write_csv(path: Path, names: Sequence[str], columns: Sequence[FloatArray], digits: int = 9) -> None:
@@ -70,4 +74,4 @@ def write_figure(path: Path, figure: Figure, dpi: int) -> None:
         raise ParameterError(f"{path}: a figure must be named .png or .svg, or another of {', '.join(sorted(known))}")
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, dpi=dpi)
-    write_whole(path, buffer.getvalue())
+    write_atomically(path, buffer.getvalue())

@@ -1,8 +1,11 @@
-"""Ctrl-C that ends a command also while native code runs and does not return.
+"""Ctrl-C that also ends a command whose native code does not return.
 
-Python heeds a signal between two of its own instructions. A factorisation that spins, under a memory limit say, never
+Python acts on a signal between two of its instructions. A factorisation that spins, under a memory limit say, never
 comes back to one. The handler in C, however, writes the signal's number into a pipe at once (`signal.set_wakeup_fd`); a
-small process at its other end gives the command some time, and ends it then.
+small process at its other end gives the command some time, and then ends it.
+
+The master's commands have `master.safety.supervision` for this. It stands twice because neither package may import the
+other, and the two differ: the master works in the child, whose results the parent marks; here the child only watches.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ _SENTENCE: Final = b"error: interrupted in a computation that does not return; t
 def watch_interruptions(grace: float = GRACE) -> None:
     """Start the process that ends this one ``grace`` seconds after an interruption, unless it has ended by then.
 
-    Nothing is done where processes cannot be forked: there a second Ctrl-C is no better than the first.
+    It does nothing where processes cannot be forked: there a second Ctrl-C does no more than the first.
     """
     if not hasattr(os, "fork"):
         return

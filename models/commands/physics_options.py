@@ -14,9 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
+from models.definition_files.message_text import printable
 from models.definition_files.parameter import Definition, ParameterError
 from models.definition_files.si_units import to_si
-from models.definition_files.toml_reader import LARGEST, SMALLEST, printable
+from models.definition_files.toml_reader import LARGEST, SMALLEST
 
 _PARTS = ("line", "pantograph")
 #: A number, as Python writes it, and a unit or none.
@@ -100,7 +101,7 @@ def _value(setting: Setting, wanted: str | None) -> float:
     if match is None:
         raise ParameterError(f"{what}: '{setting.value}' is not a number, or a number with its unit ('12 kN')")
     number, unit = float(match[1]), match[2]
-    if not unit or wanted is None:  # that there is no such parameter is told by the definition
+    if not unit or wanted is None:  # the definition reports an unknown parameter
         return number
     try:
         return to_si(number, unit, wanted)
@@ -109,7 +110,7 @@ def _value(setting: Setting, wanted: str | None) -> float:
 
 
 def finite(text: str) -> float:
-    """Read a finite number from the command line; argparse tells what is wrong with another."""
+    """Read a finite number from the command line; argparse reports what is wrong with another."""
     try:
         value = float(text)
     except ValueError:
@@ -139,7 +140,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
 
 
 def warn(texts: Iterable[str]) -> None:
-    """Tell what deserves a second look; the command goes on."""
+    """Print what deserves a second look; the command continues."""
     for text in filter(None, texts):
         print(f"warning: {printable(text)}", file=sys.stderr)
 

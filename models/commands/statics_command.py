@@ -14,6 +14,7 @@ from models.catenary.definition.line_definition import Span
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics import elasticity as statics
+from models.catenary.statics import rest_profile, wire_waves
 from models.commands import statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
@@ -23,22 +24,22 @@ from models.library.catalogue import load_line
 
 @dataclass(frozen=True)
 class LineStatics:
-    """What the command tells of a line: a section of it, and one span in detail."""
+    """What the command reports on a line: a section of it, and one span in detail."""
 
     model: CatenaryModel
     section: int
     number: int
     span: Span
-    profiles: tuple[statics.Profile, ...]
-    droppers: statics.Droppers
-    arms: statics.ArmLoads
+    profiles: tuple[rest_profile.Profile, ...]
+    droppers: rest_profile.Droppers
+    arms: rest_profile.ArmLoads
     elasticity: statics.Elasticity
-    waves: statics.Waves
+    waves: wire_waves.Waves
 
     @property
-    def span_droppers(self) -> statics.Droppers:
+    def span_droppers(self) -> rest_profile.Droppers:
         """Return the droppers (and hangers) of the span in detail."""
-        return statics.droppers(self.model, self.span.start, self.span.end, self.section)
+        return rest_profile.droppers(self.model, self.span.start, self.span.end, self.section)
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -98,11 +99,11 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
         section=section,
         number=number,
         span=span,
-        profiles=statics.profiles(model, section),
-        droppers=statics.droppers(model, section=section),
-        arms=statics.arm_loads(model, section),
+        profiles=rest_profile.profiles(model, section),
+        droppers=rest_profile.droppers(model, section=section),
+        arms=rest_profile.arm_loads(model, section),
         elasticity=statics.elasticity(model, statics.positions_in_span(span), arguments.force, section),
-        waves=statics.waves(definition, arguments.speed / 3.6, span.length),
+        waves=wire_waves.waves(definition, arguments.speed / 3.6, span.length),
     )
 
 
@@ -149,7 +150,7 @@ _DROPPER_COLUMNS = ("from the support [m]", "length [m]", "tension [N]")
 
 def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
     contact = next(p for p in result.profiles if p.component == "contact_wire")
-    z = contact.z[statics.within(contact, result.span)]
+    z = contact.z[rest_profile.within(contact, result.span)]
     rows = [("contact wire, highest and lowest [m]", f"{z.max():.4f}, {z.min():.4f}")]
     d = result.span_droppers
     rows.append(("dropper lengths, longest and shortest [m]", f"{d.length.max():.4f}, {d.length.min():.4f}"))
@@ -169,13 +170,13 @@ def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
     ]
 
 
-def _dropper_rows(droppers: statics.Droppers) -> Iterable[Sequence[str]]:
+def _dropper_rows(droppers: rest_profile.Droppers) -> Iterable[Sequence[str]]:
     for x, length, force, hanger in zip(droppers.x, droppers.length, droppers.force, droppers.is_hanger, strict=True):
         yield f"{x:.2f}{' (hanger)' if hanger else ''}", f"{length:.4f}", f"{force:.1f}"
 
 
-def _write_profiles(folder: Path, profiles: Sequence[statics.Profile]) -> None:
-    """Write every kind of wire to a file of its own, stitch wires one after the other."""
+def _write_profiles(folder: Path, profiles: Sequence[rest_profile.Profile]) -> None:
+    """Write a file for every kind of wire, stitch wires one after the other."""
     for component in dict.fromkeys(p.component for p in profiles):
         same = [p for p in profiles if p.component == component]
         columns = [np.concatenate(c) for c in zip(*((p.x, p.y, p.z) for p in same), strict=True)]

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from models.catenary.definition.line_definition import Span
-from models.catenary.statics.elasticity import Droppers, Elasticity, Profile, within
+from models.catenary.statics.elasticity import Elasticity
+from models.catenary.statics.rest_profile import Droppers, Profile, within
 
 _COLOURS: Final = {
     "contact_wire": "#c2571a",

@@ -1,6 +1,6 @@
 """Monolithic coupling of a line with lumped pantographs: one system, one step, no communication.
 
-The yardstick of the co-simulation: the same equations and the same time integration, but contact force, line and
+The reference for the co-simulation: the same equations and the same time integration, but contact force, line and
 pantographs are solved together at the end of every step.
 """
 
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import BoolArray, FloatArray
-from models.catenary.line_model import CatenaryModel, ContactResult, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import ContactResult, StripMotion
 from models.contact_law import application_point
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
@@ -20,7 +21,7 @@ from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 
 @dataclass(frozen=True)
 class CoupledRecord:
-    """What a coupled run leaves: one row per time, the start included.
+    """The record of a coupled run: one row per time, the start included.
 
     Attributes
     ----------

@@ -9,8 +9,8 @@ report prints it. A definition declares what it consists of, numbers and the tab
         mesh: Mesh = part(Mesh, default=Mesh())                 # [mesh]
         bodies: tuple[Body, ...] = named("body", Body)          # [body.NAME]
 
-and `read` fills it, `parameters` lists its tunable numbers, `with_values` changes them. What depends on more than one
-field, a class says in a method ``problems()``, which yields pairs of a key (may be empty) and a text.
+and `read` fills it, `parameters` lists its tunable numbers, `with_values` changes them. Conditions on more than one
+field go into a method ``problems()``, which yields pairs of a key (possibly empty) and a text.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeVar, runtime_checkable
 
@@ -30,6 +30,8 @@ _META = "openpanto"
 #: Names of elements: parts of dotted parameter names.
 _NAME: Final = re.compile(r"[\w-]+")
 XYZ: Final = ("x", "y", "z")
+#: Kind of an element -> its class, or what finds that in the element's table.
+Kinds = Mapping[str, type[Any] | Callable[[Table], type[Any]]]
 T = TypeVar("T")
 
 
@@ -38,11 +40,11 @@ class Checked(Protocol):
     """A dataclass with values that must fit together."""
 
     def problems(self) -> Iterable[tuple[str, str]]:
-        """Yield a key and what is wrong with it, for every problem."""
+        """Yield the key and the text of every problem."""
 
 
 class _Spec(Protocol):
-    """What a field knows of itself."""
+    """What a field declares."""
 
     def read(self, table: Table, name: str, default: Any) -> Any:
         """Read the field from a table."""
@@ -50,7 +52,7 @@ class _Spec(Protocol):
 
 @dataclass(frozen=True)
 class _Number:
-    """A number, or several with a label each."""
+    """A number, or several numbers with labels."""
 
     unit: str
     description: str
@@ -106,17 +108,20 @@ class _Direction:
 
 @dataclass(frozen=True)
 class _Text:
-    """A text, one of the choices if there are any."""
+    """A text, if there are choices one of them."""
 
     choices: Iterable[str] | None
+    filled: bool
 
     def read(self, table: Table, name: str, default: Any) -> Any:
+        if self.filled and table.data.get(name) == "":
+            table.problem(name, "is empty")
         return table.text(name, default=None if default is dataclasses.MISSING else default, choices=self.choices)
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A dataclass in a table of its own."""
+    """A dataclass in a sub-table."""
 
     cls: type[Any]
 
@@ -129,10 +134,10 @@ class _Part:
 
 @dataclass(frozen=True)
 class _Named:
-    """Dataclasses with a name, in tables ``[key.NAME]``; their class may depend on the text ``kind`` in each."""
+    """Named dataclasses in tables ``[key.NAME]``, whose class may depend on the text ``kind`` in the table."""
 
     key: str
-    kinds: type[Any] | Mapping[str, type[Any]]
+    kinds: type[Any] | Kinds
 
     def read(self, table: Table, name: str, default: Any) -> Any:
         every = table.table(self.key)
@@ -150,7 +155,8 @@ class _Named:
             return read(self.kinds, table, name=name)
         kind = table.text("kind", choices=self.kinds)
         if kind in self.kinds:
-            return read(self.kinds[kind], table, name=name)
+            cls = self.kinds[kind]
+            return read(cls if isinstance(cls, type) else cls(table), table, name=name)
         table.accept_all()  # what the other keys mean depends on the kind
         return None
 
@@ -167,7 +173,7 @@ def quantity(
 ) -> Any:
     """Declare a physical value; ``default=None`` makes it optional without a value.
 
-    ``{name}`` in a description stands for the name of the element that it belongs to.
+    ``{name}`` in the description stands for the name of the element that has the field.
     """
     return _field(_Number(unit, description, minimum, maximum, positive, tunable=tunable), default)
 
@@ -182,12 +188,12 @@ def vector(
     maximum: float = math.inf,
     tunable: bool = True,
 ) -> Any:
-    """Declare physical values written as one list, a tuple; the parameters are NAME.LABEL."""
+    """Declare physical values written as one list; they become a tuple, and parameters NAME.LABEL."""
     return _field(_Number(unit, description, minimum, maximum, tunable=tunable, labels=labels), default)
 
 
 def direction(*, default: Any = dataclasses.MISSING) -> Any:
-    """Declare a direction in space, written with any length and kept as a unit vector."""
+    """Declare a direction in space, written with any length and stored as a unit vector."""
     return _field(_Direction(), default)
 
 
@@ -197,22 +203,22 @@ def count(description: str, *, default: Any = dataclasses.MISSING, minimum: int 
 
 
 def monitoring() -> Any:
-    """Declare the number of a definition that says whether the balance is kept."""
+    """Declare the number that switches the energy balance on."""
     return count("whether the energy balance is kept, for energy.* and contact.work: 0 no, 1 yes", default=0, maximum=1)
 
 
-def text(*, default: Any = dataclasses.MISSING, choices: Iterable[str] | None = None) -> Any:
-    """Declare a text."""
-    return _field(_Text(choices), default)
+def text(*, default: Any = dataclasses.MISSING, choices: Iterable[str] | None = None, filled: bool = False) -> Any:
+    """Declare a text; where it is ``filled``, an empty one is a mistake."""
+    return _field(_Text(choices, filled), default)
 
 
 def part(cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:
-    """Declare a dataclass that has a table of its own; ``default=None`` makes it optional."""
+    """Declare a dataclass in a sub-table; ``default=None`` makes it optional."""
     return _field(_Part(cls), default)
 
 
-def named(key: str, kinds: type[Any] | Mapping[str, type[Any]]) -> Any:
-    """Declare the tables ``[key.NAME]``: a tuple of dataclasses with a ``name``, of the class that ``kind`` says."""
+def named(key: str, kinds: type[Any] | Kinds) -> Any:
+    """Declare tables ``[key.NAME]``: a tuple of dataclasses with a ``name``, of the class given by ``kind``."""
     return _field(_Named(key, kinds), dataclasses.MISSING)
 
 
@@ -221,7 +227,7 @@ def _field(spec: _Spec, default: Any) -> Any:
 
 
 def read(cls: type[T], table: Table, **given: Any) -> T:
-    """Fill a dataclass from a table; fields that declare nothing come from ``given``."""
+    """Read a dataclass from a table; fields without a declaration come from ``given``."""
     values = dict(given)
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         spec: _Spec | None = field.metadata.get(_META)
@@ -289,7 +295,7 @@ def _inside(field: dataclasses.Field[Any], value: Any) -> Iterator[tuple[str, An
 
 
 def _problems(obj: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield what does not fit together in a dataclass and those inside it, with dotted keys."""
+    """Yield the problems of a dataclass and of those inside it, with dotted keys."""
     if isinstance(obj, Checked):
         yield from ((_joined(prefix, key), problem) for key, problem in obj.problems())
     for field in dataclasses.fields(obj):

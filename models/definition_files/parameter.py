@@ -9,7 +9,7 @@ from typing import Protocol
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of a definition that a user may change.
+    """A number in a definition that a user may change.
 
     Attributes
     ----------
@@ -22,9 +22,9 @@ class Parameter:
     description : str
         What it is, in one line.
     minimum, maximum : float or None
-        Allowed range, if there is one.
+        Allowed range, if any.
     source : str
-        Where the start value comes from; begins with ``choice`` where the source leaves it open.
+        Source of the start value; begins with ``choice`` where the data leave it open.
     is_integer : bool
         Whether only whole numbers make sense.
     """
@@ -40,7 +40,7 @@ class Parameter:
 
 
 class ParameterError(ValueError):
-    """A parameter value that the model cannot take; says name, value and allowed range."""
+    """A parameter value that the model cannot accept; the message gives name, value and allowed range."""
 
 
 class Definition(Protocol):

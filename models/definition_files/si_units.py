@@ -1,4 +1,4 @@
-"""Units accepted in definition files and their conversion to SI, done once, at the edge."""
+"""Units accepted in definition files, and their conversion to SI, made once, at the edge."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def to_si(value: float, unit: str, wanted: str) -> float:
     Raises
     ------
     ValueError
-        If ``unit`` is unknown or measures something else than ``wanted``.
+        If ``unit`` is unknown or does not measure the same quantity as ``wanted``.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def to_si(value: float, unit: str, wanted: str) -> float:
 
 
 def shown(value: float, unit: str) -> str:
-    """Return a value with its unit as a message says it; a plain number has none.
+    """Return a value with its unit as shown in a message; a plain number has none.
 
     Examples
     --------

@@ -1,84 +1,50 @@
-"""Reading definition files: values with unit and source, every mistake reported at once.
+"""Read definition files: values with unit and source, with every mistake reported at once.
 
-A definition (a line, a pantograph, a mechanism) is a TOML file in which a physical value is written
-with its unit and its source::
+A definition (of a line, a pantograph, a mechanism) is a TOML file in which a physical value has its unit and its
+source::
 
     tension = [20, "kN", "Table 5.2"]
     encumbrance = [1.2, "m", "choice: gives the printed first dropper"]
 
-Sources that begin with ``choice`` mark what the data leaves open.
+A source that begins with ``choice`` marks a value that the data leave open.
 """
 
 from __future__ import annotations
 
 import math
-import reprlib
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from models.definition_files.message_text import one_line, shown_value
 from models.definition_files.si_units import shown, to_si
 
-#: Longest message told in full [characters]: a value may be megabytes of nested lists; and most of them told.
-_LONGEST: Final = 400
+#: Largest number of problems listed.
 _MOST: Final = 100
-#: Deepest nesting of tables and lists; a definition needs five levels.
+#: Deepest allowed nesting of tables and lists; a definition needs five levels.
 _DEEPEST: Final = 20
-#: Magnitudes in SI beyond which no quantity of a line or pantograph lies, and squares and quotients stay finite.
+#: Limits of magnitude in SI: no quantity of a line or pantograph lies beyond, and squares and quotients stay finite.
 LARGEST: Final = 1e15
 SMALLEST: Final = 1e-15
 
 
-class _Shown(reprlib.Repr):
-    """Values as they are told: short, whatever is in them."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxlist = self.maxdict = self.maxlevel = 4
-        self.maxstring = self.maxother = self.maxlong = 80
-
-    def repr_int(self, x: int, level: int) -> str:
-        """Return a number; Python refuses to write out one of thousands of digits."""
-        return f"(a whole number of {x.bit_length()} bits)" if x.bit_length() > 1000 else super().repr_int(x, level)
-
-
-_shown = _Shown().repr
-
-
 def beyond_all(value: float) -> str:
-    """Return why a value in SI cannot be that of anything here, empty if it can."""
+    """Return why a value in SI cannot belong to anything here, empty if it can."""
     if not abs(value) <= LARGEST:
         return f"is not finite, or larger than anything here can be ({LARGEST:g})"
     return ""
 
 
 def in_its_unit(unit: str) -> str:
-    """Return what to do about a value out of range: most such values are in another unit."""
+    """Return advice on a value out of range: most such values are in the wrong unit."""
     return "" if unit == "1" else ": check its size and its unit"
-
-
-def one_line(text: str) -> str:
-    """Return text on one line, without control characters, its middle left out if it is very long."""
-    if len(text) > _LONGEST:
-        half = _LONGEST // 2
-        text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
-    return "".join(map(_printed, text))
-
-
-def printable(text: str) -> str:
-    """Return text whose characters all print, lines kept: for what others have written, on its way to a terminal."""
-    return "".join(c if c == "\n" else _printed(c) for c in text)
-
-
-def _printed(c: str) -> str:
-    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake in a definition: where it is, what is wrong, what to do."""
+    """A mistake in a definition: where it is, what is wrong, what to do."""
 
     file: str
     key: str
@@ -90,7 +56,7 @@ class Problem:
 
 
 class DefinitionError(ValueError):
-    """A definition that cannot be used; lists every problem found, one per line."""
+    """A definition that cannot be used; the message lists every problem, one per line."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -102,7 +68,7 @@ class DefinitionError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A value as written in a definition, with where it comes from.
+    """A value as written in a definition, with its source.
 
     Attributes
     ----------
@@ -120,7 +86,7 @@ class Quantity:
 
     @property
     def is_choice(self) -> bool:
-        """Whether the value was chosen because no source states it."""
+        """Return whether the value was chosen because no source states it."""
         return self.source.startswith("choice")
 
 
@@ -134,8 +100,8 @@ class _Log:
 class Table:
     """One table of a definition file, read key by key.
 
-    Reading collects problems instead of stopping; ``finish`` on the root reports unknown keys and raises
-    them all. A value that could not be read comes back as its ``default`` (or NaN, empty), so that reading goes on.
+    Reading collects problems instead of stopping; ``finish`` on the root adds unknown keys and raises them all. A value
+    that cannot be read is returned as its ``default`` (or as NaN, or empty), so that reading continues.
     """
 
     def __init__(self, data: dict[str, Any], log: _Log, path: str = "") -> None:
@@ -176,17 +142,17 @@ class Table:
 
     @property
     def provenance(self) -> dict[str, Quantity]:
-        """Every quantity read so far, by its dotted key, as written."""
+        """Return every quantity read so far as written, by its dotted key."""
         return self._log.provenance
 
     @property
     def data(self) -> dict[str, Any]:
-        """The mapping that the table was made from."""
+        """Return the mapping that the table was made from."""
         return self._data
 
     @property
     def file(self) -> str:
-        """The file's name, for messages."""
+        """Return the name of the file, for messages."""
         return self._log.file
 
     def key(self, name: str) -> str:
@@ -194,7 +160,7 @@ class Table:
         return f"{self._path}.{name}" if self._path else name
 
     def has(self, name: str) -> bool:
-        """Whether the table has the key."""
+        """Return whether the table has a key."""
         return name in self._data
 
     def names(self) -> tuple[str, ...]:
@@ -202,7 +168,7 @@ class Table:
         return tuple(self._data)
 
     def accept_all(self) -> None:
-        """Take every key as known: for a table whose keys mean nothing until a mistake in it is mended."""
+        """Accept every key, in a table whose keys mean nothing until a mistake in it is corrected."""
         self._known.update(self._data)
 
     def problem(self, name: str, text: str) -> None:
@@ -274,10 +240,10 @@ class Table:
                 return fallback
             value = int(numbers[0]) if numbers[0].is_integer() else numbers[0]
         if isinstance(value, bool) or not isinstance(value, int):
-            self.problem(name, f"{_shown(value)} is not a whole number")
+            self.problem(name, f"{shown_value(value)} is not a whole number")
             return fallback
         if not minimum <= value <= maximum:
-            self.problem(name, f"{_shown(value)} is outside {minimum} ... {maximum}")
+            self.problem(name, f"{shown_value(value)} is outside {minimum} ... {maximum}")
             return fallback
         return value
 
@@ -287,7 +253,7 @@ class Table:
         if entry is None:
             return default or ""
         if not isinstance(entry, str):
-            self.problem(name, f"{_shown(entry)} is not a text in quotation marks")
+            self.problem(name, f"{shown_value(entry)} is not a text in quotation marks")
             return default or ""
         allowed = list(choices) if choices is not None else None
         if allowed is not None and entry not in allowed:
@@ -300,7 +266,7 @@ class Table:
         if entry is None:
             return bool(default)
         if not isinstance(entry, bool):
-            self.problem(name, f"{_shown(entry)} is neither true nor false")
+            self.problem(name, f"{shown_value(entry)} is neither true nor false")
             return bool(default)
         return entry
 
@@ -315,12 +281,12 @@ class Table:
         return self._child(entry, self.key(name))
 
     def required_table(self, name: str) -> Table:
-        """Return the sub-table ``[name]``; its absence is a problem and gives an empty table."""
+        """Return the sub-table ``[name]``; report it and return an empty table if it is absent."""
         table = self.table(name)
         if table is None:
             if name not in self._data:
                 self.problem(name, f"table [{self.key(name)}] is missing")
-            table = Table({}, _Log(self._log.file), self.key(name))  # its own log: one message is enough
+            table = Table({}, _Log(self._log.file), self.key(name))  # with a separate log, as one message is enough
         return table
 
     def tables(self, name: str) -> list[Table]:
@@ -334,7 +300,7 @@ class Table:
         return [self._child(e, f"{self.key(name)}[{i}]") for i, e in enumerate(entry, 1)]
 
     def finish(self) -> None:
-        """Report keys that nothing read, and raise if there was any problem.
+        """Report keys that were not read, and raise if there was any problem.
 
         Raises
         ------
@@ -343,7 +309,7 @@ class Table:
         """
         self._report_unknown()
         if self._log.problems:
-            # A rule that is read for every span reports its mistakes for every span.
+            # A rule is read for every span, and reports its mistakes for every span.
             raise DefinitionError(tuple(dict.fromkeys(self._log.problems)))
 
     def _child(self, data: dict[str, Any], path: str) -> Table:
@@ -364,14 +330,14 @@ class Table:
     ) -> tuple[float, ...] | None:
         form = "[[v1, v2, ...]" if many else "[value"
         if not (isinstance(entry, list) and len(entry) == 3 and all(isinstance(e, str) for e in entry[1:])):
-            self.problem(name, f'{_shown(entry)} must be written {form}, "unit", "source"]')
+            self.problem(name, f'{shown_value(entry)} must be written {form}, "unit", "source"]')
             return None
         raw, written_unit, source = entry
         if not source.strip():
             self.problem(name, "names no source; where none states the value, write 'choice: why'")
         values = raw if many and isinstance(raw, list) else [raw]
         if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
-            self.problem(name, f"{_shown(raw)} is not a number")
+            self.problem(name, f"{shown_value(raw)} is not a number")
             return None
         if self._has_absurd(name, values):
             return None
@@ -392,7 +358,7 @@ class Table:
     def _has_absurd(self, name: str, values: Sequence[float]) -> bool:
         for value in values:
             if text := beyond_all(value):
-                self.problem(name, f"{_shown(value)} {text}")
+                self.problem(name, f"{shown_value(value)} {text}")
                 return True
         return False
 
@@ -420,7 +386,7 @@ def _too_deep(file: str) -> DefinitionError:
 
 
 def _is_deep(data: Any) -> bool:
-    """Whether values are nested deeper than allowed; found without recursion."""
+    """Return whether values are nested deeper than allowed, found without recursion."""
     level = [data]
     for _ in range(_DEEPEST):
         inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, (dict, list))]

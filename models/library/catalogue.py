@@ -9,7 +9,7 @@ from models.catenary.definition.line_reading import load as load_line_file
 from models.definition_files.toml_reader import Table
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
-from models.pantograph.multibody.mechanism_definition import parse as read_multibody
+from models.pantograph.multibody.mechanism_reading import read_mechanism
 
 _HERE = Path(__file__).parent
 
@@ -58,7 +58,7 @@ def load_line(name: str) -> CatenaryDefinition:
 def load_pantograph(name: str) -> LumpedDefinition | MechanismDefinition:
     """Read a pantograph of any kind by its name or file; raises ``UnknownNameError`` or ``DefinitionError``."""
     table = Table.load(pantograph_path(name))
-    return read_multibody(table) if table.data.get("type") == "multibody" else read_lumped(table)
+    return read_mechanism(table) if table.data.get("type") == "multibody" else read_lumped(table)
 
 
 def load_lumped(name: str) -> LumpedDefinition:

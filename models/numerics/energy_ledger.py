@@ -1,11 +1,11 @@
-"""The energy balance of a part: what it was given must be what it holds and has lost.
+"""The energy balance of a part: the energy supplied must equal the energy stored and dissipated.
 
-The trapezoidal rule keeps this balance exactly: over a step of length h, with d what the displacements change by,
+The trapezoidal rule keeps this balance exactly: over a step of length h, with the change of displacement d,
 
     E_n+1 - E_n = d . (f_n + f_n+1) / 2 - d . C d / h
 
-whatever the forces f are. So the drift, what the balance is off by, is rounding; more of it means that something
-other than a force has changed the state.
+whatever the forces f are. So the drift, the error of the balance, is rounding; a larger one means that something other
+than a force has changed the state.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ import numpy as np
 
 from models.arrays import FloatArray, Snapshot
 
-#: Names of the values of a balance, and what they are.
+#: Names of the values of a balance, and their meaning.
 BALANCE = (
     ("stored", "kinetic and elastic energy, from the static state"),
     ("dissipated", "energy lost in dampers"),
     ("work", "work of all outer forces"),
     ("drift", "stored and dissipated energy minus work: what the balance is off by"),
 )
-#: The values where no balance is kept: numbers, as hosts and comparisons of states have their troubles with NaN.
+#: The values where no balance is kept: zeros, as hosts and comparisons of states do not cope with NaN.
 NO_BALANCE = np.zeros(len(BALANCE))
 
 
 @dataclass
 class Ledger:
-    """Sums over the steps made so far.
+    """Sums over all steps so far.
 
     Attributes
     ----------
     at_contact : ndarray, shape (P,)
-        Work that the strip has done against each contact [J].
+        Work done by the strip at each contact [J].
     work, dissipated : float
-        Work of the outer forces, and energy lost [J].
+        Work of the outer forces, and energy dissipated [J].
     """
 
     at_contact: FloatArray
@@ -44,7 +44,7 @@ class Ledger:
     dissipated: float = 0.0
 
     def balance(self, stored: float) -> FloatArray:
-        """Return the values of `BALANCE` [J], shape (4,), from the energy that is held [J].
+        """Return the values of `BALANCE` [J], shape (4,), for a stored energy [J].
 
         Examples
         --------

@@ -1,11 +1,11 @@
 """Inputs of a part between communication points.
 
-Tools exchange values once per macro step and hold them. Held inputs add energy at a stiff contact (they act
-like a damping of about -K H), so each part continues its own inputs inside the step.
+Tools exchange values once per macro step and hold them. Held inputs add energy at a stiff contact (they act like a
+damping of about -K H), so each part extrapolates its inputs within the step.
 
-A tool may hand over values that hold at the beginning of the step (jacobi) or, from a part that has stepped
-already, at its end (gauss-seidel), and nothing in FMI says which. Here the data say it: strip and contact point
-travel along the track at a known speed, so a position is a time stamp.
+A tool may pass values valid at the beginning of the step (jacobi) or, from a part that has already stepped, at its end
+(gauss-seidel), and FMI does not tell them apart. The data do: strip and contact point travel along the track at a known
+speed, so a position is a time stamp.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ import numpy.typing as npt
 
 from models.arrays import FloatArray, Snapshot
 
-#: How far, as a share of a step's travel, a position may be off its time and still stamp it.
+#: Largest deviation of a position, as a share of the travel in a step, at which it still serves as a time stamp.
 _STAMP_TOLERANCE = 0.25
-#: Slower than this the travel within a step stamps nothing [m].
+#: Travel within a step below which a position is no time stamp [m].
 _LEAST_TRAVEL = 1e-9
 #: Highest order of the polynomials.
 MAX_ORDER = 2
-#: What a strip's extrapolation knows of its ends.
+#: Quantities by which a strip's ends are extrapolated.
 _MOTION = ("position", "velocity", "acceleration")
 
 
 def lead_of(position: float, expected: float, speed: float, step: float) -> float:
-    """Return how much later than the step's beginning a received position holds: 0 or ``step`` [s].
+    """Return how long after the beginning of the step a received position is valid: 0 or ``step`` [s].
 
     Parameters
     ----------
     position, expected : float
-        Received position, and where the body is at the step's beginning [m].
+        Received position, and position of the body at the beginning of the step [m].
     speed : float
         Speed along the track [m/s].
     step : float
@@ -53,16 +53,16 @@ def lead_of(position: float, expected: float, speed: float, step: float) -> floa
 
 @dataclass
 class ForceExtrapolation:
-    """Contact force over a step, from its last values: constant, linear or quadratic in time.
+    """Contact force over a step from its latest values: constant, linear or quadratic in time.
 
     Attributes
     ----------
     order : int
-        0, 1 or 2; fewer as long as fewer values are known.
+        0, 1 or 2; lower while fewer values are known.
     times, values : list of float
-        When the last values hold [s], and they [N], the latest first: plain floats, faster than so short arrays.
+        Times of the latest values [s] and the values [N], latest first: plain floats, faster than such short arrays.
     known : int
-        How many of them have been received.
+        Number of values received.
     """
 
     order: int = MAX_ORDER
@@ -71,12 +71,12 @@ class ForceExtrapolation:
     known: int = 0
 
     def start(self, time: float, force: float) -> None:
-        """Forget everything but one value."""
+        """Begin with a single value."""
         self.known = 0
         self.receive(time, force)
 
     def receive(self, time: float, force: float) -> None:
-        """Take a value that holds at ``time``; one for the same time replaces the last."""
+        """Take a value valid at ``time``; it replaces one for the same time."""
         if self.known and time <= self.times[0] + 1e-12:
             self.values[0] = force
             return
@@ -87,12 +87,12 @@ class ForceExtrapolation:
     def receive_at(
         self, time: float, force: float, position: float, expected: float, speed: float, step: float
     ) -> None:
-        """Take a value for a step that begins at ``time``, finding out from its position when it holds.
+        """Take a value for a step that begins at ``time``, valid when its position says.
 
         Parameters
         ----------
         position, expected : float
-            Received point of application, and where the strip is at ``time`` [m].
+            Received point of application, and position of the strip at ``time`` [m].
         """
         self.receive(time + lead_of(position, expected, speed, step), force)
 
@@ -109,14 +109,14 @@ class ForceExtrapolation:
     def at(self, time: float) -> float:
         """Return the force at ``time`` [N], never negative.
 
-        A force that is zero now stays zero: a lost contact has no trend.
+        A force of zero stays zero: a lost contact has no trend.
         """
         if self.values[0] == 0.0 and time > self.times[0]:
             return 0.0
         return max(0.0, self._polynomial(time))
 
     def _polynomial(self, time: float) -> float:
-        """Newton's divided differences through the last values."""
+        """Evaluate Newton's divided differences through the latest values."""
         t, f = self.times, self.values
         order = min(self.order, self.known - 1)
         result: float = f[0]
@@ -131,16 +131,16 @@ class ForceExtrapolation:
 
 @dataclass
 class StripExtrapolation:
-    """Strip ends over a step, from their last positions and velocities.
+    """Strip ends over a step from their latest positions and velocities.
 
     Attributes
     ----------
     order : int
-        0 holds the positions, 1 moves them on by the velocity, 2 also by the change of velocity.
+        0 holds the positions, 1 continues them by the velocity, 2 also by the change of velocity.
     time : float
-        When they hold [s].
+        When the values are valid [s].
     position, velocity, acceleration : list of float
-        x, y, z of end A, then of end B: plain floats, faster than so short arrays. The acceleration is 0 below order 2.
+        x, y, z of end A, then of end B: plain floats, faster than short arrays. The acceleration is 0 below order 2.
     """
 
     order: int = MAX_ORDER
@@ -150,13 +150,13 @@ class StripExtrapolation:
     acceleration: list[float] = field(default_factory=lambda: [0.0] * 6)
 
     def start(self, time: float, strip: FloatArray) -> None:
-        """Forget everything but one state, shape (2, 2, 3): end A, B; position, velocity; x, y, z."""
+        """Begin with a single state, shape (2, 2, 3): end A, B; position, velocity; x, y, z."""
         self.time = time
         self._take(strip)
         self.acceleration = [0.0] * 6
 
     def receive(self, time: float, strip: FloatArray, step: float) -> None:
-        """Take a strip state, shape (2, 2, 3), for a step that begins at ``time``, finding out when it holds."""
+        """Take a strip state, shape (2, 2, 3), for a step that begins at ``time``, valid when its position says."""
         known, before, velocity = self.position[0], self.velocity, self._take(strip)
         speed = velocity[0]
         holds = time + lead_of(self.position[0], known + speed * (time - self.time), speed, step)
@@ -187,13 +187,13 @@ class StripExtrapolation:
         self.position, self.velocity, self.acceleration = (_as_list(snapshot[f"strip.{name}"], 6) for name in _MOTION)
 
     def _take(self, strip: FloatArray) -> list[float]:
-        """Take positions and velocities; returns the velocities."""
+        """Take positions and velocities, and return the velocities."""
         (a, velocity_a), (b, velocity_b) = strip.tolist()
         self.position, self.velocity = a + b, velocity_a + velocity_b
         return self.velocity
 
 
 def _as_list(values: npt.ArrayLike, count: int) -> list[float]:
-    """Return numbers as a list; raises ``ValueError`` if they are not so many."""
+    """Return numbers as a list; raises ``ValueError`` if there are not ``count`` of them."""
     numbers: list[float] = np.asarray(values, dtype=np.float64).reshape(count).tolist()
     return numbers

@@ -1,14 +1,14 @@
 """Compiled kernels, and the folder in which their machine code is kept between runs.
 
-numba keeps what it compiles in files that are pickles, beside the source. Loading a pickle runs it, and a damaged one
-ends a run, so the cache must neither be trusted blindly nor decide whether a run works:
+numba stores what it compiles as pickles beside the source. Loading a pickle executes it, and a damaged one ends the
+run, so the cache must neither be trusted blindly nor decide whether a run works:
 
 - a folder that does not belong to this user, or that others may write to, is not read;
-- every file carries a checksum, and one that does not fit is compiled afresh and replaced;
-- where nothing can be kept (no home, no space, no permission) the kernels are compiled into a temporary folder of this
-  process, or kept in memory alone.
+- every file carries a checksum, and one that does not match is compiled again and replaced;
+- where nothing can be stored (no home, no space, no permission) the kernels are compiled into a temporary folder of
+  this process, or kept in memory only.
 
-Each time one warning names the folder, through `logging`; figures and results are the same with and without a cache.
+In each case one warning names the folder, through `logging`; results are the same with and without a cache.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ _named: set[str] = set()
 
 
 class KernelError(RuntimeError):
-    """The compiled kernels were asked for and are not available."""
+    """Compiled kernels were requested and are not available."""
 
 
 def load_kernels(name: str, source: bytes) -> ModuleType:
-    """Return a module of numba kernels, made from ``source`` the first time in a process.
+    """Return a module of numba kernels, made from ``source`` on first use in a process.
 
-    FMUs are unpacked somewhere new every time, and numba recognises its files by the path of the source, so the
-    module is loaded from a copy in the user's cache, named by its content.
+    FMUs are unpacked to a new place every time, and numba identifies its files by the path of the source, so the module
+    is loaded from a copy in the user's cache, named by its content.
 
     Parameters
     ----------
     name : str
-        What the kernels are called, letters and underscores.
+        Name of the kernels, letters and underscores.
     source : bytes
-        A Python module that imports nothing of the project.
+        A Python module that imports nothing from the project.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def _kept_source(source: bytes, folder: str) -> Path:
 
 
 def _write(copy: Path, source: bytes) -> None:
-    """Put the source where it is compiled from, unless it is there already."""
+    """Write the source to the place it is compiled from, unless it is already there."""
     if copy.is_file() and copy.read_bytes() == source:
         return
     part = copy.with_name(f"{copy.name}.{os.getpid()}.part")
@@ -121,7 +121,7 @@ def _write(copy: Path, source: bytes) -> None:
 
 
 def _cache_folder() -> Path:
-    """Return the folder in which this user's programs keep what they can make again.
+    """Return the folder for data of this user's programs that can be regenerated.
 
     A relative XDG_CACHE_HOME is to be ignored (XDG Base Directory Specification).
     """
@@ -132,12 +132,12 @@ def _cache_folder() -> Path:
 
 
 def _check_owner(folder: Path) -> None:
-    """Refuse a folder that somebody else can put files into; one that is not there yet is fine.
+    """Reject a folder to which somebody else can write; one that does not exist yet is accepted.
 
     Raises
     ------
     PermissionError
-        If it belongs to another user, or its mode lets others write. Windows keeps a user's folders to the user.
+        If it belongs to another user, or its mode lets others write. On Windows a user's folders are private.
     """
     if sys.platform == "win32":
         return
@@ -159,7 +159,7 @@ def _warn(text: str) -> None:
 
 
 def _guard(module: ModuleType, folder: Path) -> None:
-    """Let every kernel of a module keep its machine code in checked files."""
+    """Make every kernel of a module store its machine code in checked files."""
     for kernel in vars(module).values():
         cache = getattr(kernel, "_cache", None)
         if hasattr(kernel, "py_func") and hasattr(cache, "_cache_file"):
@@ -168,7 +168,7 @@ def _guard(module: ModuleType, folder: Path) -> None:
 
 
 def _leave_out_if_foreign(cache: Any) -> None:
-    """Keep nothing where others may write; numba has further places, and an environment variable for more."""
+    """Disable a cache where others may write; numba has further places, and an environment variable for more."""
     try:
         _check_owner(Path(cache.cache_path))
     except OSError as error:
@@ -177,14 +177,14 @@ def _leave_out_if_foreign(cache: Any) -> None:
 
 
 class _GuardedCache:
-    """The cache of one numba kernel, whose failures cost time and never a run.
+    """The cache of a numba kernel, whose failures cost time but never a run.
 
     Parameters
     ----------
     cache : numba cache
-        The one that does the work.
+        The cache that does the work.
     folder : Path
-        Named in warnings.
+        Folder to name in warnings.
     """
 
     def __init__(self, cache: Any, folder: Path) -> None:
@@ -194,11 +194,11 @@ class _GuardedCache:
 
     @property
     def cache_path(self) -> Any:
-        """Where the files are."""
+        """Return where the files are."""
         return self._cache.cache_path
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what is kept for a signature, None if there is nothing that can be used."""
+        """Return the stored code for a signature, None if there is none that can be used."""
         try:
             return self._cache.load_overload(sig, target_context)
         except Exception as error:  # whatever a damaged file may raise
@@ -208,29 +208,29 @@ class _GuardedCache:
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled, if that is possible."""
+        """Store compiled code, if possible."""
         try:
             self._cache.save_overload(sig, data)
         except Exception as error:  # a full disk, say
             _warn(f"compiled kernels cannot be kept in {self._folder}: {error}")
 
     def enable(self) -> None:
-        """Use the cache."""
+        """Start using the cache."""
         self._cache.enable()
 
     def disable(self) -> None:
-        """Do without it."""
+        """Stop using the cache."""
         self._cache.disable()
 
     def flush(self) -> None:
-        """Forget what is kept."""
+        """Discard what is stored."""
         self._cache.flush()
 
 
 def _checked_files(files: Any) -> Any:
-    """Return numba's files of a kernel, each behind the checksum of its content.
+    """Return numba's files of a kernel, each preceded by the checksum of its content.
 
-    Files in numba's format are left alone: they have other names and are not read.
+    Files in numba's format are left alone: they have different names and are not read.
     """
     base: Any = type(files)
 
@@ -266,7 +266,7 @@ def _with_checksum(content: bytes) -> bytes:
 
 
 def _checked(path: Path) -> bytes:
-    """Return the content of a file behind its checksum.
+    """Return the content of a file after verifying its checksum.
 
     Raises
     ------

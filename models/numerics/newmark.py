@@ -56,7 +56,7 @@ class Newmark:
 
 
 def steps_within(duration: float, longest: float) -> int:
-    """Return into how many equal steps of at most ``longest`` a duration is divided.
+    """Return the number of equal steps of at most ``longest`` that divide a duration.
 
     Examples
     --------

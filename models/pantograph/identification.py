@@ -28,7 +28,7 @@ from models.pantograph.lumped.lumped_rig import chain_stiffness
 #: What a response file may hold: displacement per force [m/N], force per acceleration [kg], per displacement [N/m].
 RESPONSE_KINDS: Final = ("receptance", "apparent_mass", "dynamic_stiffness")
 
-#: Most stages of a chain that a response at its top can tell apart.
+#: Most stages of a chain that a response at its top can distinguish.
 MAX_STAGES: Final = 6
 _HIGHEST_FREQUENCY: Final = 1e5
 _KINDS: Final = {"m": "mass", "c": "damping", "k": "stiffness"}

@@ -1,4 +1,4 @@
-"""Whether the wire above a pantograph is at the height that its lifting force or moment belongs to."""
+"""The check that the wire above a pantograph is at the height that its lifting force or moment belongs to."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Raised(NamedTuple):
     start: float
 
     def is_under_another_height(self, x: float, z: float) -> bool:
-        """Whether the wire at (x, z) [m] is the one above the start, and another than the value is for."""
+        """Return whether the wire at (x, z) [m] is the one above the start, and another than the value is for."""
         return abs(x - self.start) <= _NEAR and z - self.reference > _SAME_HEIGHT
 
     def warning(self, z: float, left: float | None, at_reference: float) -> str:
@@ -55,7 +55,7 @@ class Raised(NamedTuple):
         kind, cure = self.parameter.replace("_", " "), "set reference_height to the wire's height"
         return (
             f"the {kind} of {self.value:g} {self.unit} is that at the reference height, {self.reference:g} m; at the "
-            f"wire's, {z:.2f} m, {_left(left)}: {cure}, or find {self.parameter} anew"
+            f"wire's, {z:.2f} m, {_left(left)}: {cure}, or find another {self.parameter}"
         )
 
 

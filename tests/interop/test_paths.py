@@ -172,10 +172,10 @@ def _spoil(part, how):
         script.write_text("def (:\n")
         return "the FMU cannot be loaded: "
     if how == "a module is missing":
-        next(resources.glob("openpanto_*/models/part.py")).unlink()
+        next(resources.glob("openpanto_*/models/definition_files/parameter.py")).unlink()
         return "the FMU is incomplete: No module named"
     if how == "a module is cut":
-        path = next(resources.glob("openpanto_*/fmus/adapter.py"))
+        path = next(resources.glob("openpanto_*/fmus/slave/adapter.py"))
         path.write_bytes(path.read_bytes()[:3000])
         return "the FMU cannot be loaded: "
     if how == "no definition":

@@ -93,7 +93,7 @@ def standalone(system, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def ordinary(host, system, tmp_path_factory):
-    """The numbers of the ordinary FMUs, with the step in numpy: a runtime is without numba."""
+    """The numbers of the ordinary FMUs, with the step in numpy: a runtime has no numba."""
     folder = tmp_path_factory.mktemp("ordinary")
     text = orders(system, [unpack(c.fmu.path, folder) for c in system.components])
     return numbers(run_host(host, text, OPENPANTO_PYTHON=sys.executable, OPENPANTO_KERNEL="numpy"))

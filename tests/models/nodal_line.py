@@ -5,7 +5,7 @@ import scipy.sparse as sp
 
 from models.catenary.contact_and_slack.contact_wire import height_polynomials
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.line_matrices import dropper_rows, element_dofs
+from models.catenary.shape.line_matrices import element_dofs
 
 
 def pendulum_stiffness(model):
@@ -43,10 +43,10 @@ class NodalLine:
         self.free = np.flatnonzero(~mesh.fixed.ravel())
         index = np.full(mesh.fixed.size, -1)
         index[self.free] = np.arange(len(self.free))
-        self.B = dropper_rows(mesh, static.positions)[:, self.free].tocsr()
+        self.B = static.droppers.rows[:, self.free].tocsr()
         droppers = self.B.T @ sp.diags(model.dropper_law.stiffness) @ self.B
         pendulums = model.definition.dynamics.geometric_stiffness * pendulum_stiffness(model)
-        matrices = (static.matrices.K + pendulums, static.matrices.M, static.matrices.C)
+        matrices = (static.shape.matrices.K + pendulums, static.shape.matrices.M, static.shape.matrices.C)
         K, M, C = (matrix.tocsr()[self.free][:, self.free] for matrix in matrices)
         self.K, self.M = (K + droppers).tocsc(), M.tocsc()
         self.C = (C + model.definition.damping.of("dropper").alpha * droppers).tocsc()

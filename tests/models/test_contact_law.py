@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from models.catenary.definition.line_definition import Contact
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import StripMotion
 from models.contact_law import continuous_contact
 
 

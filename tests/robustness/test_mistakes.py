@@ -102,7 +102,7 @@ def test_places_that_cannot_be_meant_end_the_run_at_its_first_second(scenario, t
     [
         ('stopTime="5.16"', 'stopTime="3.0"', ("at 280 m, before the end of the interval", "stop at 4 s or later")),
         ('start="240" end="360"', 'start="10" end="360"', ("starts at 30 m", "the interval a later start")),
-        (' end="360"', ' until="end"', ("has no end that the run could go on until", "give it one")),
+        (' end="360"', ' until="end"', ("has no end that the run could end at", "give it one")),
     ],
 )
 def test_stop_times_and_intervals_that_do_not_go_together(scenario, tmp_path, old, new, parts):

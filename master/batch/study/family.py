@@ -1,8 +1,8 @@
-"""A family as it lies in its scenario's folder: ``study.toml`` says what is reported, ``variants.csv`` what is varied.
+"""A family of variants as files in its scenario's folder: ``study.toml`` (what is reported) and ``variants.csv``.
 
 The table has a row for each variant. Its columns are ``component.parameter``, in the FMU's units, and the columns of
 the run itself (``stop``, ``step``). A value may have a unit (``12 kN``). A component that has columns, but no value in
-a row, takes no part in that variant; the line's cells must all have one.
+a row, takes no part in that variant; the cells of the line must all have a value.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Interval(_Model):
 
 
 class Calibration(_Model):
-    """Which parameter of every pantograph is found for which mean contact force [N] in which interval."""
+    """The parameter of every pantograph that is calibrated, its target mean contact force [N] and the interval."""
 
     parameter: str = "static_force"
     mean_force: float = Field(gt=0)
@@ -56,14 +56,14 @@ class Calibration(_Model):
 
 
 class Histories(_Model):
-    """Variants, and the place along the track [m], whose uplift and dropper force are drawn over time."""
+    """The variants, and the track position [m], whose uplift and dropper force are drawn over time."""
 
     variants: tuple[str, ...] = ()
     position: float
 
 
 class Sharing(_Model):
-    """Variants whose contact force is drawn wire by wire."""
+    """The variants whose contact force is drawn wire by wire."""
 
     variants: tuple[str, ...] = ()
 
@@ -117,7 +117,7 @@ class Family(_Model):
         Raises
         ------
         RequestError
-            If there is none of a name.
+            If a name is unknown.
         """
         known = [v.name for v in self.variants]
         for name in names:
@@ -127,7 +127,7 @@ class Family(_Model):
 
 
 def family_names(root: Path = SCENARIOS) -> tuple[str, ...]:
-    """Return the names of all scenarios that are families."""
+    """Return the names of all scenarios that have a study."""
     return tuple(sorted(p.parent.name.removesuffix(".ssp") for p in root.glob(f"*.ssp/{STUDY}")))
 
 
@@ -137,9 +137,9 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
     Raises
     ------
     RequestError
-        If there is none.
+        If there is no such family.
     ScenarioError
-        With the mistakes in its files.
+        With all mistakes in its files.
     """
     folder = Path(name) if (Path(name) / STUDY).is_file() else root / f"{name}.ssp"
     if not (folder / STUDY).is_file():
@@ -152,7 +152,7 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
 
 
 def store_values(family: Family, variant: str, values: dict[str, float]) -> None:
-    """Write values into a variant's row, leaving all others as they are.
+    """Write values into the row of a variant and leave all others unchanged.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def store_values(family: Family, variant: str, values: dict[str, float]) -> None
     rows = _table(path)
     wanted = [row for row in rows[1:] if row and row[0] == variant]
     if len(wanted) != 1 or not set(values) <= set(rows[0]):
-        raise MasterError(f"{path}: row '{variant}' with columns {', '.join(values)} is needed once")
+        raise MasterError(f"{path} must have one row '{variant}', with columns {', '.join(values)}")
     for name, value in values.items():
         wanted[0][rows[0].index(name)] = f"{value:.6g}"
     text = io.StringIO()
@@ -178,7 +178,7 @@ def _read_settings(path: Path) -> Settings:
         raise ScenarioError(_problems(path, 0, error)) from error
     except RecursionError as error:
         raise ScenarioError([Problem(str(path), 0, "study", "cannot be read: it is nested too deeply")]) from error
-    except (OSError, ValueError) as error:  # no UTF-8, no TOML, whole numbers of thousands of digits
+    except (OSError, ValueError) as error:  # not UTF-8, not TOML, integers of thousands of digits
         raise ScenarioError([Problem(str(path), 0, "study", f"cannot be read: {error}")]) from error
 
 
@@ -207,9 +207,9 @@ def _read_variants(path: Path) -> tuple[Variant, ...]:
 
 
 def _name_texts(names: Sequence[str]) -> list[str]:
-    """Return what is wrong with the variants' names: each names a folder of its own."""
+    """Return what is wrong with the names of the variants: each must name a different folder."""
     folders = [folder_name(n).casefold() for n in names]
-    texts = [f"'{n}' stands there twice" for n in dict.fromkeys(names) if names.count(n) > 1]
+    texts = [f"'{n}' appears more than once" for n in dict.fromkeys(names) if names.count(n) > 1]
     taken = dict(zip(reversed(folders), reversed(names), strict=True))
     texts += [
         f"'{name}' and '{taken[folder]}' would have the same folder of results, '{folder}'; rename one"
@@ -220,7 +220,7 @@ def _name_texts(names: Sequence[str]) -> list[str]:
 
 
 def folder_name(variant: str) -> str:
-    """Return a variant's name as that of a folder.
+    """Return the name of a variant's folder.
 
     Examples
     --------
@@ -235,7 +235,7 @@ def _head_problems(path: Path, heads: Sequence[str]) -> list[Problem]:
         return [Problem(str(path), 1, "variants", f"the first column must be '{_NAME}'")]
     text = f"is neither 'component.parameter' nor one of {', '.join(_RUN)}"
     wrong = [f"column '{h}' {text}" for h in heads[1:] if h not in _RUN and not all(h.partition("."))]
-    wrong += [f"column '{h}' is there {heads.count(h)} times" for h in dict.fromkeys(heads) if heads.count(h) > 1]
+    wrong += [f"column '{h}' appears {heads.count(h)} times" for h in dict.fromkeys(heads) if heads.count(h) > 1]
     return [Problem(str(path), 1, "variants", text) for text in wrong]
 
 
@@ -267,7 +267,7 @@ def _problems(path: Path, line: int, error: ValidationError) -> list[Problem]:
 
 
 def _check_names(path: Path, settings: Settings, variants: Sequence[Variant]) -> None:
-    """Check that what the settings name is there."""
+    """Check that the variants and intervals named in the settings exist."""
     named = [*(settings.histories.variants if settings.histories else ())]
     named += settings.sharing.variants if settings.sharing else ()
     texts = [f"there is no variant '{n}'" for n in named if n not in {v.name for v in variants}]

@@ -21,14 +21,14 @@ from master.report.charts.force_charts import SHARE, TRACK, force_bars
 from master.report.charts.line_charts import line_marks
 from master.results.run_results import Results
 
-#: How far to both sides of a change of wires the forces are drawn [m].
+#: How far before and after a change of wires the forces are drawn [m].
 _MARGIN: Final = 15.0
 _FORCE: Final = Axis("contact force, low-passed", "N")
 _STATISTICS: Final = ("maximum", "minimum", "amplitude", "mean", "sigma", "statistical_minimum")
 
 
 def interval_charts(outcome: StudyOutcome, interval: Interval, found: Sequence[StudyEntry]) -> list[Chart]:
-    """Return statistics by role, then forces and histograms of every variant of several pantographs."""
+    """Return statistics by place in the train, then forces and histograms of variants with several pantographs."""
     number = outcome.family.settings.interval.index(interval) + 1
     made = [_statistics(number, role, own) for role, own in _roles(found).items()]
     for i, done in enumerate(outcome.done):
@@ -39,7 +39,7 @@ def interval_charts(outcome: StudyOutcome, interval: Interval, found: Sequence[S
 
 
 def _roles(found: Sequence[StudyEntry]) -> dict[str, list[StudyEntry]]:
-    """Return, for every place in the train, its entries with those of single pantographs before them."""
+    """Return the entries by place in the train, each with those of single pantographs before them."""
     several = [e for e in found if sum(o.variant == e.variant for o in found) > 1]
     singles = [e for e in found if e not in several]
     roles = list(dict.fromkeys(e.pantograph for e in several)) or ["single"]
@@ -56,7 +56,7 @@ def _statistics(number: int, role: str, found: Sequence[StudyEntry]) -> Chart:
 
 
 def _filtered(done: Results, e: StudyEntry) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return track position, low-passed force and what of it lies in the entry's interval."""
+    """Return track position, low-passed force and which samples lie in the interval of the entry."""
     settings = replace(done.evaluation, interval=(e.interval.start, e.interval.end))
     s = contact_signals(done.recordings[0], e.assessment.contact, settings)
     return s.position, s.filtered, s.inside & settled(s.raw, s.step)
@@ -104,12 +104,12 @@ def _sharing(key: str, done: Results, e: StudyEntry) -> Chart:
     count = forces.shape[1]
     curves = [Curve(f"section {s + 1}", position[near], forces[near, s], stroke(s)) for s in range(count)]
     curves.append(Curve("total", position[near], forces[near].sum(axis=1), stroke(count, 1.2)))
-    title = f"From wire to wire, {e.variant}, {e.pantograph}"
+    title = f"From wire to wire, {e.name}"
     return Chart(key, title, TRACK, Axis("contact force, as computed", "N"), tuple(curves), height=340)
 
 
 def history_charts(outcome: StudyOutcome) -> list[Chart]:
-    """Return uplift and dropper force at one place over time, for the variants that the family names."""
+    """Return uplift and dropper force at one position over time, for the variants that the family names."""
     wanted = outcome.family.settings.histories
     if wanted is None:
         return []
@@ -124,7 +124,7 @@ def history_charts(outcome: StudyOutcome) -> list[Chart]:
 
 @dataclass(frozen=True)
 class _Kind:
-    """What a history shows: thing, variable, title, axis, and the factor to its unit."""
+    """What a history shows: thing, variable, title, axis, and the factor to the unit of the axis."""
 
     thing: str
     variable: str
@@ -151,7 +151,7 @@ def _history(chosen: Sequence[VariantResult], position: float, kind: _Kind) -> C
 
 
 def _nearest(geometry: Geometry, kind: str, position: float) -> tuple[str, float] | None:
-    """Return the full name and place of the support or dropper that is nearest to a position."""
+    """Return full name and position of the support or dropper nearest to a position."""
     found = [
         (f"{component}.{name.removesuffix('.x')}", x)
         for component, values in geometry.items()

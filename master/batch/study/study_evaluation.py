@@ -1,4 +1,4 @@
-"""What a study reports of one pantograph in one interval beyond the figures of every run."""
+"""The figures that a study adds to those of every run, for one pantograph in one interval."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from master.system.contacts import Contact
 
 @dataclass(frozen=True)
 class Sharing:
-    """A strip between two wires, while both can be touched.
+    """The passage of a strip from one wire to another.
 
     Attributes
     ----------
     start, end : float
         Track positions of the strip at the first and last contact with both wires [m].
     duration : float
-        Between these [s].
+        Time between the two [s].
     touching : float
-        Time in which both wires are touched [s].
+        Time during which both wires are touched [s].
     losses : tuple of int
         How often contact with each wire is lost, from ``start`` on, section by section.
     least_force : float
-        Least total force, as computed [N].
+        Smallest total force, as computed [N].
     """
 
     start: float
@@ -52,9 +52,9 @@ class StudyEntry:
     variant : str
     interval : Interval
     assessment : Assessment
-        Figures and verdict in it.
+        Figures and verdict in the interval.
     sharing : Sharing or None
-        If it touches two wires within the interval.
+        None unless it touches two wires within the interval.
     """
 
     variant: str
@@ -64,8 +64,13 @@ class StudyEntry:
 
     @property
     def pantograph(self) -> str:
-        """The pantograph's name."""
+        """Name of the pantograph."""
         return self.assessment.contact.pantograph
+
+    @property
+    def name(self) -> str:
+        """Variant and pantograph."""
+        return f"{self.variant}, {self.pantograph}"
 
     @property
     def quality(self) -> Quality:
@@ -74,17 +79,17 @@ class StudyEntry:
 
     @property
     def uplift(self) -> float | None:
-        """Largest uplift of the interval's supports [m]."""
+        """Largest uplift of the supports in the interval [m]."""
         return None if self.assessment.uplift is None else self.assessment.uplift.maximum
 
     @property
     def slack(self) -> float | None:
-        """Share of the interval's droppers that go slack as this pantograph passes."""
+        """Share of the droppers in the interval that go slack as this pantograph passes."""
         return self.assessment.slack
 
 
 def entries(variant: str, done: Results, interval: Interval) -> tuple[StudyEntry, ...]:
-    """Return the entries of a run's pantographs in an interval, the leading one first."""
+    """Return the entries of all pantographs of a run in an interval, the leading one first."""
     found = {a.contact: a for a in done.assessments_in((interval.start, interval.end))}
     ordered = leading_first(done.recordings[0], list(found))
     return tuple(StudyEntry(variant, interval, found[c], sharing(done.recordings[0], c, interval)) for c in ordered)

@@ -1,4 +1,4 @@
-"""What a study has found so far, and as rows for tables and files."""
+"""The results of a study so far, and as rows of tables and files."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from master.batch.study.study_evaluation import StudyEntry, entries
 from master.results.run_results import Results
 from master.safety.safe_files import safe_cell
 
-#: Version of ``study.json`` and ``study.csv``; 1 says none.
+#: Version of ``study.json`` and ``study.csv``; files without one are of version 1.
 FORMAT: Final = 2
-#: Columns of the figures: title, unit, how to get it, decimals.
+#: Columns of the figures: title, unit, how to read it, decimals.
 FIGURES: Final[tuple[tuple[str, str, Callable[[StudyEntry], float | None], int], ...]] = (
     ("mean", "N", lambda e: e.assessment.quality.mean, 1),
     ("sigma", "N", lambda e: e.assessment.quality.sigma, 1),
@@ -48,7 +48,7 @@ class VariantResult:
 
 @dataclass(frozen=True)
 class StudyOutcome(BatchState):
-    """A study so far.
+    """The state of a study.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class StudyOutcome(BatchState):
     done : tuple of VariantResult
         In the order of the table.
     failures : dict
-        Why variants failed, by name.
+        Reasons why variants failed, by name.
     """
 
     family: Family
@@ -67,6 +67,11 @@ class StudyOutcome(BatchState):
         """Return the figures of all pantographs of all variants in an interval."""
         return tuple(e for d in self.done for e in entries(d.name, d.results, interval))
 
+    @property
+    def all_entries(self) -> tuple[StudyEntry, ...]:
+        """The figures of all pantographs of all variants, interval by interval."""
+        return tuple(e for interval in self.family.settings.interval for e in self.entries(interval))
+
 
 def shown(value: float | None, decimals: int) -> str:
     """Return a figure as text."""
@@ -74,7 +79,7 @@ def shown(value: float | None, decimals: int) -> str:
 
 
 def verdict(entry: StudyEntry) -> str:
-    """Return the verdict on the limits in a few words."""
+    """Return the verdict in a few words."""
     if entry.assessment.withheld:
         return "not judged"
     criteria = entry.assessment.criteria
@@ -86,35 +91,35 @@ def verdict(entry: StudyEntry) -> str:
 
 
 def filters(outcome: StudyOutcome) -> tuple[str, ...]:
-    """Return with what the forces of the variants were low-passed: one filter, several if runs had other settings."""
+    """Return the filters that low-passed the forces: one, or several if the settings of the runs differ."""
     return tuple(dict.fromkeys(d.results.evaluation.filter.sentence for d in outcome.done))
 
 
 def judged_by(found: Sequence[VariantResult]) -> str:
-    """Return by which limits the variants are judged."""
+    """Return the limits by which the variants are judged."""
     return "; ".join(dict.fromkeys(d.results.evaluation.limits.title for d in found)) or "EN 50367"
 
 
 def filter_remarks(found: Sequence[StudyEntry]) -> list[str]:
-    """Return whose extremes depend on the filter, with what they would be, and which verdicts do."""
+    """Return remarks on extremes and verdicts that depend on the filter, with the figures of other filters."""
     remarks = []
     for e in found:
-        who = f"{e.variant}, {e.pantograph}"
-        told = "; ".join(
+        who = e.name
+        others = "; ".join(
             f"maximum {f.maximum:.0f}, minimum {f.minimum:.0f} N with {f.filter}" for f in e.quality.filter_dependent
         )
-        remarks += [f"{who}: {told}"] if told else []
+        remarks += [f"{who}: {others}"] if others else []
         remarks += [f"{who}: {c.name}: {c.remark}" for c in e.assessment.criteria if c.remark and not c.is_at_limit]
         remarks += [f"{who}: {warning}" for warning in e.assessment.warnings]
     return remarks
 
 
 def differences(found: Sequence[StudyEntry]) -> list[tuple[str, str, str, tuple[float, float, float]]]:
-    """Return what stands beside what: sigma, maximum and minimum of one less those of the other [N].
+    """Return differences between pantographs: sigma, maximum and minimum of one minus those of the other [N].
 
-    Every follower is compared with the pantograph ahead, and everyone of several with a variant of a single pantograph
-    of the same name ending (``single, low damping`` for ``31 m, low damping``), if there is just one. Variants of one
-    pantograph each differ in what was swept: what another one of them has less or more means nothing here.
+    Each follower is compared with the pantograph ahead, and each of several with the variant of a single pantograph
+    whose name ends alike (``single, low damping`` for ``31 m, low damping``), if there is just one. Variants with one
+    pantograph each are not compared: they differ in the parameter that was swept.
     """
     alone = [e for e in found if _is_single(e, found)]
     kinds = [_kind(e.variant) for e in alone]
@@ -155,24 +160,24 @@ def as_csv(outcome: StudyOutcome) -> str:
         for e in outcome.entries(interval):
             values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
             named = map(safe_cell, (e.variant, interval.name, e.pantograph))
-            told = _values_of(outcome.family, e.variant)
-            own = [told.get(name, "") for name in swept]
+            given = _values_of(outcome.family, e.variant)
+            own = [given.get(name, "") for name in swept]
             cells = [*values, verdict(e), filtered[e.variant], *_sharing_cells(e), *own]
             writer.writerow([*named, *cells])
     return text.getvalue()
 
 
 def _swept(variants: Sequence[Variant]) -> list[str]:
-    """Return the columns of the table of variants that hold a value somewhere, in their order."""
-    return list(dict.fromkeys(name for v in variants for name in _told(v)))
+    """Return the columns of the table of variants that hold any value, in their order."""
+    return list(dict.fromkeys(name for v in variants for name in _values(v)))
 
 
 def _values_of(family: Family, name: str) -> dict[str, str]:
-    """Return what a variant was given, as its table has it."""
-    return next((_told(v) for v in family.variants if v.name == name), {})
+    """Return the values of a variant as written in its table."""
+    return next((_values(v) for v in family.variants if v.name == name), {})
 
 
-def _told(variant: Variant) -> dict[str, str]:
+def _values(variant: Variant) -> dict[str, str]:
     times = {"stop": variant.stop, "step": variant.step}
     return {**variant.values, **{name: f"{value:g}" for name, value in times.items() if value is not None}}
 
@@ -201,7 +206,7 @@ def as_data(outcome: StudyOutcome) -> dict[str, Any]:
             for d in outcome.done
         ],
         "failures": dict(outcome.failures),
-        "figures": [_entry_data(e) for i in outcome.family.settings.interval for e in outcome.entries(i)],
+        "figures": [_entry_data(e) for e in outcome.all_entries],
     }
 
 

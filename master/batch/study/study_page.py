@@ -1,4 +1,4 @@
-"""A study as a page: one HTML file that needs nothing else."""
+"""The page of a study: a single HTML file that needs no other."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from master.report.charts.chart import Chart
 from master.report.run_page import INTERVAL_NOTE
 
 _STATUS = {
-    "running": "Not finished: still running, or killed. What follows is what was computed.",
-    "interrupted": "Interrupted. What follows is what was computed.",
+    "running": "Not finished: the study is still running or was killed. The results so far follow.",
+    "interrupted": "Interrupted. The results so far follow.",
 }
 
 
@@ -54,35 +54,24 @@ def page(outcome: StudyOutcome) -> str:
 
 
 def _tables(found: Sequence[StudyEntry], title: str) -> list[str]:
-    heads = ["variant, pantograph", *(f"{title} [{unit}]" for title, unit, _, _ in FIGURES), title]
-    rows = [
-        [f"{e.variant}, {e.pantograph}", *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found
-    ]
+    heads = ["variant, pantograph", *(f"{name} [{unit}]".removesuffix(" [1]") for name, unit, _, _ in FIGURES), title]
+    rows = [[e.name, *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found]
     note = INTERVAL_NOTE
     parts = [html_markup.table(heads, rows), f"<p class='note'>{note}</p>"]
     parts += [f"<p class='note'>{html_markup.text(r)}</p>" for r in filter_remarks(found)]
     if beside := differences(found):
         lines = [[f"{v}, {p}", other, *(f"{d:+.1f}" for d in change)] for v, p, other, change in beside]
-        heads = ["variant, pantograph", "less", "sigma [N]", "maximum [N]", "minimum [N]"]
-        parts += ["<h3>Leading and trailing, one and two</h3>", html_markup.table(heads, lines)]
+        heads = ["variant, pantograph", "compared with", "sigma [N]", "maximum [N]", "minimum [N]"]
+        parts += ["<h3>Differences between pantographs</h3>", html_markup.table(heads, lines)]
     return parts
 
 
 def _sharing(outcome: StudyOutcome) -> list[str]:
-    found = [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing is not None]
-    if not found:
-        return []
-    heads = ["variant, pantograph", "both wires from [m]", "to [m]", "[s]", "losses per wire", "least total force [N]"]
-    rows = [
-        [
-            f"{e.variant}, {e.pantograph}",
-            f"{s.start:.1f}",
-            f"{s.end:.1f}",
-            f"{s.duration:.3f}",
-            ", ".join(map(str, s.losses)),
-            f"{s.least_force:.1f}",
-        ]
-        for e in found
-        if (s := e.sharing) is not None
-    ]
-    return ["<h2>From wire to wire</h2>", html_markup.table(heads, rows)]
+    found = outcome.all_entries
+    heads = ["variant, pantograph", "both wires from [m]", "to [m]", "for [s]", "losses per wire", "lowest total [N]"]
+    rows = []
+    for e in found:
+        if (s := e.sharing) is not None:
+            losses = ", ".join(map(str, s.losses))
+            rows.append([e.name, f"{s.start:.1f}", f"{s.end:.1f}", f"{s.duration:.3f}", losses, f"{s.least_force:.1f}"])
+    return ["<h2>From wire to wire</h2>", html_markup.table(heads, rows)] if rows else []

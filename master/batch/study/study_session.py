@@ -1,4 +1,4 @@
-"""A study: variants one after the other, and what is left of them on disk after each."""
+"""A study: its variants are run one after the other, and its files written after each."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from master.batch.batch_session import BatchFiles, Runner, work_off
+from master.batch.batch_session import BatchFiles, Runner, run_tasks
 from master.batch.study.family import VARIANTS, Family, Variant, folder_name
 from master.batch.study.study_outcome import StudyOutcome, VariantResult, as_csv, as_data
 from master.batch.study.study_page import page
@@ -30,31 +30,31 @@ def study(
     again: bool = False,
     show: Callable[[VariantResult], None] = lambda _: None,
 ) -> StudyOutcome:
-    """Run variants; page, table and JSON in ``folder`` are written again after each.
+    """Run the variants of a study; page, table and JSON file are written after each.
 
-    A variant that an earlier study in the same folder has finished, with the same FMUs and values, is not run again;
-    those that were not chosen are reported if they are there.
+    A variant that an earlier study in the same folder finished, with the same FMUs and values, is not run again;
+    those that were not chosen are reported if their results are there.
 
     Parameters
     ----------
     family : Family
     chosen : sequence of Variant
-        What is run.
+        The variants to run.
     folder : Path
-        Made, or taken over if it is an earlier study's.
+        Created, or taken over from an earlier study.
     runner : Runner
         Makes the runs.
     again : bool
         Whether finished variants are run again.
     show : callable
-        Called with every variant that has been run.
+        Called with each variant that was run.
 
     Raises
     ------
     InterruptedRunError, KeyboardInterrupt
-        If the user stops it; the finished variants are in the page then.
+        If the user stops it; the page then has the finished variants.
     ScenarioError
-        If a variant cannot be run as it is written; nothing was run then.
+        If a variant cannot be run as it is written; nothing is run then.
     MasterError
         If the folder holds something else.
     """
@@ -77,11 +77,11 @@ def study(
             show(done)
         return replace(state, done=(*state.done, done))
 
-    return work_off(StudyOutcome(family), family.variants, finish, FILES, folder)
+    return run_tasks(StudyOutcome(family), family.variants, finish, FILES, folder)
 
 
 def _results(family: Family, variant: Variant, runner: Runner, folder: Path, may: tuple[bool, bool]) -> Results | None:
-    """Return what lies finished in a variant's folder, or what a new run leaves there, if it may be run and reused."""
+    """Return the results of an earlier run of a variant if it may be reused, else of a new one if it may be run."""
     may_run, may_reuse = may
     with opened_variant(family, variant, runner) as system:
         found = finished(folder, system) if may_reuse else None
@@ -92,7 +92,7 @@ def _results(family: Family, variant: Variant, runner: Runner, folder: Path, may
 
 
 def check(family: Family, chosen: Sequence[Variant], runner: Runner) -> None:
-    """Open every variant that is to be run, and close it again; raises `ScenarioError` with all that is wrong."""
+    """Open and close every variant that is to be run; raise `ScenarioError` with all mistakes."""
     problems: list[Problem] = []
     for variant in chosen:
         try:

@@ -1,11 +1,10 @@
-"""A study on the terminal, 80 columns wide."""
+"""The tables of a study for a terminal 80 columns wide."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, Literal
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -13,23 +12,25 @@ from rich.table import Table
 from master.batch.study.family import Family, Interval
 from master.batch.study.study_evaluation import StudyEntry
 from master.batch.study.study_outcome import StudyOutcome, differences, filter_remarks, filters, judged_by, shown
+from master.report.result_tables import ruled_table
 
-_WIDTH: Final = 80
+#: Heads of the columns that hold words.
+_TEXTS: Final = ("variant", "compared with", "study", "variants", "title")
 _SIGMA: Final = "\u03c3"
 _FIGURE_HEADS: Final = (*("variant", "mean", _SIGMA, f"{_SIGMA}/Fm", "max", "min", "stat", "upl", "slack", "loss"),)
 
 
 def show(console: Console, outcome: StudyOutcome) -> None:
-    """Print a study: figures and differences for each interval, then the changes of wire, then what failed."""
+    """Print a study: figures and differences for each interval, changes of wire, and what failed."""
     for interval in outcome.family.settings.interval:
         found = outcome.entries(interval)
         if found:
             console.print(figures_table(interval, found, outcome))
         if beside := differences(found):
             console.print(differences_table(beside))
-    if sharing := [e for i in outcome.family.settings.interval for e in outcome.entries(i) if e.sharing]:
+    if sharing := [e for e in outcome.all_entries if e.sharing]:
         console.print(sharing_table(sharing))
-    for remark in filter_remarks([e for i in outcome.family.settings.interval for e in outcome.entries(i)]):
+    for remark in filter_remarks(outcome.all_entries):
         console.print(remark, markup=False, soft_wrap=True)
     for sentence in filters(outcome):
         console.print(f"filter: {sentence}", markup=False, soft_wrap=True)
@@ -38,9 +39,10 @@ def show(console: Console, outcome: StudyOutcome) -> None:
 
 
 def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: StudyOutcome) -> Table:
-    """Return the statistics of all pantographs; yellow where a limit is not kept."""
+    """Return the statistics of all pantographs; rows are yellow where a limit is not met."""
     where = f"{interval.name}, {interval.start:g}-{interval.end:g} m"
-    table = _table(f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]", _FIGURE_HEADS)
+    title = f"{where}: low-passed force [N], uplift [mm], slack droppers and loss [%]"
+    table = _table(title, _FIGURE_HEADS, _failing(found, judged_by(outcome.done)))
     for e in found:
         q = e.assessment.quality
         numbers = (q.mean, q.sigma, q.sigma_share, q.maximum, q.minimum, q.statistical_minimum)
@@ -48,27 +50,18 @@ def figures_table(interval: Interval, found: Sequence[StudyEntry], outcome: Stud
         uplift = shown(None if e.uplift is None else 1e3 * e.uplift, 0)
         slack = shown(None if e.slack is None else 1e2 * e.slack, 0)
         style = "" if e.assessment.passed else "yellow"
-        table.add_row(_name(e), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
-    table.caption, table.caption_justify = escape(_failing(found, judged_by(outcome.done))), "left"
+        table.add_row(escape(e.name), *texts, uplift, slack, shown(q.losses.percentage, 1), style=style)
     return table
 
 
-def _name(e: StudyEntry) -> str:
-    return escape(_name_of(e))
-
-
-def _name_of(e: StudyEntry) -> str:
-    return f"{e.variant}, {e.pantograph}"
-
-
 def _failing(found: Sequence[StudyEntry], title: str) -> str:
-    """Return which limits are not kept, and by whom."""
+    """Return which limits are not met, and by which pantographs."""
     failing: dict[str, list[str]] = {}
     for e in found:
         for criterion in e.assessment.criteria:
             if not criterion.passed:
-                failing.setdefault(criterion.name, []).append(f"{e.variant}, {e.pantograph}")
-    withheld = [f"{_name_of(e)}: {e.assessment.withheld}" for e in found if e.assessment.withheld]
+                failing.setdefault(criterion.name, []).append(e.name)
+    withheld = [f"{e.name}: {e.assessment.withheld}" for e in found if e.assessment.withheld]
     not_judged = "".join(f"\nnot judged: {text}" for text in withheld)
     if not failing:
         others = "all others pass" if withheld else "all pass"
@@ -78,42 +71,41 @@ def _failing(found: Sequence[StudyEntry], title: str) -> str:
 
 
 def differences_table(rows: Iterable[tuple[str, str, str, tuple[float, float, float]]]) -> Table:
-    """Return what stands beside what."""
-    table = _table("less the one ahead, and less the single one [N]", ("variant", "less", _SIGMA, "max", "min"))
+    """Return the differences between pantographs."""
+    table = _table(
+        "differences from the pantograph ahead and from the single one [N]",
+        ("variant", "compared with", _SIGMA, "max", "min"),
+    )
     for variant, pantograph, other, change in rows:
         table.add_row(escape(f"{variant}, {pantograph}"), escape(other), *(f"{d:+.1f}" for d in change))
     return table
 
 
 def sharing_table(found: Sequence[StudyEntry]) -> Table:
-    """Return how the strips pass from wire to wire."""
+    """Return the passages of the strips from wire to wire."""
     heads = ("variant", "from m", "to m", "s", "losses per wire", "least total N")
     table = _table("From wire to wire: both touched", heads)
     for e in found:
         if (s := e.sharing) is not None:
             numbers = (f"{s.start:.1f}", f"{s.end:.1f}", f"{s.duration:.3f}", " ".join(map(str, s.losses)))
-            table.add_row(_name(e), *numbers, f"{s.least_force:.0f}")
+            table.add_row(escape(e.name), *numbers, f"{s.least_force:.0f}")
     return table
 
 
 def list_table(families: Sequence[Family]) -> Table:
-    """Return families with their variants."""
-    table = _table("", ("study", "variants", "what"))
+    """Return the studies with their variants."""
+    table = _table("", ("study", "variants", "title"))
     for family in families:
         names = "\n".join(v.name for v in family.variants)
         table.add_row(escape(family.name), escape(names), escape(family.settings.title))
     return table
 
 
-def _table(title: str, heads: Sequence[str]) -> Table:
-    table = Table(
-        title=escape(title) if title else None, title_justify="left", width=_WIDTH - 1, box=SIMPLE_HEAD, pad_edge=False
-    )
-    texts = ("variant", "less", "study", "variants", "what")
+def _table(title: str, heads: Sequence[str], caption: str = "") -> Table:
+    table = ruled_table(title, caption)
     for head in heads:
-        is_text = head in texts
-        table.add_column(
-            head, justify="left" if is_text else "right", no_wrap=not is_text, ratio=1 if head == "variant" else None
-        )
+        is_text = head in _TEXTS
+        justify: Literal["left", "right"] = "left" if is_text else "right"
+        table.add_column(head, justify=justify, no_wrap=not is_text, ratio=1 if head == "variant" else None)
     table.padding = (0, 0)
     return table

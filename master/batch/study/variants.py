@@ -1,4 +1,4 @@
-"""From a family's table to runnable systems, and their runs."""
+"""The systems of a family's variants, their earlier results and their calibration."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def opened_variant(family: Family, variant: Variant, runner: Runner) -> Iterator
 
 
 def finished(folder: Path, system: System) -> Results | None:
-    """Return the results in a folder if they are those of just this system, complete."""
+    """Return the results in a folder if they are complete and of this very system, else None."""
     if not results_folder.is_ours(folder):
         return None
     found = run_results.read(folder)
@@ -44,7 +44,7 @@ def finished(folder: Path, system: System) -> Results | None:
 
 
 def _is_of(summary: dict[str, Any], system: System) -> bool:
-    """Whether a run had the same FMUs, values, times and settings."""
+    """Return whether a run had the same FMUs, values, times and settings."""
     components = [[c.name, c.fmu.sha256, c.parameters] for c in system.components]
     times = {"start": system.start, "stop": system.stop, "step": system.step}
     wanted = [components, {**times, **system.settings.model_dump(mode="json")}]
@@ -53,12 +53,12 @@ def _is_of(summary: dict[str, Any], system: System) -> bool:
 
 
 def calibrate_variant(family: Family, variant: Variant, runner: Runner) -> dict[str, CalibrationResult]:
-    """Find the pantographs' parameters that give each the wanted mean force, by ``component.parameter``.
+    """Find the parameters, by ``component.parameter``, with which each pantograph has the target mean force.
 
     Raises
     ------
     MasterError
-        If the family says nothing about calibration, or it does not succeed.
+        If the family has no calibration, or it does not succeed.
     """
     wanted = family.settings.calibration
     if wanted is None:

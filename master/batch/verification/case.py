@@ -1,4 +1,4 @@
-"""Case files: which scenarios are run, and the rows that are judged, as TOML."""
+"""Case files in TOML: which scenarios are run, and the rows that are judged."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from master.batch.verification.quantities import QUANTITIES, Choice
 from master.errors import Problem, RequestError, ScenarioError
 
-#: The cases that ship with the package, and the scenarios they name.
+#: The cases that come with the package, and the scenarios that they name.
 CASES: Final = Path(__file__).parent / "cases"
 SCENARIOS: Final = Path(__file__).parents[3] / "ssp_scenarios"
 _ONLY_RUN: Final = "run"
 
-#: must hold: a row that fails fails the verification. indicative: so it does, but its reference is said to be only
-#: indicative. report: printed, judged, never failing but outside its band.
+#: must hold: a row that fails fails the verification. indicative: likewise, though its source calls its data
+#: indicative. report: printed and judged, but fails only outside its band.
 Kind = Literal["must hold", "indicative", "report"]
 
 
@@ -35,11 +35,11 @@ class Run(_Data):
     Attributes
     ----------
     scenario : str
-        Name of one that ships, or the path of one, relative to the case file, ending in ``.ssp``.
+        Name of one in the library, or a path ending in ``.ssp``, relative to the case file.
     start_only : bool
-        Whether its first instant is enough (static figures).
+        Whether the first instant suffices (static figures).
     set : dict of str to float
-        Parameters of components that are given other values, as with ``--set``: "catenary.contact.stiffness".
+        Values of parameters to change, as with ``--set``: "catenary.contact.stiffness".
     """
 
     scenario: str = Field(min_length=1)
@@ -53,16 +53,16 @@ class Run(_Data):
 
 
 class Row(_Data):
-    """A quantity of a run, and what it is held against: a value, a range, a verdict or other runs.
+    """A quantity of a run and its reference: a value, a range, a verdict or other runs.
 
     Attributes
     ----------
     quantity : str
         Key of `QUANTITIES`.
     title : str
-        Printed instead of the quantity's own title.
+        Printed instead of the title of the quantity.
     run : str
-        Which run; may be left out where there is only one.
+        Which run; may be omitted if there is only one.
     contact, at, within
         See `Choice`.
     value : tuple of float
@@ -73,18 +73,18 @@ class Row(_Data):
     minimum, maximum : float
         A single limit.
     truth : bool
-        Wanted verdict (in the file: ``is``).
+        Expected verdict (in the file: ``is``).
     below, above : tuple of str
-        Runs whose values this one's has to lie below (above).
+        Runs below (above) whose values this one must lie.
     tolerance, tolerance_percent : float
         How far off a value may be, or beyond the nearer limit, in the quantity's unit or in percent of it.
     source : str
         Where the reference comes from.
     band : (float, float)
-        What readings of the source's data span that nobody has tuned: how little agreement alone proves. A figure
-        outside fails, of whatever kind the row is.
+        Range of the figure over untuned readings of the source's data: a wide one shows how little agreement alone
+        proves. A figure outside fails, whatever the kind of the row.
     recalled : bool
-        Whether the reference is recalled from texts, not read where it was published.
+        Whether the reference is known from secondary texts, not read where it was published.
     kind : Kind
     """
 
@@ -110,17 +110,17 @@ class Row(_Data):
 
     @property
     def choice(self) -> Choice:
-        """What the row says about its quantity."""
+        """How the quantity is to be measured."""
         return Choice(self.contact, self.at, math.inf if self.within is None else self.within)
 
     @property
     def others(self) -> tuple[str, ...]:
-        """Runs that the row compares its own with."""
+        """The runs with which the row compares its own."""
         return self.below + self.above
 
     @property
     def references(self) -> tuple[str, ...]:
-        """Names, as written in a file, of the references that are given."""
+        """Names of the references that are given, as written in a file."""
         given: dict[str, Any] = {
             "value": self.value,
             "range": self.range,
@@ -160,9 +160,10 @@ class Row(_Data):
         given = {"at": bool(self.at), "within": self.within is not None}
         for name, has in given.items():
             if has != (name in needs):
-                yield f"quantity '{self.quantity}' {'needs' if not has else 'knows no'} '{name}'"
+                yield f"quantity '{self.quantity}' {'needs' if not has else 'does not take'} '{name}'"
         if is_verdict != (self.truth is not None):
-            yield f"quantity '{self.quantity}' is {'a verdict: it takes only' if is_verdict else 'no verdict: no'} 'is'"
+            what = "a verdict: it takes only" if is_verdict else "not a verdict: it does not take"
+            yield f"quantity '{self.quantity}' is {what} 'is'"
         if self.quantity == "uplift_at" and self.others:
             yield "'uplift_at' has a value per support and cannot be compared with other runs; use 'uplift'"
 
@@ -178,7 +179,7 @@ class Row(_Data):
     def _tolerance_problems(self) -> Iterator[str]:
         given = [t for t in (self.tolerance, self.tolerance_percent) if t is not None]
         if len(given) > 1:
-            yield "tolerance and tolerance_percent exclude each other"
+            yield "only one of tolerance and tolerance_percent may be given"
         if self.value is not None and not given:
             yield "a value needs a tolerance or a tolerance_percent"
         if given and (self.others or self.truth is not None):
@@ -196,7 +197,7 @@ class _CaseData(_Data):
 
 @dataclass(frozen=True)
 class Case:
-    """A case as its file has it.
+    """A case, as read from its file.
 
     Attributes
     ----------
@@ -221,23 +222,23 @@ class Case:
     rows: tuple[Row, ...]
 
     def scenario_path(self, run: str) -> Path:
-        """Return where the scenario of a run lies."""
+        """Return the path of the scenario of a run."""
         scenario = self.runs[run].scenario
         return self.path.parent / scenario if scenario.endswith(".ssp") else SCENARIOS / f"{scenario}.ssp"
 
 
 def find_cases(names: Iterable[str]) -> tuple[Path, ...]:
-    """Return the files of the named cases, of all that ship if none is named.
+    """Return the files of the named cases, or of all cases in the library if none is named.
 
     Parameters
     ----------
     names : iterable of str
-        Names of cases that ship, or paths of case files.
+        Names of cases in the library, or paths of case files.
 
     Raises
     ------
     RequestError
-        Naming the nearest case, if there is none of a name.
+        If a name is unknown, with the nearest one that is known.
     """
     known = {path.stem: path for path in sorted(CASES.glob("*.toml"))}
     return tuple(dict.fromkeys(_find(name, known) for name in names)) or tuple(known.values())
@@ -299,7 +300,7 @@ def _run_problems(data: _CaseData) -> Iterator[str]:
         yield "either 'scenario' or 'runs' is needed, not both"
         return
     if not data.rows:
-        yield "rows: there is none; each begins with [[rows]]"
+        yield "rows: there are none; each begins with [[rows]]"
     for number, row in enumerate(data.rows, 1):
         if not row.run and len(data.runs) > 1:
             yield f"rows[{number}].run: is missing; the runs are {', '.join(data.runs)}"

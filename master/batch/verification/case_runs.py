@@ -1,4 +1,4 @@
-"""The runs that cases need: each made once within a verification, told apart by content, never kept beyond it."""
+"""The runs that cases need: each is made once per verification, identified by content, and never reused later."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from master.results.run_results import Results
 from master.scenario.overrides import Overrides
 from master.system.components import System
 
-#: Folder of the runs within the verification's folder.
+#: Subfolder of the runs.
 RUNS: Final = "runs"
 
 
 def content_key(system: System) -> str:
-    """Return a hash of all that a run's outcome depends on: FMUs, values, connections, times, settings."""
+    """Return a hash of everything on which a run depends: FMUs, values, connections, times and settings."""
     content = (
         [(c.name, c.fmu.sha256, sorted(c.parameters.items()), c.inputs, c.outputs) for c in system.components],
         [asdict(c) for c in system.connections],
@@ -30,12 +30,12 @@ def content_key(system: System) -> str:
 
 
 def first_instant(system: System) -> System:
-    """Return the system with a run of a single step: enough for static figures."""
+    """Return the system with a run of a single step, which suffices for static figures."""
     return replace(system, stop=system.start + system.step, may_stop_early=True)
 
 
 class _Wanted(NamedTuple):
-    """A run as a case asks for it: scenario, whether its first instant is enough, parameters and their values."""
+    """A run as a case requests it: scenario, whether the first instant suffices, and values of parameters."""
 
     path: Path
     start_only: bool
@@ -44,12 +44,12 @@ class _Wanted(NamedTuple):
 
 @dataclass
 class Runs:
-    """Makes runs and keeps them as long as the verification lasts.
+    """Makes runs and keeps their results while the verification lasts.
 
     Attributes
     ----------
     folder : Path
-        Where the runs' folders are put.
+        Holds the folders of the runs.
     runner : Runner
         Opens scenarios and makes the runs.
     """
@@ -61,12 +61,12 @@ class Runs:
     _names: set[str] = field(default_factory=set)
 
     def get(self, case: Case, name: str) -> Results:
-        """Return the results of a case's run, which is made unless one of the same content was.
+        """Return the results of a case's run, making it unless one of the same content was made.
 
         Raises
         ------
         MasterError
-            If it fails, and again whenever it is asked for.
+            If it fails, and again at every later request.
         InterruptedRunError
             If the user stops it.
         """
@@ -79,7 +79,7 @@ class Runs:
         return outcome
 
     def _make(self, wanted: _Wanted) -> str:
-        """Make a run, unless there is one, and return the key under which it is kept."""
+        """Make a run, unless there is one, and return the key of its results."""
         try:
             overrides = Overrides(parameters={name: f"{value:.17g}" for name, value in wanted.values})
             with self.runner.opened(wanted.path, overrides) as system:
@@ -103,7 +103,7 @@ class Runs:
         return key
 
     def _folder_of(self, name: str, key: str) -> Path:
-        """Return a folder of the run's own, with part of its key in the name if the name is taken."""
+        """Return a new folder for a run, with part of its key in the name if the name is taken."""
         own = f"{name}-{key[:8]}" if name in self._names else name
         self._names.add(own)
         return self.folder / own

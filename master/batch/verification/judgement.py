@@ -1,4 +1,4 @@
-"""The verdict on a row: a measured quantity against a value, a range, a wanted verdict or other runs."""
+"""The verdict on a row: a measured quantity against a value, a range, an expected verdict or other runs."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Verdict = Literal["holds", "near", "fails", "agrees", "departs"]
 Place = Literal["inside", "near", "outside"]
 FAILING: Final[Verdict] = "fails"
 _ORDER: Final = ("inside", "near", "outside")
-#: Share by which a figure may miss a limit for want of digits.
+#: Share by which a figure may miss a limit through rounding.
 _ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What one number is held against.
+    """The limits of one number.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Bounds:
         How far beyond the nearer limit a number may lie, in percent of that limit (``is_relative``) or absolute.
     is_relative : bool
     target : float, optional
-        The value wanted, where the limits are a tolerance around it.
+        The reference value, if the limits are a tolerance around it.
     is_open : bool
-        Whether the limits themselves are outside.
+        Whether the limits themselves do not belong to the range.
     """
 
     low: float
@@ -47,7 +47,7 @@ class Bounds:
     is_open: bool = False
 
     def place(self, value: float) -> Place:
-        """Say where a number lies."""
+        """Return where a number lies."""
         beyond = self.beyond(value)
         if not math.isfinite(value) or (self.is_open and value in (self.low, self.high)):
             return "outside"
@@ -62,7 +62,7 @@ class Bounds:
         return max(self.low - value, value - self.high, 0.0)
 
     def deviation(self, value: float) -> float | None:
-        """Return how far off a number is in percent of the value wanted, or of the nearer limit; None inside."""
+        """Return the deviation of a number in percent of the reference value, or of the nearer limit; None inside."""
         if self.target is not None:
             return 100.0 * (value - self.target) / abs(self.target) if self.target else None
         limit = self._nearer(value)
@@ -75,12 +75,12 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Judged:
-    """A row with its outcome.
+    """A row with its verdict.
 
     Attributes
     ----------
     row : Row
-        As the case has it.
+        As read from the case.
     title, unit, computed, reference : str
         As printed.
     measured : Measured, optional
@@ -91,7 +91,7 @@ class Judged:
     deviation : float, optional
         Of the worst number [%].
     remark : str
-        What else there is to say, such as why there is no number.
+        Further notes, such as why there is no number.
     """
 
     row: Row
@@ -122,7 +122,7 @@ def judge_row(row: Row, run: Callable[[str], Results]) -> Judged:
     Parameters
     ----------
     row : Row
-        What is asked.
+        Quantity and reference.
     run : callable
         Name of a run -> its results.
     """
@@ -136,7 +136,7 @@ def judge_row(row: Row, run: Callable[[str], Results]) -> Judged:
 
 
 def decide(row: Row, quantity: Quantity, measured: Measured, others: Mapping[str, float]) -> Judged:
-    """Judge a measured quantity; ``others`` are the values of the runs that the row compares with."""
+    """Judge a measured quantity; ``others`` holds the values of the runs with which the row compares."""
     bounds = bounds_of(row, len(measured.values), others)
     pairs = list(zip(measured.values, bounds, strict=True))
     place = max((b.place(v) for v, b in pairs), key=_ORDER.index)
@@ -157,12 +157,12 @@ def decide(row: Row, quantity: Quantity, measured: Measured, others: Mapping[str
 
 
 def stands_in_band(row: Row, values: Sequence[float]) -> bool:
-    """Return whether all numbers lie in what untuned readings span; anywhere does where no band is known."""
+    """Return whether all numbers lie in the band of untuned readings; true if no band is known."""
     return row.band is None or all(Bounds(*row.band).place(v) == "inside" for v in values)
 
 
 def verdict_of(row: Row, place: Place, in_band: bool = True) -> Verdict:
-    """Return the verdict from where the worst number lies; beyond its band a row fails, of whatever kind."""
+    """Return the verdict from where the worst number lies; outside its band a row of any kind fails."""
     if not in_band:
         return FAILING
     if row.kind == "report":
@@ -172,7 +172,7 @@ def verdict_of(row: Row, place: Place, in_band: bool = True) -> Verdict:
 
 
 def bounds_of(row: Row, count: int, others: Mapping[str, float]) -> tuple[Bounds, ...]:
-    """Return what each of ``count`` numbers is held against."""
+    """Return the limits of each of ``count`` numbers."""
     if row.value is not None:
         values = row.value if len(row.value) == count else row.value * count
         return tuple(_around(v, row) for v in values)
@@ -190,7 +190,7 @@ def bounds_of(row: Row, count: int, others: Mapping[str, float]) -> tuple[Bounds
 
 
 def reference_text(row: Row, quantity: Quantity, others: Mapping[str, float] | None = None) -> str:
-    """Return what a row is held against, as printed; without ``others`` the other runs' names stand for values."""
+    """Return the reference of a row as printed, with the names of other runs where ``others`` has no values."""
     unit = f" {quantity.unit}" if quantity.unit else ""
     if row.truth is not None:
         return quantity.show(float(row.truth))
@@ -222,7 +222,7 @@ def _around(value: float, row: Row) -> Bounds:
 
 
 def _worst(deviations: Sequence[float | None]) -> tuple[float | None, int]:
-    """Return the largest deviation in magnitude and which number has it."""
+    """Return the deviation of largest magnitude and the index of its number."""
     known = [(abs(d), i) for i, d in enumerate(deviations) if d is not None]
     if not known:
         return None, 0
@@ -235,13 +235,13 @@ def _where(measured: Measured, index: int) -> str:
 
 
 def _notes(row: Row, quantity: Quantity, measured: Measured) -> Iterator[str]:
-    """Yield what there is to know beside the verdict: that a reference is recalled, the band, what the filter moves."""
+    """Yield notes to the verdict: whether the reference is recalled, the band, and the figures of other filters."""
     if row.recalled:
         yield "reference recalled, not read"
     if row.band is not None:
         out = "" if stands_in_band(row, measured.values) else "outside the band: "
         yield f"{out}untuned readings span {row.band[0]:g} to {row.band[1]:g} {quantity.unit}".rstrip()
-    if measured.others and (row.recalled or measured.is_told):
+    if measured.others and (row.recalled or measured.depends_on_filter):
         yield "with other filters " + ", ".join(f"{quantity.show(v)} ({name})" for name, v in measured.others)
 
 

@@ -1,4 +1,4 @@
-"""What a row of a case can ask of a run: named quantities, in the unit in which they are printed."""
+"""The quantities that a row of a case can name, each measured in the unit in which it is printed."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _WAVE_SPEED: Final = "contact_wire.wave_speed"
 
 
 class MissingQuantityError(MasterError):
-    """A run that does not have what a row asks for."""
+    """A run that lacks the quantity that a row names."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a row says about its quantity.
+    """Where a quantity is to be measured.
 
     Attributes
     ----------
@@ -47,16 +47,16 @@ class Choice:
 
 @dataclass(frozen=True)
 class Measured:
-    """A quantity's value in a run, or several with a label each, and a remark.
+    """The value of a quantity in a run, or several with a label each, and a remark.
 
-    ``others`` are what other filters would give, by their names, where the quantity depends on the filter.
+    ``others`` holds the values with other filters, by their names, if the quantity can depend on the filter.
     """
 
     values: tuple[float, ...]
     labels: tuple[str, ...] = ()
     remark: str = ""
     others: tuple[tuple[str, float], ...] = ()
-    is_told: bool = False
+    depends_on_filter: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ class Quantity:
     measure : callable
         Run and choice -> value in ``unit``.
     needs : tuple of str
-        What a row has to say: ``at``, ``within``.
+        Keys that a row must give: ``at``, ``within``.
     is_verdict : bool
-        Whether it is true or false: 1 or 0.
+        Whether it is true or false, as 1 or 0.
     """
 
     title: str
@@ -103,19 +103,19 @@ def _figure(get: Callable[[Quality], float | None], scale: float = 1.0) -> Calla
     def measure(results: Results, choice: Choice) -> Measured:
         value = get(assessment(results, choice).quality)
         if value is None:
-            raise MissingQuantityError("the run does not record what this figure needs")
+            raise MissingQuantityError("the run does not record what this figure requires")
         return Measured((scale * value,))
 
     return measure
 
 
 def _filtered(get: Callable[[Filtered | Quality], float]) -> Callable[[Results, Choice], Measured]:
-    """Return how to measure a figure that depends on the filter: with what the others would give."""
+    """Return how to measure a figure that can depend on the filter, together with its values for other filters."""
 
     def measure(results: Results, choice: Choice) -> Measured:
         quality = assessment(results, choice).quality
         others = tuple((o.filter, get(o)) for o in quality.others)
-        return Measured((get(quality),), others=others, is_told=bool(quality.filter_dependent))
+        return Measured((get(quality),), others=others, depends_on_filter=bool(quality.filter_dependent))
 
     return measure
 
@@ -138,7 +138,7 @@ def _uplifts(results: Results, choice: Choice) -> tuple[Uplift, ...]:
 
 
 def _largest_uplift(results: Results, choice: Choice) -> Measured:
-    """Largest uplift at the supports of the interval of interest."""
+    """Return the largest uplift at the supports in the interval of interest."""
     found = assessment(results, choice)
     if found.uplift is None:
         raise MissingQuantityError("there is no support in the interval of interest whose uplift is recorded")
@@ -147,7 +147,7 @@ def _largest_uplift(results: Results, choice: Choice) -> Measured:
 
 
 def _slack(results: Results, choice: Choice) -> Measured:
-    """Share of the interval's droppers that go slack as the pantograph passes, as the run's table has it."""
+    """Return the share of droppers in the interval that go slack as the pantograph passes, as in the run's table."""
     share = assessment(results, choice).slack
     if share is None:
         raise MissingQuantityError("the run records no dropper forces in the interval of interest")
@@ -155,14 +155,14 @@ def _slack(results: Results, choice: Choice) -> Measured:
 
 
 def _uplift_at(results: Results, choice: Choice) -> Measured:
-    """Uplift of every support that the row names."""
+    """Return the uplift of every support that the row names."""
     uplifts = _uplifts(results, choice)
     values = tuple(1e3 * _nearest(uplifts, x).maximum for x in choice.at)
     return Measured(values, tuple(f"{x:g} m" for x in choice.at))
 
 
 def _uplift_spread(results: Results, choice: Choice) -> Measured:
-    """Largest minus smallest uplift of the named supports, in percent of their mean."""
+    """Return the largest minus the smallest uplift of the named supports, in percent of their mean."""
     values = np.array(_uplift_at(results, choice).values)
     return Measured((100.0 * float(np.ptp(values)) / float(values.mean()),))
 
@@ -175,12 +175,12 @@ def _nearest(uplifts: Sequence[Uplift], x: float) -> Uplift:
 
 
 def _slack_share(results: Results, choice: Choice) -> Measured:
-    """Share of the interval's droppers that go slack while the pantograph is near them."""
+    """Return the share of droppers in the interval that go slack while the pantograph is near them."""
     found = assessment(results, choice)
     contact = found.contact
     geometry = results.geometry.get(contact.catenary, {})
-    told = slackness(results.recordings)
-    droppers = [s for s in told if s.component == contact.catenary and s.name.startswith("dropper")]
+    recorded = slackness(results.recordings)
+    droppers = [s for s in recorded if s.component == contact.catenary and s.name.startswith("dropper")]
     if not droppers:
         raise MissingQuantityError("the run records no dropper forces")
     whole = results.recordings[0]
@@ -200,24 +200,24 @@ def _slack_share(results: Results, choice: Choice) -> Measured:
 def _wave_speed(results: Results, choice: Choice) -> Measured:
     found = [values[_WAVE_SPEED] for values in results.geometry.values() if _WAVE_SPEED in values]
     if not found:
-        raise MissingQuantityError(f"no component tells '{_WAVE_SPEED}'")
+        raise MissingQuantityError(f"no component reports '{_WAVE_SPEED}'")
     return Measured((3.6 * found[0],))
 
 
 def _elasticity(name: str) -> Callable[[Results, Choice], Measured]:
-    """Return what reads a static elasticity of the line [mm/N]."""
+    """Return how to read a static elasticity of the line [mm/N]."""
 
     def measure(results: Results, choice: Choice) -> Measured:
         found = [values[name] for values in results.geometry.values() if name in values]
         if not found:
-            raise MissingQuantityError(f"no component tells '{name}'")
+            raise MissingQuantityError(f"no component reports '{name}'")
         return Measured((1e3 * found[0],))
 
     return measure
 
 
 def _dropper_length_range(results: Results, choice: Choice) -> Measured:
-    """Longest less shortest unstressed length of the droppers in the interval of interest."""
+    """Return the longest minus the shortest unstressed length of the droppers in the interval of interest."""
     lengths = np.concatenate([
         indexed(values, "dropper", "length")[interval_mask(indexed(values, "dropper", "x"), *results.interval)]
         for values in results.geometry.values()

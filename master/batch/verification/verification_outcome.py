@@ -1,4 +1,4 @@
-"""What a verification has found: rows by case, and the runs behind them."""
+"""The results of a verification: judged rows by case, and the runs behind them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from master.batch.verification.judgement import Judged, Verdict, judge_row
 from master.errors import InterruptedRunError, MasterError
 from master.results.run_results import Results
 
-#: Version of ``verify.json``; 1 says none.
+#: Version of ``verify.json``; a file without one is of version 1.
 FORMAT: Final = 2
-#: Verdicts in the order in which they are counted up, with the words for several rows.
+#: Verdicts in the order in which they are counted, with the words for several rows.
 WORDS: Final[Mapping[Verdict, str]] = {
     "holds": "hold",
     "near": "near",
@@ -28,7 +28,7 @@ WORDS: Final[Mapping[Verdict, str]] = {
 
 @dataclass(frozen=True)
 class CaseOutcome:
-    """A case with its rows judged.
+    """A case with its judged rows.
 
     Attributes
     ----------
@@ -36,9 +36,9 @@ class CaseOutcome:
     rows : tuple of Judged
         In the order of the case file.
     runs : dict
-        Results by the case's own names of its runs; those that failed are not there.
+        Results by the names that the case gives its runs, without those that failed.
     failures : dict
-        Why runs failed, by name.
+        Reasons why runs failed, by name.
     """
 
     case: Case
@@ -48,23 +48,23 @@ class CaseOutcome:
 
     @property
     def failing(self) -> tuple[Judged, ...]:
-        """Rows that were meant to hold and fail."""
+        """The rows that fail."""
         return tuple(r for r in self.rows if r.fails)
 
     @property
     def passed(self) -> bool:
-        """Whether every row that is meant to hold does, and every run was made."""
+        """Whether no row fails and every run was made."""
         return not self.failing and not self.failures
 
 
 @dataclass(frozen=True)
 class Verification(BatchState):
-    """All cases so far.
+    """The state of a verification.
 
     Attributes
     ----------
     wanted : int
-        Number of cases asked for.
+        Number of cases requested.
     cases : tuple of CaseOutcome
         The finished ones.
     """
@@ -74,12 +74,12 @@ class Verification(BatchState):
 
     @property
     def passed(self) -> bool:
-        """Whether all cases are there and pass."""
+        """Whether all cases are finished and pass."""
         return self.status == "complete" and all(c.passed for c in self.cases)
 
     @property
     def sentence(self) -> str:
-        """Say in one line how it stands."""
+        """The state in one line."""
         counted = count_verdicts(self.cases)
         unfinished = "" if self.status == "complete" else f"{self.status}: {len(self.cases)} of {self.wanted} cases; "
         failed = sum(len(c.failures) for c in self.cases)
@@ -91,7 +91,7 @@ class Verification(BatchState):
 
 
 def judge_case(case: Case, runs: Runs) -> CaseOutcome:
-    """Make the runs that a case needs and judge its rows.
+    """Make the runs of a case and judge its rows.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def judge_case(case: Case, runs: Runs) -> CaseOutcome:
 
 
 def count_verdicts(cases: tuple[CaseOutcome, ...]) -> str:
-    """Return how many rows have which verdict, in words."""
+    """Return in words how many rows have which verdict."""
     counts = Counter(row.verdict for c in cases for row in c.rows)
     total = sum(counts.values())
     shown = [f"{counts[v]} {words}" for v, words in WORDS.items() if counts[v]]
@@ -126,7 +126,7 @@ def count_verdicts(cases: tuple[CaseOutcome, ...]) -> str:
 
 
 def as_data(verification: Verification) -> dict[str, Any]:
-    """Return a verification as plain data for JSON."""
+    """Return the contents of ``verify.json``."""
     return {
         "format": FORMAT,
         "date": verification.date,

@@ -1,4 +1,4 @@
-"""A verification as a page: one HTML file that needs nothing else."""
+"""The page of a verification: a single HTML file that needs no other."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from master.report.charts.force_charts import force_charts
 from master.report.html_markup import text
 from master.results.run_results import Results
 
-#: Classes of the verdicts in the pages' style.
+#: Classes of the verdicts in the style sheet of the pages.
 _KINDS: Final[dict[Verdict, str]] = {
     "holds": "pass",
     "near": "near",
@@ -50,7 +50,7 @@ def page(verification: Verification) -> str:
 
 
 def _section(outcome: CaseOutcome, drawn: list[Chart]) -> Iterator[str]:
-    """Yield a case's part of the page: its rows, charts and provenance."""
+    """Yield the section of a case: its rows, charts and provenance."""
     case = outcome.case
     yield f"<h2 id='{text(case.name)}'>{text(f'{case.name}: {case.title}')}</h2>"
     if case.description:
@@ -102,7 +102,7 @@ def _row(judged: Judged, several: bool) -> str:
 
 
 def _details(judged: Judged) -> str:
-    """Return the single numbers of a row that has several."""
+    """Return the individual values of a row that has several."""
     measured = judged.measured
     if measured is None or len(measured.values) < 2:
         return ""
@@ -111,7 +111,7 @@ def _details(judged: Judged) -> str:
         for label, v, b in zip(measured.labels, measured.values, judged.bounds, strict=True)
     ]
     shown = html_markup.table(("at", "computed", "reference", "deviation"), rows)
-    return f"<details><summary>each of them</summary>{shown}</details>"
+    return f"<details><summary>individual values</summary>{shown}</details>"
 
 
 def _provenance(outcome: CaseOutcome) -> str:

@@ -1,4 +1,4 @@
-"""A verification: cases one after the other, and what is left of them on disk after each."""
+"""A verification: its cases are judged one after the other, and its files written after each."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
-from master.batch.batch_session import BatchFiles, work_off
+from master.batch.batch_session import BatchFiles, run_tasks
 from master.batch.verification.case import Case
 from master.batch.verification.case_runs import Runs
 from master.batch.verification.verification_outcome import CaseOutcome, Verification, as_data, judge_case
@@ -23,23 +23,23 @@ def verify(
     runs: Runs,
     show: Callable[[CaseOutcome], None] = lambda _: None,
 ) -> Verification:
-    """Run and judge cases; page and JSON in ``folder`` are written again after each.
+    """Run and judge cases; page and JSON file are written after each.
 
     Parameters
     ----------
     cases : sequence of Case
-        What is verified, in this order.
+        The cases, in this order.
     folder : Path
-        Made, or taken over if it is an earlier verification's.
+        Created, or taken over from an earlier verification.
     runs : Runs
         Makes the runs.
     show : callable
-        Called with every finished case.
+        Called with each finished case.
 
     Raises
     ------
     InterruptedRunError, KeyboardInterrupt
-        If the user stops it; the finished cases are in the page then.
+        If the user stops it; the page then has the finished cases.
     MasterError
         If the folder holds something else.
     """
@@ -49,4 +49,4 @@ def verify(
         show(judged)
         return state.with_case(judged)
 
-    return work_off(Verification(len(cases)), cases, finish, FILES, folder)
+    return run_tasks(Verification(len(cases)), cases, finish, FILES, folder)

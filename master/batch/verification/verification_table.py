@@ -1,11 +1,10 @@
-"""Cases on the terminal."""
+"""The tables of a verification for the terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Final
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -13,6 +12,7 @@ from rich.table import Table
 from master.batch.verification.case import Case
 from master.batch.verification.judgement import Judged, Verdict
 from master.batch.verification.verification_outcome import CaseOutcome, count_verdicts
+from master.report.result_tables import ruled_table
 
 _STYLES: Final[dict[Verdict, str]] = {
     "holds": "green",
@@ -26,7 +26,7 @@ _NUMBERS: Final = ("computed", "verdict")
 
 
 def show_case(console: Console, outcome: CaseOutcome) -> None:
-    """Print a case: its rows, and why runs failed."""
+    """Print a case: its rows, its filters, and why runs failed."""
     console.print(case_table(outcome, console.width))
     for line in filter_lines(outcome):
         console.print(line, style="dim", markup=False)
@@ -36,17 +36,9 @@ def show_case(console: Console, outcome: CaseOutcome) -> None:
 
 
 def case_table(outcome: CaseOutcome, width: int) -> Table:
-    """Return a case's rows as a table."""
-    title = escape(f"{outcome.case.name}: {outcome.case.title}")
-    table = Table(
-        title=title,
-        title_justify="left",
-        width=min(width, 120) - 1,
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-        caption=escape(count_verdicts((outcome,))),
-        caption_justify="left",
-    )
+    """Return the rows of a case as a table."""
+    title = f"{outcome.case.name}: {outcome.case.title}"
+    table = ruled_table(title, count_verdicts((outcome,)), min(width, 120))
     for head in _HEADS:
         table.add_column(head, no_wrap=head in _NUMBERS, justify="right" if head == "computed" else "left")
     several = len(outcome.case.runs) > 1
@@ -56,12 +48,12 @@ def case_table(outcome: CaseOutcome, width: int) -> Table:
 
 
 def filter_lines(outcome: CaseOutcome) -> list[str]:
-    """Return with what the forces of a case's runs were low-passed, if its rows ask for any."""
-    told = {name: run.evaluation.filter.sentence for name, run in outcome.runs.items() if run.signals}
-    sentences = dict.fromkeys(told.values())
+    """Return the filters that low-passed the forces of a case's runs, if they have any."""
+    filters = {name: run.evaluation.filter.sentence for name, run in outcome.runs.items() if run.signals}
+    sentences = dict.fromkeys(filters.values())
     if len(sentences) == 1:
         return [f"filter: {next(iter(sentences))}"]
-    return [f"filter of {name}: {sentence}" for name, sentence in told.items()]
+    return [f"filter of {name}: {sentence}" for name, sentence in filters.items()]
 
 
 def _cells(judged: Judged, several: bool) -> tuple[str, ...]:
@@ -78,7 +70,7 @@ def _cells(judged: Judged, several: bool) -> tuple[str, ...]:
 
 
 def verdict_text(judged: Judged) -> str:
-    """Return the verdict with how far off the figure is."""
+    """Return the verdict with the deviation of the figure."""
     word = judged.verdict.upper() if judged.fails else judged.verdict
     return f"{word} {percent(judged.deviation)}".rstrip()
 
@@ -95,9 +87,9 @@ def percent(value: float | None) -> str:
 
 
 def list_table(cases: Iterable[Case]) -> Table:
-    """Return the cases with what they run."""
+    """Return the cases with the scenarios that they run."""
     table = Table(title="Cases", title_justify="left")
-    for head in ("case", "what", "rows", "scenarios"):
+    for head in ("case", "subject", "rows", "scenarios"):
         table.add_column(head, overflow="fold", justify="right" if head == "rows" else "left")
     for case in cases:
         scenarios = "\n".join(dict.fromkeys(run.scenario for run in case.runs.values()))

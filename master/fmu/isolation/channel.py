@@ -1,8 +1,9 @@
 """Frames between master and child: a header, then numbers, text or raw bytes.
 
-Every frame is a header of two 32-bit numbers (what, argument) and the length of the rest, in bytes. What follows a
-request or an answer is laid out by the request alone, so the master knows the length of every answer but texts and
-serialised states beforehand and refuses others.
+Every frame is a header of two 32-bit numbers (what, argument) and the length of the rest, in bytes. The request alone
+determines the layout of what follows it and of its answer, so the master knows the length of every answer but texts and
+serialised states beforehand and refuses others. Frames are no array containers: making and reading one takes 37 us, a
+frame 1.6 us, and a step has two.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ TIMES: Final = struct.Struct("<dd")
 NUMBER: Final = 8
 #: Groups that a step can read: as many as the bits in its mask.
 MOST_PREFETCHED: Final = 64
-#: Time for which an awaited frame is looked out for before the process sleeps [s].
+#: Time for which an awaited frame is polled for before the process sleeps [s].
 _WATCHFUL: Final = 1e-4
 #: Longest text that is accepted from a child [bytes].
 LONGEST_TEXT: Final = 1 << 16
@@ -52,14 +53,14 @@ class Ask(IntEnum):
 
 
 class Answer(IntEnum):
-    """How it went; after a failure the rest of the frame is text."""
+    """The outcome of a request; after a failure the rest of the frame is text."""
 
     DONE = 0
     FAILED = 1
 
 
 class EndedError(Exception):
-    """The other side is gone."""
+    """The other side has gone."""
 
 
 class ProtocolError(Exception):
@@ -139,7 +140,7 @@ class Channel:
         return bytes(self._frame[HEADER.size : HEADER.size + length])
 
     def shut(self) -> None:
-        """Let nothing more come in, so that nobody waits for it; what has come is still there."""
+        """Stop receiving, so that nobody waits for more; what has arrived can still be read."""
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_RD)
 
@@ -148,7 +149,7 @@ class Channel:
         self._socket.close()
 
     def _watch(self) -> None:
-        """Look out for a frame for a moment before sleeping: to be woken takes longer than most answers do."""
+        """Poll for a frame for a moment before sleeping: waking up takes longer than most answers do."""
         end = perf_counter() + self._watchful
         while not self._poll.poll(0) and perf_counter() < end:
             pass

@@ -37,7 +37,7 @@ def main() -> None:
     """Serve the connection whose file descriptor is the first argument; the second is the master's process."""
     descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
     die_with(parent)
-    # Ctrl-C is meant for the master, which tells its children when it is done.
+    # Ctrl-C is meant for the master, which ends its children when it is done.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EndedError):
         Child(Channel(socket.socket(fileno=descriptor))).serve()
@@ -94,9 +94,9 @@ class Child:
                 raise EndedError
 
     def _load(self, _argument: int, length: int) -> bytes:
-        told = json.loads(self._channel.rest(length))
-        self._is_paced = told["paced"]
-        component = _component(told)
+        described = json.loads(self._channel.rest(length))
+        self._is_paced = described["paced"]
+        component = _component(described)
         self._instance = Instance(component)
         self._lay_out(len(component.inputs), len(component.outputs))
         self._instance.bind(self._inputs, self._outputs)
@@ -129,16 +129,16 @@ class Child:
         _, _, has_inputs, groups = STEP.unpack_from(self._channel.buffer, HEADER.size)
         if has_inputs:
             self._instance.write()
-        self._tell_values(groups)
+        self._send_values(groups)
 
     def _step(self, _argument: int, _length: int) -> None:
         time, step, has_inputs, groups = STEP.unpack_from(self._channel.buffer, HEADER.size)
         if has_inputs:
             self._instance.write()
         self._instance.step(time, step)
-        self._tell_values(groups)
+        self._send_values(groups)
 
-    def _tell_values(self, groups: int) -> None:
+    def _send_values(self, groups: int) -> None:
         self._instance.read()
         self._numbers[0] = self._instance.stepping_time
         rest = b""
@@ -186,7 +186,7 @@ class Child:
 def describe(component: Component, is_paced: bool) -> bytes:
     """Return what a child has to know to load a component."""
     fmu = component.fmu
-    told: dict[str, Any] = {
+    described: dict[str, Any] = {
         "name": component.name,
         "path": str(fmu.path.resolve()),
         "guid": fmu.guid,
@@ -198,14 +198,14 @@ def describe(component: Component, is_paced: bool) -> bytes:
         "tolerance": component.tolerance,
         "paced": is_paced,
     }
-    return json.dumps(told).encode()
+    return json.dumps(described).encode()
 
 
-def _component(told: dict[str, Any]) -> Component:
+def _component(described: dict[str, Any]) -> Component:
     variables = {
         name: Variable(name, reference, kind, "", "", "", None, None, None)
-        for name, reference, kind in told["variables"]
+        for name, reference, kind in described["variables"]
     }
-    fmu = Fmu(Path(told["path"]), told["guid"], told["identifier"], variables, True, "", "", True)
-    inputs, outputs = tuple(told["inputs"]), tuple(told["outputs"])
-    return Component(told["name"], fmu, told["parameters"], inputs, outputs, told["tolerance"])
+    fmu = Fmu(Path(described["path"]), described["guid"], described["identifier"], variables, True, "", "", True)
+    inputs, outputs = tuple(described["inputs"]), tuple(described["outputs"])
+    return Component(described["name"], fmu, described["parameters"], inputs, outputs, described["tolerance"])

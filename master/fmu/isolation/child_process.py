@@ -20,11 +20,11 @@ from master.errors import one_line
 from master.fmu.isolation.channel import Channel
 from master.safety.supervision import signal_text
 
-#: Seconds that a process has to be gone after its connection has ended.
+#: Seconds within which a process has to be gone after its connection has ended.
 _ENDING_SECONDS: Final = 5.0
-#: Seconds that a process has to end by itself once it was told to, or its connection was closed.
+#: Seconds that a process has to end by itself once it was asked to, or its connection was closed.
 _GRACE_SECONDS: Final = 2.0
-#: Variable of the environment that tells whose child a process is, whatever it has become since.
+#: Environment variable that says whose child a process is, whatever it has become since.
 _MARK: Final = "OPENPANTO_ISOLATED"
 #: What is kept of what an FMU prints: this many pieces of at most so many bytes.
 _PIECES: Final = 4
@@ -32,7 +32,7 @@ _PIECE: Final = 4096
 
 
 class Process:
-    """A child process with a connection to it, its own folder for temporary files, and an ear for what it prints.
+    """A child process with a connection to it, its own folder for temporary files, and a thread for what it prints.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Process:
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
-                # -P: the working folder is no place to import from.
+                # -P: nothing is imported from the working folder.
                 [sys.executable, "-P", "-m", "master.fmu.isolation", str(theirs.fileno()), str(os.getpid())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
@@ -56,7 +56,7 @@ class Process:
             )
         self.channel = Channel(ours)
         self._said: deque[bytes] = deque(maxlen=_PIECES)
-        # Someone has to read what an FMU prints, or it would stop when the pipe is full.
+        # What an FMU prints has to be read, or it would block when the pipe is full.
         self._listener = Thread(target=self._listen, args=(self._process.stdout,), daemon=True)
         self._listener.start()
         self._reaper = Thread(target=self._reap, daemon=True)
@@ -90,7 +90,7 @@ class Process:
         return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "TMPDIR": self._folder, _MARK: self._folder}
 
     def _reap(self) -> None:
-        """Await the process's end and end what it has left behind, which may keep the connection and the pipe open."""
+        """Wait for the process to end and end what it left behind, which may keep the connection and the pipe open."""
         self._process.wait()
         _end_group(self._process.pid)
         for left in marked_processes(self._folder):
@@ -117,7 +117,7 @@ def _end_group(group: int) -> None:
 
 
 def marked_processes(folder: str) -> Iterator[int]:
-    """Yield the processes that were started with a folder's mark, also in sessions of their own (on Linux)."""
+    """Yield the processes that were started with a folder's mark, also in other sessions (on Linux)."""
     mark = f"{_MARK}={folder}\0".encode()
     for path in Path("/proc").glob("[0-9]*/environ"):
         with suppress(OSError):

@@ -26,11 +26,11 @@ from master.fmu.isolation.channel import (
 )
 from master.fmu.isolation.child import describe
 from master.fmu.isolation.child_process import Process
-from master.safety.interruption import heeded_at_once, is_wished
+from master.safety.interruption import interruptible_at_once, is_stop_requested
 from master.system.components import Component
 
-#: Seconds that an FMU has to load, or to get through a phase of its initialisation: many times what the longest line
-#: takes, kernels compiled and all.
+#: Seconds that an FMU has to load, or to complete a phase of its initialisation: many times what the longest line
+#: takes, including the compilation of kernels.
 INIT_TIMEOUT: Final = 300.0
 #: Seconds that an FMU has to free itself when the run is over.
 _CLOSING_SECONDS: Final = 5.0
@@ -38,7 +38,7 @@ _CLOSING_SECONDS: Final = 5.0
 
 @dataclass(frozen=True)
 class _Owed:
-    """An answer that is awaited: what for, in words; the length of what it brings; whether that is the values."""
+    """An answer that is awaited: to which request, in words; its length in bytes; whether it holds the values."""
 
     doing: str
     size: int = 0
@@ -55,7 +55,7 @@ class Isolation:
     step_timeout : float, optional
         Seconds of wall time after which a step, or another call between steps, counts as an endless loop.
     is_paced : bool
-        Whether the run goes by the wall clock: then no child collects garbage while it steps.
+        Whether the run is paced by the wall clock: then no child collects garbage while it steps.
     init_timeout : float
         Seconds of wall time after which a call while loading or initialising counts as an endless loop.
     """
@@ -91,16 +91,16 @@ class IsolatedGroup:
         return self._period > 0 and step == self._last + self._period
 
     def note(self, step: int) -> None:
-        """Take note that it is read after a step."""
+        """Record that it is read after a step."""
         if step != self._last:
             self._last, self._period = step, step - self._last
 
 
 class IsolatedInstance:
-    """An FMU in a process of its own; a `Slave` with the order of calls, the texts and the figures of `Instance`.
+    """An FMU in a separate process; a `Slave` with the order of calls, the texts and the figures of `Instance`.
 
-    A step is one message there and one back: inputs go with it, and outputs and what is recorded come back with its
-    end. The answer is awaited when it is needed, so that scheme jacobi has its components step at the same time.
+    A step is one message each way: inputs travel with the request, outputs and recorded values with the answer. The
+    answer is awaited only when it is needed, so that with scheme jacobi the components step at the same time.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class IsolatedInstance:
     Raises
     ------
     SlaveError
-        As soon as an answer is awaited that says that the FMU failed, or that does not come.
+        When an awaited answer reports that the FMU failed, or does not arrive.
     """
 
     def __init__(self, component: Component, isolation: Isolation) -> None:
@@ -127,7 +127,7 @@ class IsolatedInstance:
         self.stepping_time = 0.0
         self._isolation = isolation
         self._groups: list[IsolatedGroup] = []
-        self._has_inputs = False  # whether inputs wait to go with the next message
+        self._has_inputs = False  # whether inputs wait for the next message
         self._is_fresh = False  # whether the numbers are the FMU's present ones
         self._fetched = 0  # groups among the numbers, a bit each
         self._steps = 0
@@ -142,7 +142,7 @@ class IsolatedInstance:
         try:
             self._process = Process()
         except OSError as error:
-            raise SlaveError(f"{self._who} cannot be given a process of its own ({error})") from error
+            raise SlaveError(f"{self._who} cannot be given a separate process ({error})") from error
         self._channel = self._process.channel
         self._limit(isolation.init_timeout, "--init-timeout")
         self._lay_out()
@@ -154,7 +154,7 @@ class IsolatedInstance:
 
     def group(self, names: Sequence[str]) -> IsolatedGroup:
         """Return a group for further variables, e.g. for recording."""
-        self._tell_inputs()
+        self._send_inputs()
         self._ask(_Owed("a request for variables"), Ask.GROUP, 0, json.dumps(list(names)).encode())
         group = IsolatedGroup(self, len(self._groups), names)
         self._groups.append(group)
@@ -170,13 +170,13 @@ class IsolatedInstance:
 
     def finish_initialisation(self) -> None:
         """Leave initialization mode; from here on no call may last longer than the step timeout."""
-        self._tell_inputs()
+        self._send_inputs()
         self._ask(_Owed("its initialization"), Ask.FINISH)
         self._is_fresh = False
         self._limit(self._isolation.step_timeout, "--step-timeout")
 
     def write(self) -> None:
-        """Take the bound inputs; the FMU is told them with the next message."""
+        """Take the bound inputs; the FMU receives them with the next message."""
         self._settle()
         self._request_inputs[:] = self._inputs
         self._has_inputs = True
@@ -190,7 +190,7 @@ class IsolatedInstance:
         self._outputs[:] = self._latest_outputs
 
     def step(self, time: float, step: float) -> None:
-        """Begin to advance from ``time`` to ``time + step``; the end is awaited when something is wanted of it."""
+        """Begin to advance from ``time`` to ``time + step``; the end is awaited when a result is needed."""
         self._settle()
         self._where = f" at t = {time:.6g} s"
         self._steps += 1
@@ -204,34 +204,34 @@ class IsolatedInstance:
         if self._is_fresh and self._fetched >> index & 1:
             values: FloatArray = self._latest[self._places(self._fetched)[index]]
             return values
-        self._tell_inputs()
+        self._send_inputs()
         size = NUMBER * len(self._groups[index].names)
         return np.frombuffer(self._ask(_Owed("reading its variables", size), Ask.READ, index), np.float64)
 
     def save(self) -> int:
         """Return a number that stands for the FMU's state; hand it back to `release`."""
-        self._tell_inputs()
+        self._send_inputs()
         return int.from_bytes(self._ask(_Owed("saving its state", NUMBER), Ask.SAVE), "little")
 
     def restore(self, state: int) -> None:
         """Return to a saved state."""
-        self._tell_inputs()
+        self._send_inputs()
         self._ask(_Owed("restoring its state"), Ask.RESTORE, state)
         self._is_fresh = False
 
     def release(self, state: int) -> None:
-        """Give up a saved state."""
+        """Free a saved state."""
         if not self._dead:
             self._ask(_Owed("freeing a state"), Ask.RELEASE, state)
 
     def serialise(self) -> bytes:
         """Return the state as bytes."""
-        self._tell_inputs()
+        self._send_inputs()
         return self._ask(_Owed("serialising its state", LONGEST_STATE, is_exact=False), Ask.SERIALISE)
 
     def deserialise(self, data: bytes) -> None:
         """Return to a state given as bytes."""
-        self._tell_inputs()
+        self._send_inputs()
         self._ask(_Owed("reading a state"), Ask.DESERIALISE, 0, data)
         self._is_fresh = False
 
@@ -255,13 +255,13 @@ class IsolatedInstance:
         Returns
         -------
         str
-            What went wrong, empty if nothing did: what was computed is not touched by how an FMU ends.
+            What went wrong, empty if nothing did: how an FMU ends does not affect what was computed.
         """
         if self._dead:
             self._process.end()
             return ""
         self._dead = True
-        if self._owed is not None and is_wished():  # nobody waits for what is not wanted any more
+        if self._owed is not None and is_stop_requested():  # the result is no longer wanted
             self._process.end(grace=0.0)
             return ""
         self._channel.limit(_CLOSING_SECONDS)
@@ -307,8 +307,8 @@ class IsolatedInstance:
             self._by_mask[groups] = places
         return self._by_mask[groups]
 
-    def _tell_inputs(self) -> None:
-        """Pass on inputs that wait, before something that they count for."""
+    def _send_inputs(self) -> None:
+        """Pass on waiting inputs before a call that depends on them."""
         self._settle()
         if self._has_inputs:
             self._exchange()
@@ -350,7 +350,7 @@ class IsolatedInstance:
         if owed is None:
             return b""
         try:
-            with heeded_at_once():
+            with interruptible_at_once():
                 length = self._receive(owed)
         except (EndedError, ProtocolError, TimeoutError) as error:
             raise self._lost(owed, error) from error
@@ -367,7 +367,7 @@ class IsolatedInstance:
         return b""
 
     def _receive(self, owed: _Owed) -> int:
-        """Receive an answer; returns the length of what it brings."""
+        """Receive an answer; return the length of what follows its header."""
         answer, _, length = self._channel.receive(max(owed.size, LONGEST_TEXT))
         self._owed = None
         if answer == Answer.FAILED:
@@ -377,7 +377,7 @@ class IsolatedInstance:
         return length
 
     def _lost(self, owed: _Owed, error: Exception) -> SlaveError:
-        """Return what has become of a child that gives no answer, or a wrong one; it is ended."""
+        """End a child that gives no answer, or a wrong one, and return what became of it."""
         self._dead, self._owed = True, None
         doing = f"{owed.doing}{self._where}"
         if isinstance(error, TimeoutError):

@@ -1,4 +1,4 @@
-"""Charts: each described once, as curves, bars and marks over axes with units, then drawn for a page or for a file.
+"""Charts: each is described once, as curves, bars and marks over axes with units, and drawn by two renderers.
 
-It imports results and their evaluation, and nothing of the pages.
+It may import what `report` may, and nothing of its pages.
 """

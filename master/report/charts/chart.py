@@ -1,14 +1,14 @@
-"""A chart as it is described, once: curves, bars, points and marks over two axes with units.
+"""The description of a chart: curves, bars, points and marks over two axes with units.
 
-Nothing here draws: `interactive_figure` makes of a chart what plotly.js shows on a page, `static_figure` what goes into
-a file. Curves differ in dash and width as well as in colour (the palette of Okabe and Ito, its blue lighter, so that it
-stands out on a dark page too), bars in hatching: charts survive a grey printer and colour-blind eyes.
+Nothing here draws: `interactive_figure` turns a chart into what plotly.js shows on a page, `static_figure` into a
+figure for a file. Curves differ in dash and width as well as in colour (the palette of Okabe and Ito, its blue lighter,
+so that it stands out on a dark page too), bars in hatching: charts survive a grey printer and colour-blind eyes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 
@@ -19,14 +19,10 @@ Dash = Literal["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"]
 
 COLOURS: Final = ("#1f80c4", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 DASHES: Final[tuple[Dash, ...]] = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-#: What stands behind the curves, marks of the line, limits.
+#: Colours of what lies behind the curves, of marks along the line, and of limits.
 GREY: Final = "#8a8f98"
 MARK: Final = "#6b7280"
 LIMIT: Final = "#b3261e"
-#: The interval of interest, its transparency, and that of its edges.
-INTERVAL: Final = "#e6b428"
-INTERVAL_OPACITY: Final = 0.16
-EDGE: Final = "#aa7800"
 
 
 @dataclass(frozen=True)
@@ -38,10 +34,10 @@ class Axis:
     name, unit : str
         The unit is empty for names and numbers of things.
     limits : (float, float), optional
-        What is shown at first; as much as there is, if None.
+        The range shown at first; that of the data if None.
     is_logarithmic : bool
     ticks : tuple of float
-        Where the numbers stand, if it is not left to the renderer.
+        Positions of the numbers; left to the renderer if empty.
     """
 
     name: str
@@ -71,9 +67,14 @@ def stroke(index: int, width: float = 1.8) -> Stroke:
     return Stroke(COLOURS[index % len(COLOURS)], dash, width)
 
 
+def fill(index: int) -> tuple[str, int]:
+    """Return colour and number of the hatching (0 to 5) of a chart's bars by their number, no two of 36 alike."""
+    return COLOURS[index % len(COLOURS)], (index + index // len(COLOURS)) % 6
+
+
 @dataclass(frozen=True)
 class Curve:
-    """A line through points; NaN interrupts it.
+    """A line through points, interrupted where they are NaN.
 
     Attributes
     ----------
@@ -84,9 +85,9 @@ class Curve:
     is_shown : bool
         Whether it is drawn at first; a page shows it when its name is clicked, a file leaves it out.
     is_whole : bool
-        Whether all points are drawn; else those that can be seen (`kept_samples`).
+        Whether all points are drawn, or only those that can be seen (`kept_samples`).
     most : int
-        How many points are drawn at most.
+        Largest number of points drawn, unless it is whole.
     """
 
     name: str
@@ -99,7 +100,7 @@ class Curve:
 
     @property
     def points(self) -> tuple[FloatArray, FloatArray]:
-        """What is drawn of x and y."""
+        """The points of x and y that are drawn."""
         if self.is_whole:
             return self.x, self.y
         kept = kept_samples(self.y, self.most)
@@ -117,11 +118,11 @@ class Bars:
     x : ndarray or tuple of str, shape (n,)
     y : ndarray, shape (n,)
     index : int
-        Number of colour and hatching.
+        Number of colour and hatching (`fill`).
     width : float, optional
         In units of the abscissa.
     words : tuple of str
-        What a page says when a bar is pointed at, instead of its numbers.
+        Text that a page shows when a bar is pointed at, instead of its numbers.
     """
 
     name: str
@@ -139,20 +140,21 @@ class Points:
     name: str
     x: FloatArray
     y: FloatArray
-    colour: str
     symbol: Literal["circle", "x", "triangle-up"]
+    colour: str = MARK
     size: float = 8.0
     words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Ticks:
-    """Upright strokes at places of the line, from the bottom up to a share of the chart's height."""
+    """Vertical strokes at positions along the line, from the bottom to a share of the chart's height."""
 
     name: str
     x: FloatArray
     share: float = 1.0
     dash: Dash = "solid"
+    colour: ClassVar = MARK
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,9 @@ class Band:
 
     start: float
     end: float
+    colour: ClassVar = "#e6b428"
+    edge: ClassVar = "#aa7800"
+    opacity: ClassVar = 0.16
 
 
 @dataclass(frozen=True)
@@ -173,7 +178,7 @@ class Level:
 
     @property
     def colour(self) -> str:
-        """Red for limits, grey for what is only pointed out."""
+        """Red for limits, grey for other marks."""
         return MARK if self.is_upright else LIMIT
 
 
@@ -194,11 +199,11 @@ class Chart:
     parts : tuple
         What is drawn, from the back to the front.
     note : str
-        What a reader must know.
+        What a reader needs to know.
     height : int
         Pixels.
     group : str
-        Charts of a page whose abscissas are moved together.
+        Charts of one group on a page are zoomed together along the abscissa.
     """
 
     key: str
@@ -212,5 +217,5 @@ class Chart:
 
 
 def gapped(x: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the points of a curve of separate upright strokes."""
+    """Return the points of a curve that consists of separate vertical strokes."""
     return np.repeat(x, 3), np.column_stack((low, high, np.full(len(x), np.nan))).ravel()

@@ -11,7 +11,7 @@ from master.arrays import FloatArray
 from master.evaluation.filters import stands_in
 from master.evaluation.line_geometry import indexed, period_of, slackness
 from master.recording.recording import Recording
-from master.report.charts.chart import COLOURS, MARK, Axis, Chart, Curve, Level, Part, Points, Stroke, gapped, stroke
+from master.report.charts.chart import COLOURS, Axis, Chart, Curve, Level, Part, Points, Stroke, gapped, stroke
 from master.report.charts.line_charts import interval_band
 from master.report.charts.uplift_charts import FEW_POINTS, IN_LAP, TIME
 from master.results.run_results import Results
@@ -46,7 +46,7 @@ def _dropper_charts(results: Results, recording: Recording, component: str, name
     forces = np.column_stack([recording[n] for n in names])
     slack = {f"{s.component}.{s.name}.force": 100.0 * float(np.mean(s.slack)) for s in slackness(results.recordings)}
     parts += _ranges(place, forces, np.array([slack[n] for n in names]))
-    note = "Bar: from least to greatest in the run; dot: at the start; cross: slack at some time (hover for its share)."
+    note = "Bar: minimum to maximum in the run; dot: at the start; cross: slack at some time (hover for its share)."
     inside = [i for i, p in enumerate(place) if stands_in(float(p), results.interval, period)]
     chosen = _middle(inside or list(range(len(names))))
     named = [(f"{place[i]:.1f}{' m' if is_placed else ''}", forces[:, i]) for i in chosen]
@@ -65,12 +65,12 @@ def _ranges(place: FloatArray, forces: FloatArray, share: FloatArray) -> list[Pa
     low, high = forces.min(axis=0), forces.max(axis=0)
     slack = share > 0.0
     parts: list[Part] = [
-        Curve("least to greatest", *gapped(place, low, high), Stroke(COLOURS[0], width=3.0), is_whole=True),
-        Points("at the start", place, forces[0], MARK, "circle", 5.0),
+        Curve("minimum to maximum", *gapped(place, low, high), Stroke(COLOURS[0], width=3.0), is_whole=True),
+        Points("at the start", place, forces[0], "circle", size=5.0),
     ]
     if slack.any():
         words = tuple(f"slack {s:.1f} % of the time" for s in share[slack])
-        parts.append(Points("slack", place[slack], low[slack], COLOURS[1], "x", words=words))
+        parts.append(Points("slack", place[slack], low[slack], "x", COLOURS[1], words=words))
     return parts
 
 
@@ -82,4 +82,4 @@ def _history_chart(component: str, time: FloatArray, named: Sequence[tuple[str, 
     )
     key, title = f"dropper_history_{component}", "History of the dropper forces"
     note = "Droppers in the middle of the interval of interest; click a name to hide or show it."
-    return Chart(key, title, TIME, _FORCE, (*curves, Level(0.0, "carries nothing")), note, 400)
+    return Chart(key, title, TIME, _FORCE, (*curves, Level(0.0, "no load")), note, 400)

@@ -1,4 +1,4 @@
-"""Charts of the contact force: over the track, its histogram and spectrum; where it acts on the strip and how high."""
+"""Charts of the contact: its force over the track, histogram and spectrum, its height and its place on the strip."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from master.report.charts.chart import GREY, Axis, Bars, Chart, Curve, Level, Pa
 from master.report.charts.line_charts import interval_band, line_marks
 from master.results.run_results import Results
 
-#: Abscissa of whatever is drawn where the contact is.
+#: Abscissa of charts over the position of the contact.
 TRACK: Final = Axis("track position of the contact", "m")
 FREQUENCY: Final = Axis("frequency", "Hz", (0.3, 100.0), True, (0.5, 1, 2, 5, 10, 20, 50, 100))
 DENSITY: Final = Axis("power spectral density", "N\u00b2/Hz", is_logarithmic=True)
@@ -34,7 +34,9 @@ def _force_chart(results: Results, s: Signals) -> Chart:
     note = f"Thin grey: as computed; thick: {s.filter.short}. Shaded: interval of interest. "
     note += "Dashed: supports; ticks at the bottom: droppers."
     if not np.isfinite(s.shown[0]):
-        note += f" The filtered force is drawn from {FILTER_REACH:g} s after the first contact on; before, it rings."
+        note += (
+            f" The filtered force is drawn from {FILTER_REACH:g} s after the first contact; the filter rings before."
+        )
     return Chart(
         key=f"force_{s.contact.catenary}_{s.contact.index}",
         title=f"Contact force, {s.contact.pantograph}",
@@ -155,7 +157,7 @@ def _median_span(results: Results, catenary: str) -> float | None:
 
 
 def lateral_histogram(signals: Sequence[Signals]) -> Chart | None:
-    """Return how the contact is spread over the strip, which is how the strip wears."""
+    """Return the distribution of the contact over the strip, and so of its wear."""
     bars = []
     for i, s in enumerate(signals):
         known = _known_lateral(s)
@@ -167,7 +169,7 @@ def lateral_histogram(signals: Sequence[Signals]) -> Chart | None:
     if not bars:
         return None
     x = Axis("contact on the strip, left positive", "mm")
-    note = "Interval of interest; the more even, the more evenly the strip wears."
+    note = "Interval of interest. An even distribution means even wear of the strip."
     return Chart("lateral", "Contact on the collector strip (wear)", x, SHARE, tuple(bars), note, 320)
 
 

@@ -1,4 +1,4 @@
-"""The line in charts: its static geometry, and the marks of supports, droppers and interval under other curves."""
+"""The line in charts: its static geometry, and marks of supports, droppers and interval under other curves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from master.evaluation.line_geometry import aligned, by_section, met
 from master.report.charts.chart import (
     DASHES,
     GREY,
-    MARK,
     Axis,
     Band,
     Chart,
@@ -113,7 +112,7 @@ def _elevation(s: _Section) -> list[Curve | Points]:
         Curve("messenger wire", *s.wire("upper.z", "messenger_wire.z"), Stroke(stroke(1).colour)),
     ]
     if not np.isnan(s.supports["z"]).all():
-        parts.append(Points("support", s.supports["x"], s.supports["z"], MARK, "triangle-up"))
+        parts.append(Points("support", s.supports["x"], s.supports["z"], "triangle-up"))
     return parts
 
 
@@ -121,5 +120,5 @@ def _plan(s: _Section) -> list[Curve | Points]:
     x, y = s.wire("lower.y", "y")
     return [
         Curve("contact wire", x, 1e3 * y, stroke(0)),
-        Points("support", s.supports["x"], 1e3 * s.supports["y"], MARK, "triangle-up"),
+        Points("support", s.supports["x"], 1e3 * s.supports["y"], "triangle-up"),
     ]

@@ -1,4 +1,4 @@
-"""What is shown of a run without a pantograph: its outputs, as a table and over time, those of one unit together."""
+"""The outputs of a run without a pantograph, as a table and over time; those of one unit share a chart."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from master.report.charts.chart import Axis, Chart, Curve, stroke
 from master.report.result_tables import plain_table
 from master.results.run_results import Results
 
-#: Curves in one chart, and rows of the table on a terminal.
+#: Largest number of curves in a chart, and of rows in the table on a terminal.
 _MOST_CURVES = 8
 _MOST_ROWS = 40
-#: Longest name of an output that the terminal's table shows whole.
+#: Longest name of an output that the table on a terminal shows in full.
 _LONGEST = 30
-HEADS = ("output", "start", "end", "least", "greatest", "mean")
+HEADS = ("output", "start", "end", "minimum", "maximum", "mean")
 
 
 def has_contacts(results: Results) -> bool:
-    """Whether the run is one of pantograph and line; if not, its outputs are what there is to show."""
+    """Return whether the run couples pantograph and line; if not, only its outputs can be shown."""
     return bool(results.contacts)
 
 
@@ -35,7 +35,7 @@ def output_rows(results: Results) -> list[tuple[str, ...]]:
 
 
 def outputs_table(results: Results) -> Table:
-    """Return the table for a terminal of 80 columns."""
+    """Return the table of outputs for a terminal 80 columns wide."""
     rows = [(_short(row[0]), *row[1:]) for row in output_rows(results)]
     table = plain_table(HEADS, rows[:_MOST_ROWS])
     more = len(rows) - _MOST_ROWS

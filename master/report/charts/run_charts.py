@@ -1,4 +1,4 @@
-"""Which charts a run has: those of its page, in its order, and those of its files."""
+"""The charts of a run: those of its page, in their order, and those of its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers for a page: decimated so that nothing that can be seen is lost, and packed."""
+"""Numbers for a page: decimated without visible loss, and packed."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from master.arrays import FloatArray, IntArray
 
-#: Points of a curve on a page: more than a screen or a sheet of paper has.
+#: Points of a curve: more than a screen or a sheet of paper resolves.
 MOST_POINTS: Final = 4000
 
 
 def kept_samples(values: FloatArray, most: int = MOST_POINTS) -> IntArray:
-    """Return the samples to draw, shape (m,), m <= ``most``: the least and the greatest of every stretch.
+    """Return the indices of the samples to draw, shape (m,), m <= ``most``: minimum and maximum of every stretch.
 
     Gaps (NaN) are kept as gaps: a stretch that begins with one keeps it.
 
@@ -23,7 +23,7 @@ def kept_samples(values: FloatArray, most: int = MOST_POINTS) -> IntArray:
     values : ndarray, shape (n,)
         A curve's ordinates at a constant step.
     most : int
-        Most samples to keep.
+        Largest number of samples to keep.
 
     Examples
     --------
@@ -50,19 +50,19 @@ def _extremes(values: FloatArray, stretch: IntArray) -> set[int]:
 
 
 def packed(values: FloatArray) -> dict[str, str]:
-    """Return numbers as plotly.js reads them, four bytes each.
+    """Return numbers in the form that plotly.js reads, four bytes each.
 
     Examples
     --------
     >>> packed(np.array([1.0]))
     {'dtype': 'f4', 'bdata': 'AACAPw=='}
     """
-    most = np.finfo("<f4").max  # what is beyond is drawn at the edge
+    most = np.finfo("<f4").max  # larger ones are drawn at the edge
     return {"dtype": "f4", "bdata": _base64(np.clip(values, -most, most).astype("<f4"))}
 
 
 def packed_integers(values: FloatArray, unit: float) -> str:
-    """Return numbers as multiples of ``unit`` in 16 bits, base64; those beyond are cut."""
+    """Return numbers as multiples of ``unit`` in 16 bits, base64; larger ones are clipped."""
     scaled = np.nan_to_num(np.round(np.asarray(values) / unit))
     return _base64(np.clip(scaled, -32768, 32767).astype("<i2"))
 

@@ -1,35 +1,20 @@
-"""Charts as Matplotlib draws them into a file, one below the other; nothing is written here."""
+"""The renderer for files: charts in a Matplotlib figure, one below the other. It writes nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import singledispatch
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from master.report.charts.chart import (
-    COLOURS,
-    INTERVAL,
-    INTERVAL_OPACITY,
-    MARK,
-    Axis,
-    Band,
-    Bars,
-    Chart,
-    Curve,
-    Dash,
-    Level,
-    Points,
-    Ticks,
-)
+from master.report.charts.chart import Axis, Band, Bars, Chart, Curve, Dash, Level, Points, Ticks, fill
 
 _WIDTH: Final = 9.0
-#: Pixels of a page that an inch of a file has.
+#: Pixels on a page that correspond to an inch in a file.
 _PIXELS: Final = 125.0
-#: Points that a legend has for its width, and needs for a row, a letter, and the line beside a name.
-_LEGEND_WIDTH, _LEGEND_ROW, _LETTER, _LINE = 590.0, 13.0, 4.6, 44.0
+#: Width available to a legend, and what a row, a letter and the line before a name need [points].
+_LEGEND_WIDTH, _LEGEND_ROW, _LETTER, _LINE = 610.0, 13.0, 3.8, 44.0
 _GRID: Final = "#e3e5e8"
 #: Curves are thinner on paper than on a screen.
 _THINNER: Final = 0.65
@@ -64,14 +49,14 @@ def _draw_chart(axes: Any, chart: Chart) -> None:
         _draw_bars(axes, each, number, len(bars))
     for part in chart.parts:
         if not isinstance(part, Bars):
-            _draw(part, axes)
+            _DRAWN[type(part)](axes, part)
     _scale(axes, "x", chart.x)
     _scale(axes, "y", chart.y)
     axes.set_title(chart.title, loc="left", fontsize=10, pad=6.0 + _LEGEND_ROW * _draw_legend(axes))
 
 
 def _draw_legend(axes: Any) -> int:
-    """Draw the legend above the axes, where there is more than one thing to tell apart, and return its rows."""
+    """Draw the legend above the axes if there is more than one name, and return its number of rows."""
     _, labels = axes.get_legend_handles_labels()
     if len(labels) < 2:
         return 0
@@ -91,38 +76,28 @@ def _scale(axes: Any, which: str, axis: Axis) -> None:
         axes.set(**{f"{which}lim": axis.limits})
 
 
-@singledispatch
-def _draw(part: object, axes: Any) -> None:
-    raise TypeError(f"cannot draw {part!r} on {axes}")
-
-
-@_draw.register
-def _(curve: Curve, axes: Any) -> None:
+def _draw_curve(axes: Any, curve: Curve) -> None:
     if curve.is_shown:
         style = {"color": curve.stroke.colour, "linestyle": _PATTERNS[curve.stroke.dash]}
         axes.plot(*curve.points, linewidth=_THINNER * curve.stroke.width, label=curve.name, **style)
 
 
-@_draw.register
-def _(points: Points, axes: Any) -> None:
+def _draw_points(axes: Any, points: Points) -> None:
     style = {"color": points.colour, "marker": _SYMBOLS[points.symbol], "markersize": _THINNER * points.size}
     axes.plot(points.x, points.y, linestyle="none", label=points.name, **style)
 
 
-@_draw.register
-def _(ticks: Ticks, axes: Any) -> None:
-    style = {"color": MARK, "linewidth": 0.6, "linestyle": _PATTERNS[ticks.dash], "label": ticks.name}
+def _draw_ticks(axes: Any, ticks: Ticks) -> None:
+    style = {"color": ticks.colour, "linewidth": 0.6, "linestyle": _PATTERNS[ticks.dash], "label": ticks.name}
     axes.vlines(ticks.x, 0.0, ticks.share, transform=axes.get_xaxis_transform(), **style)
 
 
-@_draw.register
-def _(band: Band, axes: Any) -> None:
-    look = {"alpha": 1.5 * INTERVAL_OPACITY, "linewidth": 0, "zorder": 0.5}
-    axes.axvspan(band.start, band.end, color=INTERVAL, label="interval of interest", **look)
+def _draw_band(axes: Any, band: Band) -> None:
+    look = {"color": band.colour, "alpha": 1.5 * band.opacity, "linewidth": 0, "zorder": 0.5}
+    axes.axvspan(band.start, band.end, label="interval of interest", **look)
 
 
-@_draw.register
-def _(level: Level, axes: Any) -> None:
+def _draw_level(axes: Any, level: Level) -> None:
     style = {"color": level.colour, "linewidth": 0.8, "linestyle": "--"}
     if level.is_upright:
         axes.axvline(level.at, **style)
@@ -134,13 +109,18 @@ def _(level: Level, axes: Any) -> None:
 
 
 def _draw_bars(axes: Any, bars: Bars, number: int, count: int) -> None:
-    """Draw bars that stand beside the others of the chart."""
+    """Draw one set of bars beside the others of the chart."""
     is_named = isinstance(bars.x, tuple)
     x = np.arange(float(len(bars.x))) if is_named else np.asarray(bars.x)
     gap = float(np.diff(np.unique(x)).min()) if len(np.unique(x)) > 1 else 1.0
     width = (bars.width or 0.9 * gap) / count
-    look = {"color": COLOURS[bars.index % len(COLOURS)], "hatch": _HATCHES[bars.index % len(_HATCHES)]}
-    places = x + (number - 0.5 * (count - 1)) * width
-    axes.bar(places, bars.y, width, label=bars.name, edgecolor="white", linewidth=0.3, **look)
+    colour, hatching = fill(bars.index)
+    look = {"color": colour, "hatch": _HATCHES[hatching], "edgecolor": "white", "linewidth": 0.3}
+    axes.bar(x + (number - 0.5 * (count - 1)) * width, bars.y, width, label=bars.name, **look)
     if is_named:
         axes.set_xticks(x, bars.x)
+
+
+_DRAWN: Final[dict[type, Callable[[Any, Any], None]]] = {
+    Curve: _draw_curve, Points: _draw_points, Ticks: _draw_ticks, Band: _draw_band, Level: _draw_level
+}  # fmt: skip

@@ -14,16 +14,16 @@ from master.report.charts.chart import Axis, Bars, Chart, Curve, Level, Part, st
 from master.report.charts.line_charts import interval_band
 from master.results.run_results import Results
 
-#: What is said of a place on a line that closes on itself.
+#: Added to the name of a position on a line that closes on itself.
 IN_LAP: Final = " in its lap"
 TIME: Final = Axis("time", "s")
-#: Points of one of many histories, and how many of them are shown at first.
+#: Points of a history among many, and how many histories are shown at first.
 FEW_POINTS: Final = 700
 _SHOWN: Final = 8
 
 
 def uplift_bars(results: Results) -> Chart | None:
-    """Return the largest uplift of every support, where it stands."""
+    """Return the largest uplift of every support at its position."""
     uplifts = results.uplifts
     if not uplifts:
         return None
@@ -51,7 +51,7 @@ def _place(u: Uplift) -> float:
 
 
 def support_axis(uplifts: Sequence[Uplift]) -> Axis:
-    """Return the axis that supports stand on: the track, or their numbers where no place is recorded."""
+    """Return the axis of supports: the track, or their numbers if no position is recorded."""
     if uplifts[0].x is None:
         return Axis("support number")
     return Axis(f"track position of the support{IN_LAP if uplifts[0].period else ''}", "m")

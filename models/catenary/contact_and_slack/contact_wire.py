@@ -271,14 +271,14 @@ def height_polynomials(nodes: IntArray, static: StaticState, angles: FloatArray)
         Of the static height [m].
     """
     pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
-    axes, length = frames(static.points[pairs[:, 0]], static.points[pairs[:, 1]])
+    axes, length = frames(static.shape.points[pairs[:, 0]], static.shape.points[pairs[:, 1]])
     rows = np.array([hermite_rows(axis, float(size)) for axis, size in zip(axes, length, strict=True)])
     local = static.displacement[element_dofs(pairs)].copy()
     # The static rotations count from a horizontal wire; the chord's own slope is in the reference height.
     local[:, [4, 10]] += axes[:, 0, 2, None]
     local[:, [5, 11]] -= axes[:, 0, 1, None]
     height = np.einsum("kij,kj->ki", rows, local)
-    z = static.points[pairs, 2]
+    z = static.shape.points[pairs, 2]
     height[:, 0] += z[:, 0]
     height[:, 1] += z[:, 1] - z[:, 0]
     turn = turns(angles)[np.repeat(pairs, 2, axis=1)]

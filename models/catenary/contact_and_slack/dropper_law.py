@@ -1,8 +1,9 @@
 """What droppers carry, taut and slack.
 
-A dropper pulls T = k e + c e', with e its elongation, where spring and damper go slack together, and T = k e where its
-spring does so alone. One that would push lacks f = max(0, -(1 - r) T) to that, with r its stiffness ratio in
-compression. Those forces f are unknowns of a step; here is what is linear.
+A dropper of elongation e that could push as well would pull T: the elastic force k e where the spring goes slack
+alone, and k e + c e' where its damper does so too. Within a step the rate e' is a1 times the change of the elongation
+plus what is known, so that T is linear in both cases. A slack dropper lacks f = max(0, -(1 - r) T) to that, with r its
+stiffness ratio in compression: the forces f are unknowns of the local problem.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
 from models.catenary.linear_motion.sparse_products import Product
+from models.catenary.shape.form_finding import StaticState
 from models.numerics.newmark import Newmark
 
 
@@ -20,50 +22,39 @@ class DropperLaw:
 
     Parameters
     ----------
+    static : StaticState
+    attached : ndarray, shape (n_attached,)
+        Which degrees of freedom of the nodes the attachments' displacements are.
+
+    Attributes
+    ----------
     B : sparse, shape (n_droppers, n_attached)
-        Rows of dropper elongation over the attachments' displacements.
+        Rows of dropper elongation over the attachments' displacements, which are in global axes.
     stiffness : ndarray, shape (n_droppers,)
         k [N/m].
-    alpha : float
-        c / k [s].
     unilateral : ndarray, shape (n_droppers,)
         1 - r.
     slack_delay : ndarray, shape (n_droppers,)
         c / k where spring and damper go slack together [s]; 0 where the spring does so alone.
-    elastic_force, force : ndarray, shape (n_droppers,)
-        At rest: k e, and what the dropper carries [N].
-
-    Attributes
-    ----------
-    B, stiffness, unilateral, slack_delay
-        The parameters.
     rest_compensation : ndarray, shape (n_droppers,)
         What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
     rest_load : ndarray, shape (n_attached,)
         What that does to the attachments [N].
     """
 
-    def __init__(
-        self,
-        B: sp.csr_matrix,
-        stiffness: FloatArray,
-        alpha: float,
-        unilateral: FloatArray,
-        slack_delay: FloatArray,
-        elastic_force: FloatArray,
-        force: FloatArray,
-    ) -> None:
-        self.B, self.stiffness = B, stiffness
-        self.unilateral, self.slack_delay = unilateral, slack_delay
-        self._elastic_at_rest = elastic_force
-        self.rest_compensation = force - elastic_force
-        self.rest_load = B.T @ self.rest_compensation
+    def __init__(self, static: StaticState, attached: IntArray) -> None:
+        droppers, alpha = static.droppers, static.shape.definition.damping.of("dropper").alpha
+        self.B, self.stiffness = droppers.rows[:, attached].tocsr(), droppers.stiffness
+        self.unilateral, self.slack_delay = 1.0 - droppers.compression_ratio, droppers.slack_delay
+        self._elastic_at_rest = static.elastic_force
+        self.rest_compensation = static.dropper_force - static.elastic_force
+        self.rest_load = self.B.T @ self.rest_compensation
         #: Elastic forces from the attachments' displacements; those of the dampers from velocities.
-        self._tighten = Product(sp.diags(stiffness) @ B)
-        self._damp = Product(alpha * sp.diags(stiffness) @ B)
+        self._tighten = Product(sp.diags(self.stiffness) @ self.B)
+        self._damp = Product(alpha * sp.diags(self.stiffness) @ self.B)
         self._pull = self._pulls()
         #: What each dropper pulls at.
-        self._stretch = [(row.indices, row.data) for row in B]
+        self._stretch = [(row.indices, row.data) for row in self.B]
 
     def spring_force(self, displacement: FloatArray) -> FloatArray:
         """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""

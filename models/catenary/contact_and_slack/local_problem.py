@@ -5,10 +5,9 @@ then a small problem in the forces alone [1]_: with T what droppers would pull i
 slack one must add to that, delta the penetrations and F the contact forces,
 
     T = T_free - A_dd f + A_dc F,          f = max(0, -(1 - r) T),
-    delta = delta_free - A_cc F + A_cd f,  F = law(delta, delta').
+    delta = delta_free - A_cc F + A_cd f,  F = law(delta, delta'),
 
-T is the elastic force, k e, where the spring goes slack alone, and k e + c e' where its damper does so too: within a
-step the rate is a1 times the change of the elongation, plus what is known, so that both are linear in f and F.
+with r the droppers' stiffness ratio in compression, and T as `dropper_law` has it.
 
 It is solved by Newton's method on these max-functions: each iteration is exact for its set of slack droppers and
 closed contacts, so it ends when the set repeats.

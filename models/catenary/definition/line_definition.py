@@ -31,8 +31,8 @@ SHORTEST_STEP = 1e-6
 class Wire:
     """A tensioned wire of round section.
 
-    The limits here and below are those of the things themselves, not of good design: beyond them a value was written
-    in another unit, or for another thing.
+    The limits here and below are physical ones, not those of good design: a value beyond them was written in the wrong
+    unit, or belongs to something else.
     """
 
     area: float = quantity("m2", "cross-section", positive=True, minimum=1e-6, maximum=1e-2)
@@ -43,7 +43,7 @@ class Wire:
 
     @property
     def EI(self) -> float:
-        """Bending stiffness: as given, or of a solid round section, I = A^2 / (4 pi)."""
+        """Return the bending stiffness as given, or that of a solid round section, I = A^2 / (4 pi)."""
         if self.bending_stiffness is not None:
             return self.bending_stiffness
         return self.youngs_modulus * self.area**2 / (4.0 * math.pi)
@@ -62,9 +62,9 @@ class StitchWire(Wire):
 class Dropper:
     """A dropper: carries tension only.
 
-    With k its stiffness, e its elongation and c = alpha k what its damping makes of that, ``slack_law`` says what it
-    carries: with "tension" N = max(0, k e + c e'), nothing where it is slack; with "elastic_only" N = max(0, k e), and
-    c e' beside it whether it is slack or not, as the 2012 thesis has it [2.11].
+    With the stiffness k, the elongation e and the damping c = alpha k, ``slack_law`` says what it carries: under
+    "tension" N = max(0, k e + c e'), nothing when it is slack; under "elastic_only" N = max(0, k e) plus c e' whether
+    it is slack or not, as in the 2012 thesis [2.11].
     """
 
     stiffness: float | None = quantity(
@@ -79,7 +79,7 @@ class Dropper:
     slack_law: SlackLaw = text(default="tension", choices=SLACK_LAWS)
 
     def problems(self) -> Iterator[tuple[str, str]]:
-        """Yield that nothing says how stiff it is."""
+        """Yield a problem if nothing gives the stiffness."""
         if self.stiffness is None and (self.area is None or self.youngs_modulus is None):
             yield "stiffness", "give either stiffness, or area and youngs_modulus"
 
@@ -112,7 +112,7 @@ class Clamps:
 
 @dataclass(frozen=True, kw_only=True)
 class MessengerSupport:
-    """Vertical spring-damper under the messenger wire at a support; rigid roller without it."""
+    """Vertical spring-damper under the messenger wire at a support; without it the support is a rigid roller."""
 
     stiffness: float = quantity("N/m", "vertical stiffness of a support", minimum=1e3, maximum=1e10)
     damping: float = quantity("N.s/m", "vertical damping of a support", default=0.0, minimum=0.0, maximum=1e6)
@@ -132,7 +132,7 @@ COMPONENTS = ("contact_wire", "messenger_wire", "stitch_wire", "auxiliary_wire",
 
 @dataclass(frozen=True, kw_only=True)
 class Damping(Rayleigh):
-    """Damping of the whole line, and of a component type where it has its own."""
+    """Damping of the whole line, and of the component types that have their own."""
 
     contact_wire: Rayleigh | None = part(Rayleigh, default=None)
     messenger_wire: Rayleigh | None = part(Rayleigh, default=None)
@@ -172,7 +172,7 @@ class Mesh:
 
 @dataclass(frozen=True, kw_only=True)
 class Dynamics:
-    """What of the line's motion about its static shape is computed."""
+    """How much of the motion about the static shape is computed."""
 
     highest_frequency: float = quantity(
         "Hz", "natural frequency above which modes of the wires between attachments are left out; 0: none are",
@@ -187,7 +187,7 @@ class Dynamics:
 
 @dataclass(frozen=True)
 class Span:
-    """A span: where it begins and ends, its droppers, and in a compound line the hangers of its auxiliary wire.
+    """A span: its ends, its droppers, and in a compound line the hangers of its auxiliary wire.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ class Span:
     droppers, hangers : tuple of float
         Positions along the track [m].
     dropper_lengths, hanger_lengths : tuple of float or empty
-        Given unstrained lengths [m]; empty where form finding is to find them.
+        Given unstrained lengths [m]; empty if form finding determines them.
     """
 
     start: float
@@ -208,7 +208,7 @@ class Span:
 
     @property
     def length(self) -> float:
-        """Distance between the supports [m]."""
+        """Return the distance between the supports [m]."""
         return self.end - self.start
 
 
@@ -228,7 +228,7 @@ class EndSpans:
     Attributes
     ----------
     anchors, working : (float, float)
-        Where the wires end, and where they leave the working height [m].
+        Positions at which the wires end, and at which they leave the working height [m].
     rises : (float, float)
         Height of the contact wire above its working height at the anchors [m].
     """
@@ -254,13 +254,13 @@ class Section:
     Attributes
     ----------
     supports : tuple of Support
-        From anchor to anchor; the first and last are the anchors of the wires. Of a periodic line all are supports, and
-        the one where it closes is the first.
+        From anchor to anchor; the first and last are the anchors of the wires. In a periodic line all are supports, and
+        the first is the one where it closes.
     spans : tuple of Span
     ends : EndSpans
         Where the wires rise to their anchors.
     measured : tuple of (x, z) or empty
-        Wanted heights of the contact wire instead of nominal height minus pre-sag.
+        Specified heights of the contact wire, in place of nominal height minus pre-sag.
     periodic : bool
         Whether the last span ends at the support where the first begins.
     """

@@ -53,7 +53,7 @@ def _check_stitch(table: Table, definition: CatenaryDefinition) -> None:
 
 
 def _check_stitch_length(table: Table, section: Section, length: float) -> None:
-    """Stitch wires must not meet, and must carry droppers on both sides of every support."""
+    """Check that stitch wires do not meet, and carry droppers on both sides of every support."""
     half = length / 2.0
     supports = [s.x for s in section.supports]
     if any(b - a <= length for a, b in pairwise(supports)):
@@ -70,7 +70,7 @@ def _check_stitch_length(table: Table, section: Section, length: float) -> None:
 
 
 def _any_between(x: Sequence[float], low: float, high: float) -> bool:
-    """Whether one of the values, in rising order, lies between two others."""
+    """Return whether one of the values, in rising order, lies between two others."""
     after = bisect_right(x, low)
     return after < len(x) and x[after] < high
 
@@ -84,7 +84,7 @@ def _check_auxiliary(table: Table, definition: CatenaryDefinition) -> None:
 
 
 def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:
-    """A line that closes on itself is one section of wires that something holds, and none of them crosses the seam."""
+    """Check that a periodic line is one section of wires that something holds, none of them across the seam."""
     if not any(section.periodic for section in definition.sections):
         return
     if len(definition.sections) > 1:
@@ -94,13 +94,13 @@ def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:
         text = "a periodic line needs a table [steady_arm]: it has no anchors, and nothing else holds the contact wire"
         table.problem("steady_arm", text)
     if definition.stitch_wire is not None:
-        text = "a periodic line cannot have stitch wires: that of its first support would lie across the place where it"
-        table.problem("stitch_wire", f"{text} closes; take type 'simple' or 'compound'")
+        text = "a periodic line cannot have stitch wires: the one at its first support would lie across the seam"
+        table.problem("stitch_wire", f"{text}; take type 'simple' or 'compound'")
 
 
 def _check_type(table: Table, definition: CatenaryDefinition) -> None:
     if definition.type not in LINE_TYPES:
-        return  # said already
+        return  # already reported
     stitched, compound = definition.type == "stitched", definition.type == "compound"
     if stitched != (definition.stitch_wire is not None):
         table.problem("stitch_wire", "a table [stitch_wire] is needed for type 'stitched', and only for it")

@@ -11,20 +11,20 @@ from itertools import pairwise
 from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
 from models.definition_files.toml_reader import Table
 
-#: Most spans of a section, droppers of a span and droppers of a section.
+#: Largest numbers of spans in a section, of droppers in a span and of droppers in a section.
 MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 
 
 @dataclass(frozen=True)
 class _Hung:
-    """Droppers or hangers of one span: offsets from its start, given lengths (or none) [m]."""
+    """Droppers or hangers of one span: offsets from its start, lengths if they are given [m]."""
 
     offsets: tuple[float, ...] = ()
     lengths: tuple[float, ...] = ()
 
 
 def read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
-    """Read the spans of a section, what hangs in them, its supports and its ends, or that it is a ring."""
+    """Read the spans of a section, their droppers, the supports, and the ends unless it is a ring."""
     spans_table = table.required_table("spans")
     boundaries = _read_boundaries(spans_table)
     droppers = _read_hung(spans_table, boundaries, "droppers", "listed")
@@ -113,7 +113,7 @@ def _read_listed(table: Table, count: int, list_name: str) -> dict[int, Table]:
 
 
 def _hung(table: Table, index: int, length: float) -> _Hung:
-    """Read positions and given lengths of a span's droppers; ``length`` is the span's, NaN if it has none [m]."""
+    """Read positions and given lengths of a span's droppers; ``length`` is that of the span, NaN if unknown [m]."""
     given = table.has("positions")
     offsets = table.quantities("positions", "m") if given else _dropper_rule(table, length)
     _check_droppers(table, index, length, offsets)
@@ -139,7 +139,7 @@ def _dropper_rule(table: Table, length: float) -> tuple[float, ...]:
 
 
 def _fitting_number(table: Table, length: float, first: float, spacing: float) -> int:
-    """Return how many droppers fill a span; that they do not fit is a problem and gives 0."""
+    """Return how many droppers fill a span; if they do not fit, report it and return 0."""
     gaps = (length - 2.0 * first) / spacing if spacing else math.nan
     if not math.isfinite(gaps):
         return 0
@@ -155,7 +155,7 @@ def _fitting_number(table: Table, length: float, first: float, spacing: float) -
 
 def _check_droppers(table: Table, index: int, length: float, offsets: Sequence[float]) -> None:
     if not (length > 0.0 and all(map(math.isfinite, offsets))):
-        return  # said already
+        return  # already reported
     key = "positions" if table.has("positions") else "first"
     outside = [f"{x:g}" for x in offsets if not 0.0 < x < length]
     if outside:
@@ -166,7 +166,7 @@ def _check_droppers(table: Table, index: int, length: float, offsets: Sequence[f
 
 @dataclass(frozen=True)
 class _End:
-    """One end of a section: unregistered spans, where the wires leave the working height, their rise from there [m]."""
+    """One end of a section: number of unregistered spans, where the wires leave the working height, their rise [m]."""
 
     free: int
     working: float
@@ -174,7 +174,7 @@ class _End:
 
 
 def _read_ends(table: Table, boundaries: Sequence[float]) -> tuple[tuple[int, int], EndSpans]:
-    """Return how many spans at each end are unregistered, and the wires' rise; an end may have a table of its own."""
+    """Return how many spans at each end are unregistered, and the wires' rise; each end may have its own table."""
     start = _read_end(table.table("start") or table, boundaries)
     end = _read_end(table.table("end") or table, boundaries[::-1])
     anchors = boundaries[0], boundaries[-1]
@@ -182,7 +182,7 @@ def _read_ends(table: Table, boundaries: Sequence[float]) -> tuple[tuple[int, in
 
 
 def _read_end(table: Table, boundaries: Sequence[float]) -> _End:
-    """Read one end; ``boundaries`` count from there."""
+    """Read one end; ``boundaries`` are in order from that end."""
     free = table.integer("spans", default=0, minimum=0, maximum=max(0, (len(boundaries) - 2) // 2))
     rise = table.quantity("rise", "m", default=0.0, minimum=0.0, maximum=5.0)
     working = boundaries[free]
@@ -194,14 +194,14 @@ def _read_end(table: Table, boundaries: Sequence[float]) -> _End:
 
 
 def _read_ring(table: Table, boundaries: Sequence[float], *, has_arms: bool) -> tuple[EndSpans, tuple[Support, ...]]:
-    """Return the ends, which a line that closes on itself has not, and its supports, the one where it closes once."""
+    """Return the ends of a periodic line, which have no rise, and its supports; the one at the seam is listed once."""
     if table.has("ends"):
-        table.problem("ends", "a periodic line has no ends: take this table away")
+        table.problem("ends", "a periodic line has no ends: remove this table")
         _read_ends(table.required_table("ends"), boundaries)
     inner, ends = boundaries[:-1], (boundaries[0], boundaries[-1])
     stagger = table.required_table("stagger")
     if stagger.has("anchor"):
-        stagger.problem("anchor", "a periodic line has no anchors: take this value away")
+        stagger.problem("anchor", "a periodic line has no anchors: remove this value")
         stagger.quantity("anchor", "m")
     if stagger.has("amplitude") and len(inner) % 2:
         text = f"changes sides at every support, and after {len(inner)} spans the line would close on the other side:"
@@ -213,7 +213,7 @@ def _read_ring(table: Table, boundaries: Sequence[float], *, has_arms: bool) -> 
 def _read_supports(
     table: Table, boundaries: Sequence[float], free: tuple[int, int], *, has_arms: bool
 ) -> tuple[Support, ...]:
-    """Supports with their stagger: alternating at registered supports, straight on to the anchors."""
+    """Return the supports with their stagger: alternating where registered, straight on to the anchors."""
     last = len(boundaries) - 1
     registered = [max(free[0], 1) <= i <= last - max(free[1], 1) for i in range(last + 1)]
     staggers = _read_stagger(table.required_table("stagger"), boundaries, registered)

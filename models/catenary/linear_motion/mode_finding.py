@@ -9,9 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import BoolArray, FloatArray, IntArray
-from models.catenary.linear_motion.interval_modes import IntervalBlocks, IntervalModes
+from models.catenary.linear_motion.interval_modes import IntervalBlocks, IntervalModes, slower_than
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.wire_intervals import Interval, turns, without_rounding
+from models.catenary.shape.form_finding import StaticState
+from models.catenary.shape.wire_intervals import Interval, plan_rotation, turns, without_rounding
 
 #: In-plane and out-of-plane degrees of freedom of a node, in axes along the wire.
 _PLANES = ((0, 2, 4), (1, 3, 5))
@@ -19,6 +20,34 @@ _PLANES = ((0, 2, 4), (1, 3, 5))
 _ENDS = 2 * NODE_DOFS
 #: Columns below this share of the largest are zeros but for the rounding of a turn.
 _ROUNDING = 1e-12
+
+
+def line_modes(static: StaticState, parts: Sequence[Interval], angles: FloatArray) -> IntervalModes:
+    """Return a line's coordinates and matrices about its static shape, droppers included.
+
+    Parameters
+    ----------
+    static : StaticState
+    parts : sequence of Interval
+        All intervals.
+    angles : ndarray, shape (n,)
+        Direction in plan of the nodal axes at inner nodes [rad].
+    """
+    shape, droppers, Q = static.shape, static.droppers, plan_rotation(angles)
+    matrices, definition, mesh = shape.matrices, shape.definition, shape.mesh
+    springs = droppers.rows.T @ sp.diags(droppers.stiffness) @ droppers.rows
+    damping = definition.damping
+    C = matrices.C + damping.of("dropper").alpha * springs
+    stiffness = matrices.K + springs
+    if definition.dynamics.geometric_stiffness:
+        # Not in C: alpha times it would be a damping that nothing has.
+        stiffness = stiffness + static.pendulum_stiffness()
+    K, M, C = ((Q.T @ matrix @ Q).tocsr() for matrix in (stiffness, matrices.M, C))
+    K, M, C = (without_rounding(m, np.sqrt(np.maximum(m.diagonal(), 0.0))) for m in (K, M, C))
+    rates = [(damping.of(part.component).alpha, damping.of(part.component).beta) for part in parts]
+    modes = interval_modes((K, M, C), parts, rates, angles, mesh.fixed.ravel(), mesh.owner)
+    highest = definition.dynamics.highest_frequency
+    return slower_than(modes, highest) if highest else modes
 
 
 def interval_modes(

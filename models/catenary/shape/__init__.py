@@ -1,1 +1,7 @@
-"""shape."""
+"""The line as designed, at rest: mesh, matrices and droppers about a set of points, and the points found for them.
+
+The static state keeps the `LineShape` that it was found with; rooms above take mesh, matrices and droppers from there
+and assemble nothing.
+
+May import `definition`, arrays and numerics.
+"""

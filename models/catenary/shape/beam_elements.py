@@ -1,7 +1,7 @@
 """Element matrices: 3D Euler-Bernoulli beam under tension, and bar [1]_.
 
-All functions work on arrays of elements. Degrees of freedom of a node: u, v, w, rx, ry, rz; of a beam: both
-nodes', 12 in all.
+All functions work on arrays of elements. The degrees of freedom of a node are u, v, w, rx, ry, rz; those of a beam are
+the 12 of its two nodes.
 
 References
 ----------
@@ -65,9 +65,9 @@ def beam_geometric_stiffness(tension: FloatArray, length: FloatArray) -> FloatAr
 
 
 def bar_geometric_stiffness(direction: FloatArray, tension: FloatArray, length: FloatArray) -> FloatArray:
-    """Return the stiffness N/L across bars under tension, by which they swing back as pendulums do.
+    """Return the stiffness N/L across bars under tension, the one that makes a pendulum swing back.
 
-    (N/L) [[P, -P], [-P, P]] on the translations of both ends, with P = I - e e' what is left of them across the bar.
+    (N/L) [[P, -P], [-P, P]] on the translations of both ends, with P = I - e e' the projection across the bar.
 
     Parameters
     ----------
@@ -147,8 +147,8 @@ def to_global(local: FloatArray, axes: FloatArray) -> FloatArray:
 def hermite_rows(axes: FloatArray, length: float) -> FloatArray:
     """Return the height of an element's axis as a polynomial of xi = 0 ... 1.
 
-    Row k holds what multiplies xi^k: height(xi) = [1, xi, xi^2, xi^3] @ rows @ d, with d the element's 12
-    global displacements [2.44].
+    Row k holds the factor of xi^k: height(xi) = [1, xi, xi^2, xi^3] @ rows @ d, with the 12 global displacements
+    d of the element [2.44].
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Static equilibrium and form finding.
 
-Either the wanted geometry is prescribed (the contact wire's height at every dropper, the auxiliary wire's at every
-hanger) and the droppers' lengths follow, or a dropper's unstrained length is given and the height follows. The
-unknowns are displacements and dropper forces. For given reference points this is one linear saddle-point system;
-the points are then moved to the solution and the system is solved again, until the deformed mesh is its reference.
+Either the geometry is specified (the height of the contact wire at every dropper, of the auxiliary wire at every
+hanger) and the lengths of the droppers follow, or the unstrained length of a dropper is given and the height follows.
+The unknowns are displacements and dropper forces. For given reference points this is one linear saddle-point system;
+the points are then moved to the solution and the system is solved again, until the deformed mesh is its own reference.
 """
 
 from __future__ import annotations
@@ -17,33 +17,25 @@ from scipy.sparse.linalg import splu
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.line_matrices import (
-    Matrices,
-    assemble,
-    axial_stiffness,
-    compression_ratio,
-    dropper_lengths,
-    dropper_rows,
-    dropper_stiffness,
-    pendulum_stiffness,
-    steady_arm_tension,
-)
+from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set
+from models.catenary.shape.line_matrices import Matrices, axial_stiffness, pendulum_stiffness, steady_arm_tension
 from models.catenary.shape.line_mesh import CatenaryMesh
+from models.catenary.shape.line_shape import LineShape, line_shape
 from models.catenary.shape.wire_intervals import attachments
 
-#: Form finding ends when no reference point moves by more than this [m].
+#: Form finding has converged when no reference point moves by more than this [m].
 _TOLERANCE = 1e-9
 _MAX_ITERATIONS = 30
-#: Given lengths: droppers are let slack only once the first guess of the shape, far from equilibrium, is left behind.
+#: Droppers of given length may go slack only after these iterations, as the first guess is far from equilibrium.
 _TAUT_ITERATIONS = 3
-#: A point that moves by more than this has no shape to settle to [m]; numbers would overflow soon.
+#: A point that moves by more than this diverges [m]; the numbers would soon overflow.
 _LOST = 1e5
-#: First guess of the droppers' forces [N]; only the path to the solution depends on it.
+#: First guess of the dropper forces [N]; it affects the path to the solution only.
 _FIRST_FORCE = 80.0
 
 
 class EquilibriumError(ValueError):
-    """The line has no static equilibrium of the wanted shape; says which droppers, where."""
+    """A line without a static equilibrium of the specified shape; the message names the droppers concerned."""
 
 
 @dataclass(frozen=True)
@@ -52,40 +44,44 @@ class StaticState:
 
     Attributes
     ----------
-    points : ndarray, shape (n, 3)
-        Reference positions, at the static shape [m].
+    shape : LineShape
+        The line about its reference points, which lie on the static shape.
+    droppers : DropperSet
+        Droppers between the static positions.
     displacement : ndarray, shape (6 n,)
-        Static displacement from the reference: axial stretch, rotations of the wires [m, rad].
-    dropper_force, dropper_length, unstrained_length : ndarray, shape (n_droppers,)
-        Tension [N], length under tension and without it [m].
+        Static displacement from the reference points: axial stretch, rotations of the wires [m, rad].
+    dropper_force, unstrained_length : ndarray, shape (n_droppers,)
+        Tension [N] and unstrained length [m].
     arm_force : ndarray, shape (n_arms,)
         Tension of the steady arms [N].
     elastic_force : ndarray, shape (n_droppers,)
-        Stiffness times stretch [N]: the tension, but negative where a given length leaves the dropper slack.
-    matrices : Matrices
-        About ``points``.
+        Stiffness times stretch [N]: the tension, or a negative value where a given length leaves the dropper slack.
     residual : float
-        Largest unbalanced nodal force over the line's weight.
+        Largest unbalanced nodal force relative to the weight of the line.
     """
 
-    points: FloatArray
+    shape: LineShape
+    droppers: DropperSet
     displacement: FloatArray
     dropper_force: FloatArray
-    dropper_length: FloatArray
     unstrained_length: FloatArray
     arm_force: FloatArray
     elastic_force: FloatArray
-    matrices: Matrices
     residual: float
 
     @property
     def positions(self) -> FloatArray:
         """Return the static positions of the nodes, shape (n, 3) [m]."""
-        return self.points + self.displacement.reshape(-1, NODE_DOFS)[:, :3]
+        return _displaced(self.shape.points, self.displacement)
+
+    def pendulum_stiffness(self) -> sp.csc_matrix:
+        """Return the pendulum stiffness of droppers and steady arms under their tension, zero where they push."""
+        mesh, tension = self.shape.mesh, np.concatenate([self.dropper_force, self.arm_force])
+        return pendulum_stiffness(np.vstack([mesh.droppers, mesh.arms]), np.maximum(tension, 0.0), self.positions)
 
 
 def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState:
-    """Find the dropper lengths that give the wanted contact-wire profile, or the profile that given lengths give.
+    """Find the dropper lengths for the specified contact-wire profile, or the profile for given lengths.
 
     Returns
     -------
@@ -94,8 +90,8 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
     Raises
     ------
     EquilibriumError
-        If a dropper would have to push to give the wanted profile, if the equations are singular, or if the iteration
-        does not settle.
+        If a dropper would have to push to give the specified profile, if the equations are singular, or if the
+        iteration does not converge.
     """
     points = mesh.points.copy()
     movable = _movable(mesh)
@@ -104,21 +100,20 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
     force = np.full(len(mesh.droppers), _FIRST_FORCE)
     slack = np.zeros(len(mesh.droppers), dtype=bool)
     for iteration in range(_MAX_ITERATIONS):
-        matrices = assemble(definition, mesh, points)
-        # Moving a reference point re-defines a wire's length, so it does not stretch the wire.
+        shape = line_shape(definition, mesh, points)
+        matrices = shape.matrices
+        # Moving a reference point redefines the length of the wire, so it does not stretch the wire.
         stretch = axial_stiffness(definition, mesh, points) @ sp.diags(unstretched.ravel())
-        # So do the guides act on moves of the reference alone, and vanish from the result with these.
-        guides = _swing(mesh, points, force) @ sp.diags(unstretched.ravel())
-        K = matrices.K - stretch + guides
-        conditions = _conditions(definition, mesh, points, slack)
-        displacement, force = _solve(definition, mesh, points, K, matrices.load, conditions)
+        # Likewise the guides act on moves of the reference only, and vanish from the result with them.
+        guides = _swing(shape, force) @ sp.diags(unstretched.ravel())
+        conditions = _conditions(shape, slack)
+        displacement, force = _solve(shape, matrices.K - stretch + guides, conditions)
         move = np.where(movable, displacement.reshape(-1, NODE_DOFS)[:, :3], 0.0)
-        _check_move(definition, points, move)
-        now_slack = _slack(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
+        _check_move(shape, move)
+        now_slack = _slack(mesh, _displaced(points, displacement))
         if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
-            # Without the guides: what is left of them is below the tolerance of the iteration, now it is gone.
-            displacement, force = _solve(definition, mesh, points, matrices.K, matrices.load, conditions)
-            return _static_state(definition, mesh, points, matrices, displacement, force, slack)
+            # Solve once more without the guides, to remove what the tolerance of the iteration leaves of them.
+            return _static_state(shape, *_solve(shape, matrices.K, conditions), slack)
         _straighten(mesh, points, move)
         points = points + move
         _carry_arms(mesh, points, move)
@@ -130,23 +125,29 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
     )
 
 
-def _check_move(definition: CatenaryDefinition, points: FloatArray, move: FloatArray) -> None:
-    """Stop where form finding leads nowhere."""
+def _displaced(points: FloatArray, displacement: FloatArray) -> FloatArray:
+    """Return the positions of points after a displacement of all degrees of freedom, shape (n, 3) [m]."""
+    return points + displacement.reshape(-1, NODE_DOFS)[:, :3]
+
+
+def _check_move(shape: LineShape, move: FloatArray) -> None:
+    """Stop if form finding diverges."""
     size = np.abs(move).max(axis=1)
-    worst = int(size.argmax())  # the first that is not a number, if there is one
+    worst = int(size.argmax())  # the first NaN, if there is one
     if not size[worst] <= _LOST:
         raise EquilibriumError(
-            f"line '{definition.name}' has no static equilibrium of the wanted shape: form finding moves the point at "
-            f"x = {points[worst, 0]:.2f} m by {size[worst]:.2g} m; check tensions, masses, pre-sag and dropper lengths"
+            f"line '{shape.definition.name}' has no static equilibrium of the wanted shape: form finding moves the "
+            f"point at x = {shape.points[worst, 0]:.2f} m by {size[worst]:.2g} m; check tensions, masses, pre-sag and "
+            "dropper lengths"
         )
 
 
 def _movable(mesh: CatenaryMesh) -> np.ndarray:
     """Return which coordinates of the reference form finding may move.
 
-    Not x (the wires' stretch stays a displacement); not the lateral position of registered nodes, whose
-    displacement is what loads the steady arm; and not that of nodes between two attachments, which follow these on
-    a straight line.
+    Not x (the stretch of the wires remains a displacement); not the lateral position of registered nodes, whose
+    displacement loads the steady arm; and not that of nodes between two attachments, which follow these on a straight
+    line.
     """
     movable = ~mesh.fixed[:, :3]
     movable[:, 0] = False
@@ -156,7 +157,7 @@ def _movable(mesh: CatenaryMesh) -> np.ndarray:
 
 
 def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
-    """Move the inner nodes of every interval so that the reference stays straight in plan between attachments."""
+    """Move the inner nodes of every interval so that it stays straight in plan between its attachments."""
     held = attachments(mesh)
     for chain in mesh.chains:
         fixed, x = held[chain.nodes], points[chain.nodes, 0]
@@ -164,13 +165,13 @@ def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> Non
 
 
 def _carry_arms(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
-    """Move the registration ends with their wire, so that the arms keep angle and length."""
+    """Move the registration ends with the wire, so that the arms keep their angle and length."""
     points[mesh.arms[:, 0], 2] += move[mesh.arms[:, 1], 2]
 
 
 @dataclass(frozen=True)
 class _Conditions:
-    """What holds at every dropper: rows @ d - flexibility * N = right.
+    """The equation of every dropper: rows @ d - flexibility * N = right.
 
     Attributes
     ----------
@@ -183,47 +184,39 @@ class _Conditions:
     right: FloatArray
 
 
-def _conditions(
-    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, slack: np.ndarray
-) -> _Conditions:
-    """Return the droppers' conditions: wanted height of the lower end, or elongation of a given length by the force."""
+def _conditions(shape: LineShape, slack: np.ndarray) -> _Conditions:
+    """Return the droppers' conditions: height of the lower end, or elongation of a given length by the force."""
+    mesh, droppers = shape.mesh, shape.droppers
     lower = mesh.droppers[:, 0]
     n = len(lower)
     heights = sp.csr_matrix((np.ones(n), (np.arange(n), lower * NODE_DOFS + 2)), shape=(n, mesh.fixed.size))
     given = ~np.isnan(mesh.given_length)
-    stiffness = dropper_stiffness(definition, mesh, points)
-    stiffness[slack] *= compression_ratio(definition, mesh)[slack]
+    stiffness = np.where(slack, droppers.compression_ratio, 1.0) * droppers.stiffness
     limp = given & (stiffness == 0.0)
     stiffness[limp] = 1.0  # N / 1 = 0
     rows = sp.diags(np.where(given, 0.0, 1.0)) @ heights
-    rows = rows + sp.diags(np.where(given & ~limp, 1.0, 0.0)) @ dropper_rows(mesh, points)
-    too_short = np.where(limp, 0.0, np.nan_to_num(mesh.given_length) - dropper_lengths(mesh, points))
+    rows = rows + sp.diags(np.where(given & ~limp, 1.0, 0.0)) @ droppers.rows
+    too_short = np.where(limp, 0.0, np.nan_to_num(mesh.given_length) - droppers.length)
     return _Conditions(
         rows.tocsr(),
         np.where(given, 1.0 / stiffness, 0.0),
-        np.where(given, too_short, mesh.target - points[lower, 2]),
+        np.where(given, too_short, mesh.target - shape.points[lower, 2]),
     )
 
 
 def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
-    """Return which droppers of given length are longer than the distance that they span."""
+    """Return which droppers of given length are longer than the distance they span."""
     with np.errstate(invalid="ignore"):
         result: np.ndarray = dropper_lengths(mesh, positions) < mesh.given_length
     return result
 
 
-def _solve(
-    definition: CatenaryDefinition,
-    mesh: CatenaryMesh,
-    points: FloatArray,
-    K: sp.csc_matrix,
-    load: FloatArray,
-    conditions: _Conditions,
-) -> tuple[FloatArray, FloatArray]:
-    """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], R, D and right of the droppers' conditions."""
+def _solve(shape: LineShape, K: sp.csc_matrix, conditions: _Conditions) -> tuple[FloatArray, FloatArray]:
+    """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], with R, D and right from the droppers' conditions."""
+    mesh, load = shape.mesh, shape.matrices.load
     free = np.flatnonzero(~mesh.fixed.ravel())
-    B = dropper_rows(mesh, points)[:, free]
-    # Scaled so that the rows of the conditions compare with those of the stiffness.
+    B = shape.droppers.rows[:, free]
+    # The scale makes the rows of the conditions comparable with those of the stiffness.
     scale = 1e4
     D = sp.diags(-(scale**2) * conditions.flexibility)
     system = sp.bmat([[K[free][:, free], scale * B.T], [scale * conditions.rows[:, free], D]], format="csc")
@@ -231,8 +224,8 @@ def _solve(
         solution = splu(system).solve(np.concatenate([load[free], scale * conditions.right]))
     except RuntimeError as error:  # SuperLU's "Factor is exactly singular"
         raise EquilibriumError(
-            f"line '{definition.name}' has no static equilibrium of the wanted shape: its equations are singular, as "
-            "they are where nothing holds a wire; check tensions, masses and droppers"
+            f"line '{shape.definition.name}' has no static equilibrium of the wanted shape: its equations are "
+            "singular, as they are where nothing holds a wire; check tensions, masses and droppers"
         ) from error
     displacement = np.zeros(load.size)
     displacement[free] = solution[: len(free)]
@@ -240,42 +233,32 @@ def _solve(
     return displacement, solution[len(free) :] * scale
 
 
-def _swing(mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> sp.csc_matrix:
+def _swing(shape: LineShape, force: FloatArray) -> sp.csc_matrix:
     """Return the stiffness N/L of the droppers across their axes, as pendulums.
 
-    It guides the iteration where nothing but the droppers holds a wire laterally.
+    This guides the iteration where only the droppers hold a wire laterally.
     """
-    return pendulum_stiffness(mesh.droppers, np.maximum(force, 1.0), points)
+    return pendulum_stiffness(shape.mesh.droppers, np.maximum(force, 1.0), shape.points)
 
 
-def _static_state(
-    definition: CatenaryDefinition,
-    mesh: CatenaryMesh,
-    points: FloatArray,
-    matrices: Matrices,
-    displacement: FloatArray,
-    force: FloatArray,
-    slack: np.ndarray,
-) -> StaticState:
-    _check_tension(definition, mesh, points, force)
-    arm_force = steady_arm_tension(definition, mesh, points, displacement)
-    _check_arms(definition, mesh, points, arm_force)
-    length = dropper_lengths(mesh, points + displacement.reshape(-1, NODE_DOFS)[:, :3])
-    stiffness = dropper_stiffness(definition, mesh, points)
-    given = ~np.isnan(mesh.given_length)
-    unstrained = np.where(given, mesh.given_length, length - force / stiffness)
-    elastic = np.where(slack, stiffness * (length - unstrained), force)
-    force = np.where(slack, compression_ratio(definition, mesh) * elastic, force)
+def _static_state(shape: LineShape, displacement: FloatArray, force: FloatArray, slack: np.ndarray) -> StaticState:
+    _check_tension(shape, force)
+    arm_force = steady_arm_tension(shape.definition, shape.mesh, shape.points, displacement)
+    _check_arms(shape, arm_force)
+    droppers = dropper_set(shape.definition, shape.mesh, _displaced(shape.points, displacement))
+    stiffness, given = shape.droppers.stiffness, shape.mesh.given_length
+    unstrained = np.where(~np.isnan(given), given, droppers.length - force / stiffness)
+    elastic = np.where(slack, stiffness * (droppers.length - unstrained), force)
+    force = np.where(slack, droppers.compression_ratio * elastic, force)
     return StaticState(
-        points=points,
+        shape=shape,
+        droppers=droppers,
         displacement=displacement,
         dropper_force=force,
-        dropper_length=length,
         unstrained_length=unstrained,
         arm_force=arm_force,
         elastic_force=elastic,
-        matrices=matrices,
-        residual=_residual(mesh, points, matrices, displacement, force),
+        residual=_residual(shape, displacement, force),
     )
 
 
@@ -286,34 +269,35 @@ def weight(matrices: Matrices) -> float:
     return float(GRAVITY * (up.ravel() @ (matrices.M @ up.ravel())))
 
 
-def _check_tension(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> None:
-    slack = np.flatnonzero((force <= 0.0) & np.isnan(mesh.given_length))
+def _check_tension(shape: LineShape, force: FloatArray) -> None:
+    slack = np.flatnonzero((force <= 0.0) & np.isnan(shape.mesh.given_length))
     if slack.size:
-        x = points[mesh.droppers[slack, 0], 0]
+        x = shape.points[shape.mesh.droppers[slack, 0], 0]
         listed = ", ".join(f"{a:.2f} m ({f:.1f} N)" for a, f in list(zip(x, force[slack], strict=True))[:8])
         raise EquilibriumError(
-            f"line '{definition.name}': {slack.size} dropper(s) would have to push to give the wanted profile: "
+            f"line '{shape.definition.name}': {slack.size} dropper(s) would have to push to give the wanted profile: "
             f"{listed}; reduce the pre-sag or the rise to the anchors, or move the droppers"
         )
 
 
-def _check_arms(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, force: FloatArray) -> None:
-    """Refuse steady arms that push; one that nothing but its own weight presses has the sign of no wire's pull."""
-    arm = definition.steady_arm
+def _check_arms(shape: LineShape, force: FloatArray) -> None:
+    """Reject steady arms that push by more than their own weight, which says nothing about the pull of the wire."""
+    arm = shape.definition.steady_arm
     if arm is None:
         return
     pushing = np.flatnonzero(force < -GRAVITY * arm.mass * arm.length)
     if pushing.size:
-        x = points[mesh.arms[pushing, 1], 0]
+        x = shape.points[shape.mesh.arms[pushing, 1], 0]
         listed = ", ".join(
             f"the arm at {a:.2f} m pushes with {-f:.1f} N" for a, f in list(zip(x, force[pushing], strict=True))[:8]
         )
-        raise EquilibriumError(f"line '{definition.name}': {listed}: it must pull; change its side or the stagger")
+        raise EquilibriumError(
+            f"line '{shape.definition.name}': {listed}: an arm must pull; change its side or the stagger"
+        )
 
 
-def _residual(
-    mesh: CatenaryMesh, points: FloatArray, matrices: Matrices, displacement: FloatArray, force: FloatArray
-) -> float:
-    unbalanced = matrices.K @ displacement + dropper_rows(mesh, points).T @ force - matrices.load
-    translations = unbalanced.reshape(-1, NODE_DOFS)[:, :3][~mesh.fixed[:, :3]]
+def _residual(shape: LineShape, displacement: FloatArray, force: FloatArray) -> float:
+    matrices = shape.matrices
+    unbalanced = matrices.K @ displacement + shape.droppers.rows.T @ force - matrices.load
+    translations = unbalanced.reshape(-1, NODE_DOFS)[:, :3][~shape.mesh.fixed[:, :3]]
     return float(np.abs(translations).max() / weight(matrices))

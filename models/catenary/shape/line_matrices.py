@@ -1,4 +1,4 @@
-"""Global matrices of a line from its mesh: K, M, C, dropper rows, loads."""
+"""Global matrices of a line about reference points: K, M, C and the static load."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
-from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition, Dropper
+from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition
 from models.catenary.shape.beam_elements import (
     NODE_DOFS,
     bar_geometric_stiffness,
@@ -20,8 +20,8 @@ from models.catenary.shape.beam_elements import (
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
 
-#: What holds a wire without anchors along the track at every support [N/m]: soft enough to be of no account (a span of
-#: messenger wire on it has a period of half a minute), but the wire has a place.
+#: Stiffness that holds a wire without anchors along the track at every support [N/m]: soft enough not to matter (a span
+#: of messenger wire on it has a period of half a minute), but enough to fix the position of the wire.
 ANCHORAGE = 1.0
 
 
@@ -41,14 +41,14 @@ class BeamProperties:
 
 @dataclass(frozen=True)
 class Matrices:
-    """Matrices of the line's beams and supports, droppers excluded, over all degrees of freedom (fixed ones too).
+    """Matrices of the beams and supports of a line, without droppers, over all degrees of freedom (fixed ones too).
 
     Attributes
     ----------
     K, M, C : sparse, shape (6 n, 6 n)
         Stiffness, mass (with clamps and droppers) and damping.
     load : ndarray, shape (6 n,)
-        Gravity, line tensioning, and what keeps the kinks of the reference points from being stress-free.
+        Gravity, tensioning, and the load that keeps the kinks of the reference polygon from being stress-free.
     """
 
     K: sp.csc_matrix
@@ -62,18 +62,22 @@ def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamP
     table = np.array([_component(definition, name) for name in COMPONENTS])
     properties = BeamProperties(*table[mesh.component].T.copy())
     if definition.stitch_wire is not None:
-        # Balance along the track at the clamps: what the stitch wire pulls, the messenger wire between them lacks.
+        # Balance along the track at the clamps: the messenger wire between them lacks what the stitch wire pulls.
         properties.tension[mesh.beside_stitch] -= definition.stitch_wire.tension
     return properties
 
 
-def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> Matrices:
-    """Assemble the line's matrices and static loads about the reference positions ``points``.
+def assemble(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, dropper_mass: FloatArray
+) -> Matrices:
+    """Assemble the matrices and the static load of a line about reference positions.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
         Reference positions [m].
+    dropper_mass : ndarray, shape (n_droppers,)
+        [kg].
     """
     properties = beam_properties(definition, mesh)
     start, end = mesh.beams.T
@@ -85,10 +89,12 @@ def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatAr
     C_e = properties.alpha[:, None, None] * K_e + properties.beta[:, None, None] * M_e
     dofs = element_dofs(mesh.owner[mesh.beams])
     size = NODE_DOFS * len(points)
-    M = _assembled(M_e, dofs, size) + _lumped(definition, mesh, points)
+    lumped = _clamp_mass(mesh, size) + _dropper_mass(mesh, dropper_mass, size)
+    M = _assembled(M_e, dofs, size) + lumped
     load = _gravity(M) + _tensioning(mesh, axes, properties.tension, size)
     load += _kinks(K_e, axes, dofs, properties.tension > 0.0, size)
-    C = _assembled(C_e, dofs, size) + _dropper_mass_damping(definition, mesh, points)
+    # The part of the droppers' damping that is proportional to their stiffness is added together with it.
+    C = _assembled(C_e, dofs, size) + definition.damping.of("dropper").beta * lumped
     support = definition.messenger_support
     K = _assembled(K_e, dofs, size)
     if len(mesh.adrift):
@@ -101,13 +107,13 @@ def assemble(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatAr
 
 
 def _on_nodes(nodes: IntArray, axis: int, size: int) -> sp.csc_matrix:
-    """Return 1 on the diagonal at the displacements of some nodes along an axis."""
+    """Return a matrix with 1 on the diagonal at the displacements of some nodes along an axis."""
     dofs = nodes * NODE_DOFS + axis
     return sp.csc_matrix((np.ones(len(dofs)), (dofs, dofs)), shape=(size, size))
 
 
 def axial_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
-    """Return the part of K that is the beams' stiffness along their axes, EA/l."""
+    """Return the part of K that comes from the axial stiffness of the beams, EA/l."""
     start, end = mesh.beams.T
     axes, length = frames(points[start], points[end])
     EA = beam_properties(definition, mesh).EA
@@ -122,16 +128,16 @@ def element_dofs(nodes: IntArray) -> IntArray:
 
 
 def pendulum_stiffness(bars: IntArray, tension: FloatArray, points: FloatArray) -> sp.csc_matrix:
-    """Return the stiffness of bars across their axes, from their tension, over all degrees of freedom (fixed ones too).
+    """Return the stiffness of bars across their axes due to tension, over all degrees of freedom (fixed ones too).
 
     Parameters
     ----------
     bars : ndarray, shape (n, 2)
-        Their end nodes: droppers, steady arms.
+        End nodes of the bars: droppers, steady arms.
     tension : ndarray, shape (n,)
         [N].
     points : ndarray, shape (n_nodes, 3)
-        Where the nodes are [m].
+        Positions of the nodes [m].
 
     Returns
     -------
@@ -147,7 +153,7 @@ def pendulum_stiffness(bars: IntArray, tension: FloatArray, points: FloatArray) 
 
 
 def _translations(bars: IntArray) -> IntArray:
-    """Return the translations of the ends of bars among the degrees of freedom, shape (n, 6)."""
+    """Return the degrees of freedom that are translations of the ends of bars, shape (n, 6)."""
     return (bars[:, :, None] * NODE_DOFS + np.arange(3)).reshape(len(bars), 6)
 
 
@@ -161,7 +167,7 @@ def steady_arm_tension(
     points : ndarray, shape (n, 3)
         Reference positions [m].
     displacement : ndarray, shape (6 n,)
-        From there [m, rad].
+        Displacement from there [m, rad].
     """
     if definition.steady_arm is None:
         return np.zeros(0)
@@ -174,65 +180,8 @@ def steady_arm_tension(
     return tension
 
 
-def dropper_rows(mesh: CatenaryMesh, points: FloatArray) -> sp.csr_matrix:
-    """Return the rows b with elongation of dropper j = b_j . d, shape (n_droppers, 6 n)."""
-    lower, upper = mesh.droppers.T
-    direction = points[upper] - points[lower]
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    n = len(mesh.droppers)
-    axes = np.arange(3)
-    columns = np.hstack([lower[:, None] * NODE_DOFS + axes, upper[:, None] * NODE_DOFS + axes])
-    values = np.hstack([-direction, direction])
-    rows = np.repeat(np.arange(n), 6)
-    return sp.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(n, NODE_DOFS * len(points)))
-
-
-def dropper_lengths(mesh: CatenaryMesh, points: FloatArray) -> FloatArray:
-    """Return the distance between the ends of every dropper [m]."""
-    lower, upper = mesh.droppers.T
-    return np.linalg.norm(points[upper] - points[lower], axis=1)
-
-
-def dropper_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> FloatArray:
-    """Return the axial stiffness of every dropper, as given or EA/L [N/m]."""
-    length = dropper_lengths(mesh, points)
-    result = _stiffness(definition.dropper, length)
-    if definition.hanger is not None:
-        result[mesh.is_hanger] = _stiffness(definition.hanger, length)[mesh.is_hanger]
-    return result
-
-
-def compression_ratio(definition: CatenaryDefinition, mesh: CatenaryMesh) -> FloatArray:
-    """Return every dropper's stiffness in compression over that in tension, shape (n_droppers,)."""
-    result = np.full(len(mesh.droppers), definition.dropper.compression_ratio)
-    if definition.hanger is not None:
-        result[mesh.is_hanger] = definition.hanger.compression_ratio
-    return result
-
-
-def slack_delay(definition: CatenaryDefinition, mesh: CatenaryMesh) -> FloatArray:
-    """Return how much of its rate counts with a dropper's elongation when it comes to slack [s], shape (n_droppers,).
-
-    Under the law "tension" spring and damper go slack together, k (e + alpha e') < 0: alpha. Under "elastic_only" the
-    spring does so alone: 0.
-    """
-    alpha = definition.damping.of("dropper").alpha
-    result = np.full(len(mesh.droppers), alpha if definition.dropper.slack_law == "tension" else 0.0)
-    if definition.hanger is not None:
-        result[mesh.is_hanger] = alpha if definition.hanger.slack_law == "tension" else 0.0
-    return result
-
-
-def _stiffness(dropper: Dropper, length: FloatArray) -> FloatArray:
-    if dropper.stiffness is not None:
-        return np.full_like(length, dropper.stiffness)
-    assert dropper.area is not None
-    assert dropper.youngs_modulus is not None
-    return dropper.youngs_modulus * dropper.area / length
-
-
 def _component(definition: CatenaryDefinition, name: str) -> list[float]:
-    """Return EA, EI, GJ, mass, J/A, tension, alpha, beta of a component type; zeros where the line has none."""
+    """Return EA, EI, GJ, mass, J/A, tension, alpha, beta of a component type; zeros if the line has none."""
     item = getattr(definition, name)
     if item is None or name == "dropper":
         return [0.0] * 8
@@ -251,38 +200,28 @@ def _assembled(matrices: FloatArray, dofs: IntArray, size: int) -> sp.csc_matrix
     return sp.csc_matrix((matrices.ravel(), (rows, columns)), shape=(size, size))
 
 
-def _lumped(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
-    """Mass of clamps and droppers, on the translations."""
-    size = NODE_DOFS * len(points)
-    diagonal = np.zeros((len(points), NODE_DOFS))
+def _clamp_mass(mesh: CatenaryMesh, size: int) -> sp.csc_matrix:
+    """Return the mass of the clamps, on the translations."""
+    diagonal = np.zeros((size // NODE_DOFS, NODE_DOFS))
     diagonal[:, :3] = mesh.clamp_mass[:, None]
-    return sp.diags(diagonal.ravel(), format="csc") + _dropper_mass(definition, mesh, points, size)
+    return sp.diags(diagonal.ravel(), format="csc")
 
 
-def _dropper_mass(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, size: int) -> sp.csc_matrix:
-    """Consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions."""
-    per_length = np.full(len(mesh.droppers), definition.dropper.mass)
-    if definition.hanger is not None:
-        per_length[mesh.is_hanger] = definition.hanger.mass
-    mass = per_length * dropper_lengths(mesh, points)
+def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray, size: int) -> sp.csc_matrix:
+    """Return the consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions."""
     pattern = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
     return _assembled(mass[:, None, None] * pattern, _translations(mesh.droppers), size)
 
 
-def _dropper_mass_damping(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
-    """Return beta M of droppers and clamps (what is proportional to the droppers' stiffness is added with it)."""
-    return definition.damping.of("dropper").beta * _lumped(definition, mesh, points)
-
-
 def _gravity(M: sp.csc_matrix) -> FloatArray:
-    """Return the weights: the consistent mass times a uniform acceleration field."""
+    """Return the weight: the consistent mass times a uniform acceleration field."""
     field = np.zeros((M.shape[0] // NODE_DOFS, NODE_DOFS))
     field[:, 2] = -GRAVITY
     return np.asarray(M @ field.ravel())
 
 
 def _tensioning(mesh: CatenaryMesh, axes: FloatArray, tension: FloatArray, size: int) -> FloatArray:
-    """Return the constant tension of every wire element, pulling its two nodes together [2.9]."""
+    """Return the load of the constant tension in every wire element, which pulls its two nodes together [2.9]."""
     load = np.zeros((size // NODE_DOFS, NODE_DOFS))
     pull = tension[:, None] * axes[:, 0, :]
     np.add.at(load[:, :3], mesh.owner[mesh.beams[:, 0]], pull)
@@ -291,9 +230,9 @@ def _tensioning(mesh: CatenaryMesh, axes: FloatArray, tension: FloatArray, size:
 
 
 def _kinks(K_e: FloatArray, axes: FloatArray, dofs: IntArray, is_wire: np.ndarray, size: int) -> FloatArray:
-    """Return the load that makes rotations count from a straight wire, not from the chords of the mesh.
+    """Return the load that refers rotations to a straight wire, not to the chords of the mesh.
 
-    Without it the polygon through the reference points would be the wire's unbent shape.
+    Without it the polygon through the reference points would be the unbent shape of the wire.
     """
     rotation = np.zeros((len(axes), 12))
     along = axes[:, 0, :]

@@ -1,7 +1,9 @@
 """Mesh of a line: definition -> points, wires as chains of nodes, droppers, steady arms, fixed degrees of freedom.
 
-Nodes are numbered section by section and within a section along the track, its wires interleaved, which keeps every
+Nodes are numbered section by section, and within a section along the track with its wires interleaved. This keeps every
 matrix banded: sections do not act on each other, so their matrices are blocks on the diagonal.
+
+One class builds a section wire by wire into a draft; as the wires refer to each other, the file stays in one piece.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy as np
 from models.arrays import BoolArray, FloatArray, IntArray
 from models.catenary.definition.line_definition import COMPONENTS, CatenaryDefinition, Section, Span
 
-#: Two positions closer than this are one [m].
+#: Positions closer than this coincide [m].
 _SAME = 1e-6
 
 
@@ -43,7 +45,7 @@ class CatenaryMesh:
     component : ndarray, shape (n_beams,)
         Index into ``COMPONENTS``.
     beside_stitch : ndarray, shape (n_beams,)
-        True for the messenger wire between the clamps of a stitch wire, which takes over a part of its tension.
+        True for the messenger wire between the clamps of a stitch wire, which takes over part of its tension.
     chains : tuple of Chain
         Every wire.
     droppers : ndarray, shape (n_droppers, 2)
@@ -51,9 +53,9 @@ class CatenaryMesh:
     is_hanger : ndarray, shape (n_droppers,)
         True between auxiliary and messenger wire of a compound line.
     target : ndarray, shape (n_droppers,)
-        Wanted static height of the lower node [m].
+        Specified static height of the lower node [m].
     given_length : ndarray, shape (n_droppers,)
-        Unstrained length where it is given instead of the height, NaN elsewhere [m].
+        Unstrained length where given instead of the height, NaN elsewhere [m].
     fixed : ndarray, shape (n, 6)
         Degrees of freedom held at zero.
     sprung : ndarray, shape (n_supports,)
@@ -63,16 +65,16 @@ class CatenaryMesh:
     clamp_mass : ndarray, shape (n,)
         Lumped mass [kg].
     support_nodes : ndarray, shape (n_supports,)
-        Contact-wire node at every support between the anchors.
+        Node of the contact wire at every support between the anchors.
     arms : ndarray, shape (n_arms, 2)
         Registration node and contact-wire node of the steady arms.
     section : ndarray, shape (n,)
         Section of every node, from 0.
     owner : ndarray, shape (n,)
-        Node whose degrees of freedom a node has: its own, but for the images where a periodic line closes. An image is
-        the last node of a wire, one period behind the first, whose motion it shares.
+        Node whose degrees of freedom a node has: the node itself, except for images where a periodic line closes. An
+        image is the last node of a wire, one period beyond the first, whose motion it shares.
     adrift : ndarray, shape (k,)
-        Nodes at the supports of wires that close on themselves and that nothing holds along the track.
+        Nodes at the supports of wires that close on themselves and are not held along the track.
     """
 
     points: FloatArray
@@ -131,7 +133,7 @@ class _Draft:
         return len(self.points) - 1
 
     def image(self, node: int, x: float) -> int:
-        """Add a node that moves as another one; it has no degrees of freedom of its own."""
+        """Add a node that moves as another one and has no degrees of freedom itself."""
         _, y, z = self.points[node]
         image = self.node(x, y, z, "x y z rx ry rz")
         self.owner[image] = node
@@ -175,7 +177,7 @@ class _Wire:
 
 
 def build_mesh(definition: CatenaryDefinition) -> CatenaryMesh:
-    """Return the mesh of a line, contact wire at its wanted profile, other wires at a first guess."""
+    """Return the mesh of a line, the contact wire at its specified profile, the other wires at a first guess."""
     draft = _Draft()
     for index, section in enumerate(definition.sections):
         draft.current = index
@@ -184,7 +186,7 @@ def build_mesh(definition: CatenaryDefinition) -> CatenaryMesh:
 
 
 def contact_wire_height(definition: CatenaryDefinition, section: Section, x: float) -> float:
-    """Return the wanted static height of the contact wire at a dropper [m].
+    """Return the specified static height of the contact wire at a dropper [m].
 
     Nominal height minus the pre-sag parabola of the span, or the measured table; plus the rise to the anchors.
     """
@@ -255,7 +257,7 @@ class _SectionMesher:
         else:
             wire.append(last, self.draft.node(last, self._lateral(last), height(last)))
             for end in (wire.nodes[0], wire.nodes[-1]):
-                # Held against torsion as well: nothing else would, and a static solution needs it.
+                # Held against torsion as well: nothing else does, and a static solution needs it.
                 self.draft.hold(end, "x y z rx")
         wire.close()
         return wire
@@ -270,7 +272,7 @@ class _SectionMesher:
         return self.definition.profile.contact_wire_height + self.section.ends.rise_at(x)
 
     def _messenger_height(self, x: float) -> float:
-        """Height at the supports; between them a first guess that form finding replaces."""
+        """Return the height at the supports; between them a first guess that form finding replaces."""
         span = _span_at(self.section, x)
         sag = (x - span.start) * (span.end - x) / (2.0 * self.definition.messenger_wire.tension) * 20.0
         ends = [self._base_height(span.start), self._base_height(span.end)]
@@ -297,7 +299,7 @@ class _SectionMesher:
         self._let_adrift(messenger)
 
     def _let_adrift(self, wire: _Wire) -> None:
-        """Note a wire without anchors and without steady arms, which could wander along the track."""
+        """Note a wire with neither anchors nor steady arms, which could wander along the track."""
         if self.section.periodic:
             self.draft.adrift += [wire.at(x) for x in self.supports]
 
@@ -317,7 +319,7 @@ class _SectionMesher:
                 self.draft.mass[node] += self.definition.clamps.steady_arm
 
     def _stitch_clamps(self) -> list[tuple[float, float]]:
-        """Ends of the stitch wires, one at every registered support."""
+        """Return the ends of the stitch wires, one at every registered support."""
         stitch = self.definition.stitch_wire
         if stitch is None:
             return []
@@ -366,7 +368,7 @@ class _SectionMesher:
 
 
 def _given_lengths(spans: Iterable[tuple[tuple[float, ...], tuple[float, ...]]]) -> dict[float, float]:
-    """Return position -> given length of the droppers that have one."""
+    """Return the given lengths by position, of the droppers that have one."""
     return {x: length for positions, lengths in spans for x, length in zip(positions, lengths, strict=False)}
 
 
@@ -375,7 +377,7 @@ def _inside(x: float, intervals: Sequence[tuple[float, float]]) -> bool:
 
 
 def _subdivide(breaks: Iterable[float], elements: int) -> list[float]:
-    """Return node positions: every interval between break points in equal elements."""
+    """Return node positions that divide every interval between break points into equal elements."""
     ordered = sorted(breaks)
     distinct = [x for i, x in enumerate(ordered) if i == 0 or x - ordered[i - 1] > _SAME]
     positions = [a + (b - a) * k / elements for a, b in pairwise(distinct) for k in range(elements)]

@@ -1,7 +1,7 @@
-"""Wires between their attachments: where an interval begins and ends, and axes in which its motion falls apart.
+"""Wires between their attachments: where an interval begins and ends, and axes that decouple its motion.
 
-Between two attachments (droppers, supports, arms, clamps) a wire is straight in plan. In axes that follow it, its
-in-plane motion (u, w, ry) and its out-of-plane motion (v, rx, rz) do not act on each other.
+Between two attachments (droppers, supports, arms, clamps) a wire is straight in plan. In axes that follow it, in-plane
+motion (u, w, ry) and out-of-plane motion (v, rx, rz) do not act on each other.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from models.arrays import BoolArray, FloatArray, IntArray
 from models.catenary.shape.line_mesh import CatenaryMesh, Chain
 
-#: Entries below this share of their diagonal are what rotating a matrix leaves of zeros.
+#: Entries below this share of their diagonal are zeros, up to the rounding of a rotation.
 _ROUNDING = 1e-12
 
 
@@ -29,7 +29,7 @@ class Interval:
     component : str
         Component type of the wire.
     nodes : ndarray, shape (k + 2,)
-        Its nodes, the two attachments included; k may be 0.
+        Its nodes, including the two attachments; k may be 0.
     """
 
     component: str
@@ -37,7 +37,7 @@ class Interval:
 
 
 def attachments(mesh: CatenaryMesh) -> BoolArray:
-    """Return which nodes are attachments: ends, droppers, supports, arms, clamps, held or shared nodes; shape (n,)."""
+    """Return which nodes are attachments: ends, droppers, supports, arms, clamps, held or shared; shape (n,)."""
     result = mesh.fixed.any(axis=1) | (mesh.clamp_mass > 0.0)
     for nodes in (mesh.droppers, mesh.arms, mesh.sprung, mesh.support_nodes):
         result[nodes.ravel()] = True
@@ -97,7 +97,7 @@ def without_rounding(matrix: sp.spmatrix, scale: FloatArray) -> sp.csr_matrix:
     Parameters
     ----------
     scale : ndarray, shape (n,)
-        Roots of the diagonal that entries are compared with.
+        Square roots of the diagonal, with which entries are compared.
     """
     entries = matrix.tocoo()
     kept = np.abs(entries.data) > _ROUNDING * scale[entries.row] * scale[entries.col]

@@ -130,7 +130,7 @@ class NumbaEngine:
     def _meet(
         self, wire: ContactWire, response: IntervalResponse, strip: FloatArray, element: int, motion: LineMotion
     ) -> Met | int:
-        """Return where a strip crosses an interval, or which of the kernels' words there is for it."""
+        """Return where a strip crosses an interval, or NOWHERE, BEFORE or BEYOND of the kernels."""
         interval = response.interval
         size, first = interval.size, interval.first
         result = np.empty(6 + size + len(interval.ends))

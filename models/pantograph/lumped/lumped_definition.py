@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from models.definition_files import field_schema
-from models.definition_files.field_schema import quantity
+from models.definition_files.field_schema import quantity, text
 from models.definition_files.parameter import Parameter
 from models.definition_files.toml_reader import Quantity, Table
 from models.pantograph.operation import Operation
@@ -38,8 +38,8 @@ class LumpedDefinition(Operation):
     .. [1] P. Antunes (2012), equations 2.12 to 2.19.
     """
 
-    name: str
-    title: str
+    name: str = text()
+    title: str = text(default="")
     stage: tuple[Stage, ...]
     static_force: float = quantity(
         "N", "static uplift on the lowest mass at the reference height", minimum=0.0, maximum=5e3
@@ -66,13 +66,6 @@ def read_lumped(table: Table) -> LumpedDefinition:
     stages = tuple(field_schema.read(Stage, t) for t in table.tables("stage"))
     if not stages:
         table.problem("stage", "a lumped pantograph needs at least one [[stage]]")
-    definition = field_schema.read(
-        LumpedDefinition,
-        table,
-        name=table.text("name"),
-        title=table.text("title", default=""),
-        stage=stages,
-        provenance=table.provenance,
-    )
+    definition = field_schema.read(LumpedDefinition, table, stage=stages, provenance=table.provenance)
     table.finish()
     return definition

@@ -10,7 +10,7 @@ from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 
 
 class LumpedBalance:
-    """Adds up, step by step, the work of all loads on the masses and what the dampers take.
+    """Add up, step by step, the work of all loads on the masses and what the dampers take.
 
     Energy counts from where the springs carry the weights; the roof's motion is a load.
 

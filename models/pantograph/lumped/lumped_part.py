@@ -72,7 +72,7 @@ class LumpedPantographPart:
         start, h = self.time, step / count
         height, velocity = base.tolist()
         for k in range(1, count + 1):
-            # Received for the step's beginning; the roof goes on with its velocity.
+            # Received for the step's beginning; the roof continues with its velocity.
             self._base[...] = height + k * h * velocity, velocity
             self._substep(start + k * h, h)
         self.time = start + step

@@ -4,6 +4,8 @@
 
 M is block diagonal, so the multipliers come from (Phi_q M^-1 Phi_q^T) lambda = Phi_q M^-1 g - rhs: the same solution
 with a matrix of the size of the constraints alone. Bodies of prescribed motion enter with M^-1 = 0.
+
+The file is longer than others because one evaluation of the equations reads from top to bottom here.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from models.pantograph.multibody.elements.rotations import (
     skew,
     turned,
 )
-from models.pantograph.multibody.mechanism_definition import Joint, MechanismDefinition
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition, PairJoint
 
 #: Baumgarte's a and b [1/s] [2.35]: critically damped, slow against the step and fast against the motion.
 BAUMGARTE: Final = 50.0
@@ -105,12 +107,12 @@ class Mechanism:
     names : list of str
         Bodies in the order of the arrays: those of prescribed motion come first.
     rows : list of Row
-    joint_of_row : list of Joint
+    joint_of_row : list of PairJoint
     """
 
     def __init__(self, definition: MechanismDefinition) -> None:
         self.definition = definition
-        driven = {j.body_j for j in definition.joints if j.kind == "prescribed_motion"}
+        driven = definition.driven
         bodies = sorted(definition.bodies, key=lambda b: b.name not in driven)
         self.names = [b.name for b in bodies]
         self.numbers = {name: k for k, name in enumerate(self.names)}
@@ -126,25 +128,22 @@ class Mechanism:
         self.pool = VectorPool()
         self._list_rows(A)
         self.constraints = Constraints(self.rows, self.count, self.pool)
-        self.forces = ForceElements(definition.forces, self.numbers, A, self.pool)
+        self.forces = ForceElements(definition.forces, definition.joints, self.numbers, A, self.pool)
         self.pool.close()
         self.constraints.compile(self.pool)
         self.forces.compile(self.pool)
         strip = definition.strip
         self.strip_body = self.numbers[strip.body] if strip is not None else -1
-        operation = definition.operation
-        self._strip_point = np.array([0.0, operation.strip_offset, strip.height if strip is not None else 0.0])
-        self._strip_halves = np.array([[0.0, 0.5, 0.0], [0.0, -0.5, 0.0]]) * operation.strip_length
+        self._strip_point = np.array([0.0, definition.strip_offset, strip.height if strip is not None else 0.0])
+        self._strip_halves = np.array([[0.0, 0.5, 0.0], [0.0, -0.5, 0.0]]) * definition.strip_length
 
     def _list_rows(self, A: FloatArray) -> None:
         self.rows: list[Row] = []
-        self.joint_of_row: list[Joint] = []
-        for joint in self.definition.joints:
-            if joint.kind == "prescribed_motion":
-                continue
+        self.joint_of_row: list[PairJoint] = []
+        for joint in (j for j in self.definition.joints if isinstance(j, PairJoint)):
             i, j = self.numbers[joint.body_i], self.numbers[joint.body_j]
             try:
-                rows = JOINT_ROWS[joint.kind](joint, Pair(i, j, A[i], A[j]))
+                rows = JOINT_ROWS[type(joint)](joint, Pair(i, j, A[i], A[j]))
             except ValueError as error:
                 raise MechanismError(f"joint '{joint.name}' ({joint.kind}): {error}") from error
             self.rows += rows

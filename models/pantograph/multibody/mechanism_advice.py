@@ -30,15 +30,13 @@ def working_height_warning(mechanism: Mechanism, standing: FloatArray, x: float,
     above = mechanism.strip_height(standing)
     at_reference = _force(mechanism, standing, above)
     if at_reference is None or at_reference <= 0.0:
-        return ""  # it lifts nothing even there: the run tells
+        return ""  # it lifts nothing even there, which the run reports
     return raised.warning(z, _force(mechanism, standing, above + z - raised.reference), at_reference)
 
 
 def _raised(definition: MechanismDefinition) -> Raised:
-    lift, operation = definition.lift_force, definition.operation
-    is_moment = lift is not None and lift.kind == "actuator_moment"
-    parameter, unit = ("static_moment", "N.m") if is_moment else ("static_force", "N")
-    return Raised(parameter, definition.lift, unit, operation.reference_height, operation.start_position)
+    parameter, unit = ("static_moment", "N.m") if definition.lifts_by_moment else ("static_force", "N")
+    return Raised(parameter, definition.lift, unit, definition.reference_height, definition.start_position)
 
 
 def _force(mechanism: Mechanism, standing: FloatArray, height: float) -> float | None:

@@ -1,4 +1,4 @@
-"""Putting a mechanism together: projection on the constraints, and what to say when it does not fit."""
+"""A mechanism put together: projection on the constraints, and the messages where it does not fit."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ def _unassemblable(mechanism: Mechanism, y: FloatArray) -> str:
 
 
 def _check_independence(mechanism: Mechanism, y: FloatArray) -> None:
-    """Blame the joints that repeat what those before them say."""
+    """Blame the joints that repeat earlier ones."""
     values = mechanism.constraint_values(mechanism.kinematics(y))
     jacobian = values.jacobian.reshape(mechanism.constraints.count, -1)[:, 6 * mechanism.driven :]
     if len(jacobian) == 0 or np.linalg.matrix_rank(jacobian, tol=1e-9) == len(jacobian):

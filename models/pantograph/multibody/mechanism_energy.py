@@ -28,7 +28,7 @@ class _Power(NamedTuple):
 
 
 class MechanismBalance:
-    """Adds up, step by step, what the forces on a mechanism do.
+    """Add up, step by step, what the forces on a mechanism do.
 
     Parameters
     ----------

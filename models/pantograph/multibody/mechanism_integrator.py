@@ -49,7 +49,7 @@ class History(NamedTuple):
 
 
 class Advance(NamedTuple):
-    """The end of an advance.
+    """Where an advance has ended.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Advance(NamedTuple):
 
 
 class Integrator:
-    """Advances states of one mechanism.
+    """The integrator of one mechanism: it advances states.
 
     Parameters
     ----------

@@ -47,13 +47,13 @@ class MultibodyPantographPart:
         self.time = 0.0
         self.strip = np.zeros((2, 2, 3))
         self._start_time = 0.0
-        self._force = ForceExtrapolation(definition.operation.extrapolation_order)
+        self._force = ForceExtrapolation(definition.extrapolation_order)
         self._lateral = LateralExtrapolation()
         self._base = BaseMotion()
         self._y = np.zeros(0)
         self._last: _Last | None = None
         self._history: History | None = None
-        self._substep = definition.operation.time_step
+        self._substep = definition.time_step
         self._observation = np.zeros(len(self.observed))
         self._built: _Built | None = None
         self._balance: MechanismBalance | None = None
@@ -82,7 +82,7 @@ class MultibodyPantographPart:
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
         self._base.start(base)
-        self._substep = self.definition.operation.time_step
+        self._substep = self.definition.time_step
         self._history = None
         self._y = built.standing.copy()
         s = built.mechanism.split(self._y)
@@ -90,7 +90,7 @@ class MultibodyPantographPart:
         s.v[:, 2] += base[1]
         inputs = self._inputs(0.0)
         self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
-        watched = self.definition.operation.monitor_energy
+        watched = self.definition.monitor_energy
         self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
 
     def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
@@ -116,7 +116,7 @@ class MultibodyPantographPart:
         values = (force, *point.tolist(), *base.tolist())
         if not all(map(math.isfinite, values)):
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
-        operation = self.definition.operation
+        operation = self.definition
         expected = float(self.strip[:, 0, 0].mean())
         self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
         self._receive_lateral(force, point, expected, step)
@@ -215,7 +215,7 @@ class MultibodyPantographPart:
 
     def _receive_lateral(self, force: float, point: FloatArray, expected: float, step: float) -> None:
         """Follow the contact point across the strip while there is contact."""
-        time = self.time + lead_of(float(point[0]), expected, self.definition.operation.speed, step)
+        time = self.time + lead_of(float(point[0]), expected, self.definition.speed, step)
         if force > 0.0:
             self._lateral.receive(time, float(point[1]))
         else:
@@ -229,13 +229,13 @@ class MultibodyPantographPart:
 
     def _lift(self, time: float) -> float:
         built = self._ready()
-        share = self.definition.operation.raised(time - self._start_time)
+        share = self.definition.raised(time - self._start_time)
         return built.balance + share * (self.definition.lift - built.balance)
 
     def _show(self, evaluation: Evaluation) -> None:
         """Bring strip and observations up to the state."""
         built = self._ready()
-        mechanism, operation = built.mechanism, self.definition.operation
+        mechanism, operation = built.mechanism, self.definition
         ends = mechanism.strip_ends(self._y)
         track = operation.start_position + operation.speed * (self.time - self._start_time)
         self.strip[...] = ends
@@ -305,32 +305,30 @@ class _Built:
         if definition.strip is None:
             raise MechanismError(f"{definition.name}: a pantograph needs a [strip]")
         self.mechanism = Mechanism(definition)
-        operation = definition.operation
-        self.integrator = Integrator(self.mechanism, definition.tolerance, operation.time_step)
+        self.integrator = Integrator(self.mechanism, definition.tolerance, definition.time_step)
         working = equilibrium(self.mechanism, start=settle_springs(self.mechanism))
         self.standing = project(self.mechanism, working.y)
         self.balance = working.lift
-        self.base_height = operation.reference_height - working.strip_height
+        self.base_height = definition.reference_height - working.strip_height
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 
 
 def _observed(definition: MechanismDefinition) -> tuple[tuple[str, str, str], ...]:
-    driven = {j.body_j for j in definition.joints if j.kind == "prescribed_motion"}
     kinds = (("z", "m", "height"), ("vz", "m/s", "vertical velocity"), ("az", "m/s2", "vertical acceleration"))
     bodies = [
         (f"{b.name}.{key}", unit, f"{text} of the centre of mass of {b.name}")
         for b in definition.bodies
-        if b.name not in driven
+        if b.name not in definition.driven
         for key, unit, text in kinds
     ]
-    lift = definition.lift_force
-    moment = lift is not None and lift.kind == "actuator_moment"
     return (
         *bodies,
         ("strip.roll", "rad", "roll of the collector strip, left end up"),
         ("strip.roll_rate", "rad/s", "roll rate of the collector strip"),
         ("strip.contact_y", "m", "contact point on the strip, from its middle to the left"),
-        ("lift.moment", "N.m", "lifting moment") if moment else ("lift.force", "N", "lifting force"),
+        ("lift.moment", "N.m", "lifting moment")
+        if definition.lifts_by_moment
+        else ("lift.force", "N", "lifting force"),
         ("joints.violation", "m", "largest constraint violation"),
         ("joints.violation_rate", "m/s", "largest rate of constraint violation"),
     )

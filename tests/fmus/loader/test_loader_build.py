@@ -73,7 +73,7 @@ def test_without_a_compiler_the_stock_library_serves_and_the_build_says_so(monke
 
 
 @linux
-def test_a_loader_that_does_not_compile_is_told(monkeypatch, tmp_path):
+def test_a_loader_that_does_not_compile_is_reported(monkeypatch, tmp_path):
     monkeypatch.setattr(loader_build, "_OPTIONS", ("-std=nothing",))
     with pytest.raises(loader_build.LoaderError, match=r"refused the loader: .*-std=nothing"):
         loader_build.compile_loader(tmp_path / "x.so")

@@ -162,7 +162,7 @@ def test_names_of_supports_and_droppers_say_what_the_form_finding_says(short, tm
     made.free()
 
 
-def test_a_strip_s_ends_and_velocities_are_told_by_their_own_names(short, tmp_path):
+def test_a_strip_s_ends_and_velocities_have_their_own_names(short, tmp_path):
     """A tilted strip that rolls and runs ahead, named value by named value, presses as the part's own array does."""
     part = CatenaryPart(load(short_line_recipe(tmp_path).definition))
     made = Instance(short)

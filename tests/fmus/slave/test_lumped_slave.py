@@ -61,7 +61,7 @@ def test_values_by_name_are_motions_of_the_same_mass(instance):
 
 
 @pytest.mark.parametrize(("z", "vz"), [(0.05, 0.0), (0.0, 0.4)])
-def test_the_roof_s_height_and_velocity_are_told_by_their_own_names(instance, z, vz):
+def test_the_roof_s_height_and_velocity_have_their_own_names(instance, z, vz):
     """Height lifts by the lowest spring, velocity by the lowest damper: in the first instant M a = k z + c v."""
     instance.initialise(static_force=0.0, **{"base.z": z, "base.vz": vz})
     k, c, m = instance.get(["stage[1].stiffness", "stage[1].damping", "stage[1].mass"])

@@ -80,7 +80,7 @@ def test_a_train_too_fast_for_the_waves(instantiate, sound, share, expected):
     assert all(f"are {abs(share):.2f} of the contact wire's wave speed" in text for text in line.warnings)
 
 
-def test_steps_too_long_are_told_once(instantiate, sound):
+def test_steps_too_long_are_reported_once(instantiate, sound):
     line = instantiate(sound)
     line.initialise()
     time = 0.0
@@ -109,7 +109,7 @@ def test_a_line_that_cannot_be_built_tells_errors_alone(instantiate, sound):
 @pytest.mark.parametrize(("z", "expected"), [(5.08, 0), (5.30, 1)])
 @pytest.mark.parametrize("name", ["CX", "CX_multibody"])
 def test_a_wire_at_another_working_height(instantiate, pantographs, name, z, expected):
-    """What the line tells as the contact's place is where the wire is above the strip."""
+    """What the line gives as the point of contact is where the wire is above the strip."""
     pantograph = instantiate(pantographs[name])
     pantograph.initialise(**{"contact.x": 0.0, "contact.z": z})
     assert len(pantograph.warnings) == expected

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from master.batch.batch_session import BatchFiles, BatchState, work_off
+from master.batch.batch_session import BatchFiles, BatchState, run_tasks
 from master.errors import InterruptedRunError, MasterError
 
 
@@ -28,7 +28,7 @@ def test_state_is_on_disk_after_each_task(tmp_path):
         seen.append(on_disk(tmp_path / "out")["found"])
         return replace(state, found=(*state.found, task))
 
-    done = work_off(Sums(), (1, 2, 3), finish, FILES, tmp_path / "out")
+    done = run_tasks(Sums(), (1, 2, 3), finish, FILES, tmp_path / "out")
     assert seen == [[], [1], [1, 2]]
     assert (done.found, done.status) == ((1, 2, 3), "complete")
     assert on_disk(tmp_path / "out") == {"generator": "a test", "found": [1, 2, 3], "status": "complete"}
@@ -43,12 +43,12 @@ def test_an_interruption_leaves_what_was_finished_and_says_so(tmp_path, how):
         return replace(state, found=(*state.found, task))
 
     with pytest.raises(type(how)):
-        work_off(Sums(), (1, 2, 3), finish, FILES, tmp_path / "out")
+        run_tasks(Sums(), (1, 2, 3), finish, FILES, tmp_path / "out")
     assert on_disk(tmp_path / "out") == {"generator": "a test", "found": [1], "status": "interrupted"}
 
 
 def test_a_folder_of_another_batch_is_left_alone(tmp_path):
     other = replace(FILES, generator="another test")
-    work_off(Sums(), (), lambda state, _: state, other, tmp_path / "out")
+    run_tasks(Sums(), (), lambda state, _: state, other, tmp_path / "out")
     with pytest.raises(MasterError, match="left alone"):
-        work_off(Sums(), (), lambda state, _: state, FILES, tmp_path / "out")
+        run_tasks(Sums(), (), lambda state, _: state, FILES, tmp_path / "out")

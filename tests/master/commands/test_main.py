@@ -270,7 +270,7 @@ def test_report_with_a_measurement_a_film_and_parquet(toy, in_folder, capsys):
     assert main(["report", "a", "--measured", "m.csv", "--film", "film.gif", "--parquet"]) == 0
     out = capsys.readouterr().out
     assert "correlation" in out
-    assert "Measured beside simulated" in (in_folder / "a/report.html").read_text()
+    assert "Measured and simulated" in (in_folder / "a/report.html").read_text()
     assert (in_folder / "film.gif").stat().st_size > 1000
     assert main(["report", "a", "--measured", "m.csv", "--contact", "7"]) == 1
     assert "no contact 7" in capsys.readouterr().err
@@ -304,7 +304,7 @@ def test_compare_writes_a_report_of_several_runs(toy, in_folder, capsys):
 def test_a_failed_run_leaves_a_report_marked_incomplete(toy, in_folder, capsys):
     assert main([str(toy), "--out", "a", "--set", "catenary.fail_at=0.5", "--quiet", "--no-build"]) == 1
     page = (in_folder / "a/report.html").read_text()
-    assert "<b>Incomplete.</b> This run is failed at t = 0.5 s of 1 s." in page
+    assert "<b>Incomplete.</b> This run failed at t = 0.5 s of 1 s." in page
     assert "the wire broke" in page
     assert "id='chart-force_catenary_1'" in page
     assert main([str(toy), "--out", "b", "--set", "catenary.fail_at=0.5", "--quiet", "--no-build", "--no-report"]) == 1

@@ -90,7 +90,7 @@ def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, 
     builder.fingerprint = "CD-34"
     assert fmu_provision.provide_fmu(path, told.append) == path
     assert path.read_bytes() == before
-    assert told[1:] == [f"X.fmu is used as it is: {why}; to have it built anew, remove it"]
+    assert told[1:] == [f"X.fmu is used as it is: {why}; to have it rebuilt, remove it"]
 
 
 @pytest.mark.parametrize(("script", "is_ours"), [("X_ab1234567890", True), ("X_cd1234567890", False), ("own", False)])
@@ -121,7 +121,7 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
     fmu_provision.provide_fmu(path, told.append)
-    assert "which it was built from, is not there" in told[-1]
+    assert "which it was built from, is missing" in told[-1]
     assert len(builder.asked) == 3
 
 

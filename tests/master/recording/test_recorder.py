@@ -6,11 +6,9 @@ import pytest
 from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
 from master.coupling.network import Network
-from master.errors import MasterError
 from master.recording.recorder import RecordedValues, Recorder
-from master.recording.recording import header, load
+from master.recording.recording import load
 from master.system.connections import Connection
-from master.system.variable_names import matcher
 
 NAME = "clock.pantograph[1].contact.force"
 
@@ -57,44 +55,3 @@ def test_rows_reach_the_disk_while_the_run_goes_on(tmp_path, fake_slave):
     record(fake_slave, path, 600, flow=flow)
     assert seen[300] >= 250
     assert seen[-1] >= 500
-
-
-def test_a_line_cut_short_is_left_out(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("time [s],a.b [N],a.c\n0,1,2\n0.5,3,4\n1.0,5,6")
-    recording = load(path)
-    assert recording.time.tolist() == [0.0, 0.5]
-    assert recording.units == ("N", "")
-
-
-@pytest.mark.parametrize("text", ["", "t,a\n0,1\n", "time [s],a\n0,x\n", "time [s],a\n0,1,2\n0,1\n",
-    "time [s],a\n0,1\nnan,2\n", "time [s],a\n0,1\ninf,2\n", "time [s],a\n0,1\n0,2\n",
-    "time [s],a\n1,1\n0,2\n"])  # fmt: skip
-def test_what_is_no_recording_is_refused(tmp_path, text):
-    path = tmp_path / "a.csv"
-    path.write_text(text)
-    with pytest.raises(MasterError, match=r"a\.csv is not a recording"):
-        load(path)
-
-
-def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(MasterError, match="cannot be read"):
-        load(tmp_path / "none.csv")
-
-
-def test_header_without_unit():
-    assert header(["a.b[1]"], [""]) == ["time [s]", "a.b[1]"]
-
-
-@pytest.mark.parametrize(
-    ("pattern", "name", "fits"),
-    [
-        ("*.dropper[*].force", "catenary.dropper[12].force", True),
-        ("*.dropper[*].force", "catenary.dropper[12].forces", False),
-        ("catenary.support[1].uplift", "catenary.support[1].uplift", True),
-        ("catenary.support[1].uplift", "catenary.support1.uplift", False),
-        ("a.b", "a_b", False),
-    ],
-)
-def test_patterns_take_only_the_star_as_special(pattern, name, fits):
-    assert matcher(pattern)(name) is fits

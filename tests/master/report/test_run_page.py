@@ -33,7 +33,7 @@ def traces_of(chart):
 def test_text_is_escaped_and_incompleteness_is_said_first(made_up):
     page = run_page.page(made_up("failed"))
     assert "&lt;made&gt; &amp; up" in page
-    assert "<b>Incomplete.</b> This run is failed at t = 1 s. the wire &lt;broke&gt;" in page
+    assert "<b>Incomplete.</b> This run failed at t = 1 s. the wire &lt;broke&gt;. The" in page
     assert "<broke>" not in page
     assert page.index("Incomplete") < page.index("class='tiles'")
     assert "so far" in page
@@ -125,7 +125,7 @@ def test_what_has_no_data_has_no_chart(made_up):
 def test_rows_give_a_dash_where_there_is_no_value(made_up):
     (assessment,) = made_up().assessments()
     rows = {r[0]: r[1] for r in figure_rows([assessment])}
-    assert rows["contact on strip, least [mm]"] == "-"
+    assert rows["contact on strip, minimum [mm]"] == "-"
     assert float(rows["mean force [N]"]) == pytest.approx(assessment.quality.mean, abs=0.05)
     assert float(rows["contact height range [mm]"]) == pytest.approx(18.0, rel=0.05)
 

@@ -30,11 +30,11 @@ def test_a_new_run_finds_its_folder_empty_and_gets_its_own_identity(tmp_path):
 
 def test_a_run_knows_whether_its_results_still_lie_there(tmp_path):
     with claimed_for_run(tmp_path / "out") as own:
-        assert not own.is_intact  # nothing is written yet
+        assert not own.holds_this_run  # nothing is written yet
         own.write_summary(summary_of(own.run))
-        assert own.is_intact
+        assert own.holds_this_run
         own.write_summary(summary_of("another"))
-        assert not own.is_intact
+        assert not own.holds_this_run
 
 
 def test_only_the_run_of_the_checkpoint_continues_in_its_folder(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from master.commands.main import main
 from master.fmu.instance import Instance
 from master.safety import interruption
-from master.safety.interruption import end_signals, heeded_at_once, interruptible
+from master.safety.interruption import end_signals, interruptible, interruptible_at_once
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
@@ -27,12 +27,12 @@ def test_the_first_one_is_a_wish_and_the_second_an_order(number):
         assert not wanted()
 
 
-def test_where_nothing_is_lost_the_first_one_is_heeded_at_once():
+def test_where_nothing_is_lost_the_first_one_is_interruptible_at_once():
     with interruptible() as wanted:
-        with pytest.raises(KeyboardInterrupt), heeded_at_once():
+        with pytest.raises(KeyboardInterrupt), interruptible_at_once():
             signal.raise_signal(signal.SIGTERM)
         assert wanted()
-        assert interruption.is_wished()
+        assert interruption.is_stop_requested()
 
 
 def test_handlers_are_those_from_before():

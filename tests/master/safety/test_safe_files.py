@@ -20,7 +20,6 @@ import pytest
 from master.commands.main import main
 from master.errors import MasterError
 from master.recording import checkpoint
-from master.recording.checkpoint_writer import CheckpointSchedule
 from master.recording.recorder import LONGEST_UNWRITTEN, RecordedValues, Recorder
 from master.recording.recording import load
 from master.results import results_folder, run_results
@@ -157,7 +156,7 @@ def test_a_run_goes_on_only_as_it_began(toy, killed, capsys, options, text):
     ("spoil", "text"),
     [
         (lambda f: (f / checkpoint.NAME).unlink(), "holds no checkpoint.state to continue from"),
-        (lambda f: (f / SERIES[1]).write_text("time [s],other\n0,1\n"), "holds other variables than this run records"),
+        (lambda f: (f / SERIES[1]).write_text("time [s],other\n0,1\n"), "records other variables than this run does"),
         (lambda f: (f / SERIES[0]).write_bytes((f / SERIES[0]).read_bytes()[:9000]), "some are lost"),
         (lambda f: (f / "summary.json").write_text('{"generator": "openpanto master", "run": "x"}'), "another run"),
         (lambda f: (f / "summary.json").write_text('{"generator": "openpanto master"}'), "another run"),
@@ -321,10 +320,3 @@ def test_every_write_is_of_whole_lines(tmp_path, monkeypatch):
     assert len(written) < 15
     assert all(piece.endswith(b"\n") for piece in written)
     assert b"".join(written) == (tmp_path / "a.csv").read_bytes()
-
-
-def test_occasions():
-    due = [n for n in range(1, 10) if n in CheckpointSchedule(5, 3)]
-    assert due == [3, 5, 6, 9]
-    assert not CheckpointSchedule()
-    assert not any(n in CheckpointSchedule() for n in range(10))

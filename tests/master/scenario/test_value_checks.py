@@ -137,8 +137,8 @@ def test_that_is_a_whole_number_of_steps_and_not_one_too_many():
 @pytest.mark.parametrize(
     ("train", "last", "said"),
     [
-        (pantograph(), None, "has no end that the run could go on until; give it one, or a stop time"),
-        (pantograph(speed="none"), 390.0, "the FMU of 'train' tells no start_position and speed: give a stop time"),
+        (pantograph(), None, "has no end that the run could end at; give it one, or a stop time"),
+        (pantograph(speed="none"), 390.0, "the FMU of 'train' gives no start_position and speed; give a stop time"),
         (pantograph(speed="0"), 390.0, "train.speed = 0 m/s never leads to the end of the interval, 390 m"),
     ],
 )
@@ -148,7 +148,7 @@ def test_why_there_is_no_such_time(train, last, said):
 
 def test_without_a_pantograph_there_is_none():
     alone = System("one", (LINE,), (), 0.0, 1.0, 0.001, RunSettings(interval=EvaluationInterval(start=1.0, end=2.0)))
-    assert "no pantograph is told a contact force" in stop_after_interval(alone)
+    assert "no pantograph receives a contact force" in stop_after_interval(alone)
 
 
 def test_an_empty_cell_of_the_line_is_told_and_one_of_a_pantograph_is_not():

@@ -309,7 +309,7 @@ def test_blanks_around_values_are_none(scenario):
 def test_annotations_of_other_tools_are_noted(scenario):
     steps = '<ssd:Annotations><ssc:Annotation type="org.openmodelica"><x:FixedStepMaster xmlns:x="urn:x" stepSize="0.5"/></ssc:Annotation></ssd:Annotations>'
     text = ssd(system(component("a", Y)).replace("</ssd:System>", f"{steps}</ssd:System>"))
-    told = "SystemStructure.ssd:3: annotations of type 'org.openmodelica' are not read; what they tell of steps, solvers and events has no effect [note]"
+    told = "SystemStructure.ssd:3: annotations of type 'org.openmodelica' are not read; what they say of steps, solvers and events has no effect [note]"
     assert opened(scenario(text), strict=True).warnings == (told,)  # a note is no mistake
 
 

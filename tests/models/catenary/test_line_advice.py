@@ -16,7 +16,7 @@ from models.catenary.line_advice import (
     tangent_stiffness,
 )
 from models.catenary.line_part import CatenaryPart
-from models.catenary.statics.elasticity import contact_wire_wave_speed, wave_speed
+from models.catenary.statics.wire_waves import contact_wire_wave_speed, wave_speed
 from models.commands.physics_main import main
 
 
@@ -24,7 +24,7 @@ def test_the_speed_is_compared_with_the_waves_of_the_longest_span(ln2):
     C = wave_speed(ln2.contact_wire, 50.0)
     assert speed_warning(ln2, 0.699 * C) == ""
     assert "0.71 of the contact wire's wave speed" in speed_warning(ln2, 0.71 * C)
-    assert "operated up to 0.7" in speed_warning(ln2, -0.99 * C)
+    assert "operated at up to 0.7" in speed_warning(ln2, -0.99 * C)
     assert "no wave runs ahead" in speed_warning(ln2, 1.01 * C)
 
 

@@ -8,11 +8,12 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu, spsolve
 
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import StripMotion
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import weight
-from models.catenary.shape.line_matrices import assemble
 from models.catenary.shape.line_mesh import CatenaryMesh, Chain
+from models.catenary.shape.line_shape import line_shape
 from models.numerics.newmark import Newmark, steps_within
 from tests.models.nodal_line import NodalLine, pulls
 
@@ -51,7 +52,7 @@ def _single_wire(length, elements):
 
 
 def _wire_matrices(definition, mesh):
-    matrices = assemble(definition, mesh, mesh.points)
+    matrices = line_shape(definition, mesh, mesh.points).matrices
     free = np.flatnonzero(~mesh.fixed.ravel())
     K, M = (m[free][:, free].tocsc() for m in (matrices.K, matrices.M))
     return K, M, matrices.load[free], free
@@ -75,19 +76,17 @@ def test_sag_of_a_single_tensioned_span(short_line):
 def test_reactions_carry_the_weight(short_line):
     model = CatenaryModel(short_line)
     static, mesh = model.static, model.mesh
-    from models.catenary.shape.line_matrices import dropper_rows
-
-    rows = dropper_rows(mesh, static.points)
-    internal = static.matrices.K @ static.displacement + rows.T @ static.dropper_force - static.matrices.load
+    matrices, rows = static.shape.matrices, static.shape.droppers.rows
+    internal = matrices.K @ static.displacement + rows.T @ static.dropper_force - matrices.load
     reactions = internal.reshape(-1, NODE_DOFS)[:, 2][mesh.fixed[:, 2]]
-    assert reactions.sum() == pytest.approx(weight(static.matrices), rel=1e-9)
+    assert reactions.sum() == pytest.approx(weight(matrices), rel=1e-9)
     # The weight itself, from the definition: wires over their length, droppers, arms, clamps.
     d = short_line
     wires = (d.contact_wire.mass + d.messenger_wire.mass) * 300.0
-    droppers = d.dropper.mass * static.dropper_length.sum()
+    droppers = d.dropper.mass * static.droppers.length.sum()
     arms = 5 * (d.steady_arm.mass * d.steady_arm.length + d.clamps.steady_arm)
     clamps = 42 * (d.clamps.dropper_lower + d.clamps.dropper_upper)
-    assert weight(static.matrices) == pytest.approx(GRAVITY * (wires + droppers + arms + clamps), rel=2e-3)
+    assert weight(matrices) == pytest.approx(GRAVITY * (wires + droppers + arms + clamps), rel=2e-3)
 
 
 def test_wave_speed_on_a_long_wire(short_line):

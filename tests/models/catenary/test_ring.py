@@ -9,13 +9,14 @@ import scipy.sparse as sp
 
 from models.catenary.definition.line_reading import read
 from models.catenary.line_energy import LineBalance
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
+from models.catenary.line_state import StripMotion
 from models.catenary.linear_motion.attachment_solver import Banded, Cyclic, factorised
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.line_matrices import assemble, dropper_rows
 from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.shape.line_shape import line_shape
 from models.catenary.statics.elasticity import elasticity
 from models.coupled.monolithic import CoupledModel
 from models.definition_files.toml_reader import DefinitionError, Table
@@ -65,11 +66,14 @@ def test_every_support_is_there_once(ring):
 
 def test_matrices_are_those_of_the_open_chain_with_its_ends_tied_together(ring):
     """T' A T, with T from the degrees of freedom of the owners to those of all nodes."""
-    mesh, points = ring.mesh, ring.static.points
+    mesh, points = ring.mesh, ring.static.shape.points
     alone = replace(mesh, owner=np.arange(len(mesh.owner)))
     columns = (mesh.owner[:, None] * NODE_DOFS + np.arange(NODE_DOFS)).ravel()
     T = sp.csr_matrix((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns),) * 2)
-    tied, opened = assemble(ring.definition, mesh, points), assemble(ring.definition, alone, points)
+    tied, opened = (
+        line_shape(ring.definition, mesh, points).matrices,
+        line_shape(ring.definition, alone, points).matrices,
+    )
     for name in ("K", "M", "C"):
         expected = T.T @ getattr(opened, name) @ T
         difference = abs(getattr(tied, name) - expected).max()
@@ -161,7 +165,7 @@ def test_force_does_not_see_the_seam(run):
 
 
 def test_two_pantographs_with_the_seam_between_them(run):
-    """85 m apart: both before the seam, one on either side, both behind it, in whatever order they are told."""
+    """85 m apart: both before the seam, one on either side, both behind it, in whatever order they are given."""
     before, _ = run([290.0, 205.0])
     for places in ([540.0, 455.0], [590.0, 505.0], [40.0, -45.0], [540.0, 455.0 + 500.0]):
         shift = (places[0] - 290.0) % 100.0
@@ -379,14 +383,14 @@ def test_responses_reach_round_the_seam(ring_maker):
         ({"steady_arm": None}, "steady_arm: a periodic line needs a table [steady_arm]: it has no anchors, and nothing "
          "else holds the contact wire"),
         ({"stagger": {"amplitude": [0.2, "m", "test"], "anchor": [0.1, "m", "test"]}},
-         "section[1].stagger.anchor: a periodic line has no anchors: take this value away"),
+         "section[1].stagger.anchor: a periodic line has no anchors: remove this value"),
         ({"stagger": {"listed": [[0.2, -0.2, 0.1], "m", "test"]}, "spans": 4},
          "section[1].stagger.listed: has 3 values where 4 are needed"),
         ({"type": "stitched", "stitch_wire": {
             "length": [18.0, "m", "test"], "area": [35.0, "mm2", "test"], "mass": [0.31, "kg/m", "test"],
             "youngs_modulus": [1e5, "MPa", "test"], "tension": [2.8, "kN", "test"]}},
-         "stitch_wire: a periodic line cannot have stitch wires: that of its first support would lie across the place "
-         "where it closes; take type 'simple' or 'compound'"),
+         "stitch_wire: a periodic line cannot have stitch wires: the one at its first support would lie across the "
+         "seam; take type 'simple' or 'compound'"),
     ],
 )  # fmt: skip
 def test_what_does_not_close_is_told(ring_maker, changes, sentence):
@@ -408,7 +412,7 @@ def _of_sections(section_maker, *extra):
     [
         ([{}, {}], "section: 2 sections: a periodic line has one; write one section, or no 'periodic'"),
         ([{"ends": {"spans": 1, "rise": [0.1, "m", "test"]}}],
-         "section[1].ends: a periodic line has no ends: take this table away"),
+         "section[1].ends: a periodic line has no ends: remove this table"),
         ([{"measured": {"positions": [[0.0, 200.0], "m", "test"], "heights": [[5.1, 5.0], "m", "test"]}}],
          "section[1].measured.heights: a periodic line ends as it begins: the last height must be the first, 5.1 m, "
          "not 5 m"),
@@ -436,8 +440,8 @@ def test_uneven_spans_with_listed_stagger_close_as_well(ring_maker, sections_mak
     model = CatenaryModel(line)
     static, mesh = model.static, model.mesh
     assert static.residual < 1e-12
-    unbalanced = static.matrices.K @ static.displacement - static.matrices.load
-    unbalanced += dropper_rows(mesh, static.points).T @ static.dropper_force
+    unbalanced = static.shape.matrices.K @ static.displacement - static.shape.matrices.load
+    unbalanced += static.shape.droppers.rows.T @ static.dropper_force
     assert np.abs(unbalanced.reshape(-1, NODE_DOFS)[:, 1][~mesh.fixed[:, 1]]).max() < 1e-6
     assert build_mesh(line).points[mesh.support_nodes, 0].tolist() == [-10.0, 35.0, 89.0]
 

@@ -8,8 +8,9 @@ from scipy.sparse.linalg import spsolve
 from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter
 from models.catenary.contact_and_slack.crossing import engagement
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
+from models.catenary.line_state import StripMotion
 from models.contact_law import application_point
 from models.coupled.monolithic import CoupledModel
 from models.library.catalogue import load_pantograph
@@ -36,7 +37,7 @@ def pantograph(cx):
 
 
 def _assembled(line, pantograph, dt, steps):
-    """One matrix for both wires, pantograph and the springs of the closed contacts, solved anew every step."""
+    """One matrix for both wires, pantograph and the springs of the closed contacts, solved in every step."""
     model, lumped = CatenaryModel(line), LumpedModel(pantograph)
     catenary = NodalLine(model)
     newmark, n, m = Newmark(dt), catenary.size, lumped.size

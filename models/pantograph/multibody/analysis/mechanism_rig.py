@@ -89,17 +89,16 @@ class Rig:
         self.definition = definition
         self.mechanism = Mechanism(definition)
         self._start = settle_springs(self.mechanism)
-        self.base_height = definition.operation.reference_height - self.mechanism.strip_height(self._start)
+        self.base_height = definition.reference_height - self.mechanism.strip_height(self._start)
 
     @property
     def lift_unit(self) -> str:
         """Unit of the lifting value."""
-        lift = self.definition.lift_force
-        return "N.m" if lift is not None and lift.kind == "actuator_moment" else "N"
+        return "N.m" if self.definition.lifts_by_moment else "N"
 
     def statics(self, heights: FloatArray, contact_force: float = 157.5) -> Statics:
         """Return the statics at strip heights above top of rail [m], going up and down from the reference height."""
-        reference = self.definition.operation.reference_height
+        reference = self.definition.reference_height
         up = sorted(h for h in heights.tolist() if h >= reference)
         down = sorted((h for h in heights.tolist() if h < reference), reverse=True)
         rows = sorted(self._sweep(up, contact_force) + self._sweep(down, contact_force))
@@ -160,5 +159,5 @@ class Rig:
         except np.linalg.LinAlgError as error:
             raise MechanismError(
                 f"{self.definition.name}: its small motions about a strip height of {height:g} m have no solution "
-                f"({error}); look for a part that nothing holds, or joints that say the same twice"
+                f"({error}); look for a part that nothing holds, or for joints that repeat each other"
             ) from error

@@ -177,7 +177,7 @@ def _solve(
     unknown: float,
     condition: Condition,
 ) -> tuple[FloatArray, float]:
-    """Newton's method in the motions that the joints allow, for the configuration and one unknown input.
+    """Solve by Newton's method for the configuration and one unknown input, in the motions that the joints allow.
 
     The loads are linear in the unknown; each step is limited so that bodies turn and move by little.
     """

@@ -7,18 +7,46 @@ of mass, both in global components [N, N.m].
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, get_args
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.pantograph.multibody.elements.moving_vectors import Handle, Kinematics, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross
-from models.pantograph.multibody.mechanism_definition import Force
+from models.pantograph.multibody.mechanism_definition import (
+    ActuatorForce,
+    ActuatorMoment,
+    AxisMoment,
+    BumpStop,
+    Bushing,
+    Force,
+    Joint,
+    JointFriction,
+    LiftingForce,
+    LiftingMoment,
+    LineForce,
+    PairJoint,
+    PointJoint,
+    Prismatic,
+    Revolute,
+    SpringDamper,
+    Triple,
+    WeightSpring,
+)
 
-_LINES: Final = ("spring_damper", "actuator_force", "bump_stop")
-#: Every kind that `ForceElements` makes something of; `tests/test_registries.py` sees that each one pushes.
-KNOWN_KINDS: Final = frozenset((*_LINES, "actuator_moment", "joint_friction", "bushing"))
+#: Every class that `ForceElements` makes something of; `tests/test_registries.py` sees that each one pushes.
+KNOWN: Final = (
+    SpringDamper,
+    WeightSpring,
+    BumpStop,
+    ActuatorForce,
+    LiftingForce,
+    ActuatorMoment,
+    LiftingMoment,
+    Bushing,
+    *get_args(JointFriction),
+)
 
 
 class ForceElements:
@@ -27,6 +55,8 @@ class ForceElements:
     Parameters
     ----------
     forces : sequence of Force
+    joints : sequence of Joint
+        Where the friction is.
     numbers : dict
         Body name -> number.
     orientations : ndarray, shape (n, 3, 3)
@@ -41,20 +71,28 @@ class ForceElements:
     """
 
     def __init__(
-        self, forces: Sequence[Force], numbers: dict[str, int], orientations: FloatArray, pool: VectorPool
+        self,
+        forces: Sequence[Force],
+        joints: Sequence[Joint],
+        numbers: dict[str, int],
+        orientations: FloatArray,
+        pool: VectorPool,
     ) -> None:
-        if strange := [f for f in forces if f.kind not in KNOWN_KINDS]:
-            raise ValueError(f"force '{strange[0].name}': nothing is known of its kind '{strange[0].kind}'")
-        self.lines = LineElements([f for f in forces if f.kind in _LINES], numbers, pool)
-        self._moments = _Moments([f for f in forces if f.kind == "actuator_moment"], numbers, pool)
-        self._slides = LineElements([f for f in forces if f.joint_kind == "prismatic"], numbers, pool)
-        self._friction = np.array([f.friction for f in forces if f.joint_kind == "prismatic"])
-        self._transition = np.array([f.transition for f in forces if f.joint_kind == "prismatic"])
+        if strange := [f for f in forces if type(f) not in KNOWN]:
+            raise ValueError(f"force '{strange[0].name}': nothing computes a {type(strange[0]).__name__}")
+        by_name = {j.name: j for j in joints if isinstance(j, PairJoint)}
+        rubbing = [(f, by_name[f.joint]) for f in forces if isinstance(f, JointFriction)]
+        slides = [(f, j) for f, j in rubbing if isinstance(j, Prismatic)]
+        self.lines = LineElements([f for f in forces if isinstance(f, LineForce)], numbers, pool)
+        self._moments = _Moments([f for f in forces if isinstance(f, AxisMoment)], numbers, pool)
+        self._slides = _Lines([_Line.of(j, j.axis_i, numbers) for _, j in slides], len(numbers), pool)
+        self._friction = np.array([f.level for f, _ in slides])
+        self._transition = np.array([f.transition for f, _ in slides])
         self._others: list[_Friction | _Bushing] = []
         for f in forces:
-            if f.kind == "joint_friction" and f.joint_kind != "prismatic":
-                self._others.append(_Friction(f, numbers))
-            elif f.kind == "bushing":
+            if isinstance(f, JointFriction) and not isinstance(by_name[f.joint], Prismatic):
+                self._others.append(_Friction(f, by_name[f.joint], numbers))
+            elif isinstance(f, Bushing):
                 self._others.append(_Bushing(f, numbers, orientations))
 
     def compile(self, pool: VectorPool) -> None:
@@ -97,40 +135,43 @@ class Lengths(NamedTuple):
     divisor: FloatArray
 
 
-class LineElements:
-    """Springs, dampers, actuators and bump stops: a tension along a line or a given direction.
+class _Line(NamedTuple):
+    """A line from a point of body i to one of body j, or the direction of body i that stands for it."""
 
-    With d from point i to point j and x = d, or x = a given direction a of body i, the length is l = d . x / |x|
-    and the tension T = k (l - l0) + c l' - push; it pulls body i at the far point with T x / |x| and body j with the
-    opposite.
+    start: Vector
+    to: Vector
+    direction: Triple | None
+
+    @classmethod
+    def of(cls, pair: LineForce | PointJoint, direction: Triple | None, numbers: dict[str, int]) -> _Line:
+        """Return the line of an element's points."""
+        start, to = Vector(numbers[pair.body_i], pair.point_i), Vector(numbers[pair.body_j], pair.point_j)
+        return cls(start, to, direction)
+
+
+class _Lines:
+    """Lines between bodies, or directions, with lengths and tensions along them.
+
+    With d from point i to point j and x = d, or x = a given direction a of body i, the length is l = d . x / |x|; a
+    tension T pulls body i at the far point with T x / |x| and body j with the opposite.
     """
 
-    def __init__(self, forces: Sequence[Force], numbers: dict[str, int], pool: VectorPool) -> None:
-        self.names = [f.name for f in forces]
-        self.count = len(forces)
-        springs = [f.kind == "spring_damper" for f in forces]
-        self.stiffness = np.array([f.stiffness if s else 0.0 for f, s in zip(forces, springs, strict=True)])
-        self.damping = np.array([f.damping if s else 0.0 for f, s in zip(forces, springs, strict=True)])
-        self.free_length = np.array([f.free_length or 0.0 for f in forces])
-        self.carries = np.flatnonzero([s and f.free_length is None for f, s in zip(forces, springs, strict=True)])
-        self._push = np.array([f.value if f.kind == "actuator_force" else 0.0 for f in forces])
-        self._lift = [k for k, f in enumerate(forces) if f.lift]
-        self._stops = _Stops(forces)
-        self._directed = np.array([f.direction is not None for f in forces], dtype=bool)
+    def __init__(self, lines: Sequence[_Line], bodies: int, pool: VectorPool) -> None:
+        self.count = len(lines)
+        self._directed = np.array([line.direction is not None for line in lines], dtype=bool)
         self._turning = self._directed.astype(np.float64)
-        self._enter(forces, numbers, pool)
+        self._enter(lines, pool)
         columns = np.arange(self.count)
-        self._gather = np.zeros((len(numbers), 2 * self.count))
-        self._gather[[numbers[f.body_i] for f in forces], columns] = 1.0
-        self._gather[[numbers[f.body_j] for f in forces], self.count + columns] = -1.0
+        self._gather = np.zeros((bodies, 2 * self.count))
+        self._gather[[line.start.body for line in lines], columns] = 1.0
+        self._gather[[line.to.body for line in lines], self.count + columns] = -1.0
 
-    def _enter(self, forces: Sequence[Force], numbers: dict[str, int], pool: VectorPool) -> None:
+    def _enter(self, lines: Sequence[_Line], pool: VectorPool) -> None:
         self._handles: list[tuple[Handle, Handle]] = []
         ends_i, ends_j = [], []
-        for f in forces:
-            start, to = Vector(numbers[f.body_i], f.point_i), Vector(numbers[f.body_j], f.point_j)
+        for start, to, direction in lines:
             gap = pool.gap(start, to)
-            x = gap if f.direction is None else pool.vector(Vector(start.body, f.direction))
+            x = gap if direction is None else pool.vector(Vector(start.body, direction))
             self._handles.append((x, gap))
             ends_i.append(pool.cross(pool.lever(start, to), x))
             ends_j.append(pool.cross(pool.vector(to), x))
@@ -151,6 +192,39 @@ class LineElements:
         rate = products[:, 0, 1] + self._turning * products[:, 1, 0]
         return Lengths(along / divisor, rate / divisor, divisor)
 
+    def spread(self, tension: FloatArray, vectors: MovingVectors) -> FloatArray:
+        """Return the loads of given tensions per length of x, shape (L,)."""
+        wrench = np.empty((2, self.count, 6))
+        wrench[:, :, :3] = vectors.values.take(self._x, axis=0)[:, :3]
+        wrench[:, :, 3:] = vectors.crosses.take(self._turns, axis=0).reshape(2, -1, 3)
+        wrench *= tension[:, None]
+        return self._gather @ wrench.reshape(-1, 6)
+
+
+class LineElements(_Lines):
+    """Springs, dampers, actuators and bump stops, with the tension T = k (l - l0) + c l' - push.
+
+    Attributes
+    ----------
+    names : list of str
+    stiffness, damping, free_length : ndarray, shape (L,)
+        [N/m, N.s/m, m]; 0 of what is no spring.
+    carries : ndarray
+        Which elements are springs that carry the weights.
+    """
+
+    def __init__(self, forces: Sequence[LineForce], numbers: dict[str, int], pool: VectorPool) -> None:
+        super().__init__([_Line.of(f, f.direction, numbers) for f in forces], len(numbers), pool)
+        self.names = [f.name for f in forces]
+        springs = [f if isinstance(f, SpringDamper | WeightSpring) else None for f in forces]
+        self.stiffness = np.array([f.stiffness if f else 0.0 for f in springs])
+        self.damping = np.array([f.damping if f else 0.0 for f in springs])
+        self.free_length = np.array([f.free_length if isinstance(f, SpringDamper) else 0.0 for f in forces])
+        self.carries = np.flatnonzero([isinstance(f, WeightSpring) for f in forces])
+        self._push = np.array([f.force if isinstance(f, ActuatorForce) else 0.0 for f in forces])
+        self._lift = [k for k, f in enumerate(forces) if isinstance(f, LiftingForce)]
+        self._stops = _Stops([f if isinstance(f, BumpStop) else None for f in forces])
+
     def loads(self, vectors: MovingVectors, lift: float) -> FloatArray:
         """Return the loads of all line elements."""
         if self.count == 0:
@@ -162,14 +236,6 @@ class LineElements:
         if self._stops.any:
             tension += self._stops.tension(lengths.length, lengths.rate)
         return self.spread(tension / lengths.divisor, vectors)
-
-    def spread(self, tension: FloatArray, vectors: MovingVectors) -> FloatArray:
-        """Return the loads of given tensions per length of x, shape (L,)."""
-        wrench = np.empty((2, self.count, 6))
-        wrench[:, :, :3] = vectors.values.take(self._x, axis=0)[:, :3]
-        wrench[:, :, 3:] = vectors.crosses.take(self._turns, axis=0).reshape(2, -1, 3)
-        wrench *= tension[:, None]
-        return self._gather @ wrench.reshape(-1, 6)
 
     def energy(self, vectors: MovingVectors) -> float:
         """Return the energy stored in springs and bump stops [J]."""
@@ -183,13 +249,12 @@ class LineElements:
 class _Stops:
     """Bump stops: springs beyond a shortest and a longest length; they push back, never pull."""
 
-    def __init__(self, forces: Sequence[Force]) -> None:
-        is_stop = [f.kind == "bump_stop" for f in forces]
-        self.any = any(is_stop)
-        self.k = np.array([f.stiffness if s else 0.0 for f, s in zip(forces, is_stop, strict=True)])
-        self.c = np.array([f.damping if s else 0.0 for f, s in zip(forces, is_stop, strict=True)])
-        self.shortest = np.array([f.shortest for f in forces])
-        self.longest = np.array([f.longest for f in forces])
+    def __init__(self, stops: Sequence[BumpStop | None]) -> None:
+        self.any = any(stops)
+        self.k = np.array([s.stiffness if s else 0.0 for s in stops])
+        self.c = np.array([s.damping if s else 0.0 for s in stops])
+        self.shortest = np.array([-np.inf if s is None or s.shortest is None else s.shortest for s in stops])
+        self.longest = np.array([np.inf if s is None or s.longest is None else s.longest for s in stops])
 
     def tension(self, length: FloatArray, speed: FloatArray) -> FloatArray:
         """Return the tension of the stops, 0 between the two lengths [N]."""
@@ -210,12 +275,11 @@ class _Stops:
 class _Moments:
     """Actuator moments: +M on body j and -M on body i about an axis of body i."""
 
-    def __init__(self, forces: Sequence[Force], numbers: dict[str, int], pool: VectorPool) -> None:
+    def __init__(self, forces: Sequence[AxisMoment], numbers: dict[str, int], pool: VectorPool) -> None:
         self.count = len(forces)
-        axes = [(numbers[f.body_i], f.direction) for f in forces]
-        self._handles = [pool.vector(Vector(body, axis)) for body, axis in axes if axis is not None]
-        self._values = np.array([f.value for f in forces])
-        self._lift = [k for k, f in enumerate(forces) if f.lift]
+        self._handles = [pool.vector(Vector(numbers[f.body_i], f.axis_i)) for f in forces]
+        self._values = np.array([f.moment if isinstance(f, ActuatorMoment) else 0.0 for f in forces])
+        self._lift = [k for k, f in enumerate(forces) if isinstance(f, LiftingMoment)]
         self._gather = np.zeros((len(numbers), self.count))
         for k, f in enumerate(forces):
             self._gather[numbers[f.body_j], k] = 1.0
@@ -236,11 +300,10 @@ class _Moments:
 class _Friction:
     """Moment against the relative rotation in a joint, M tanh(w / w0), for a hinge about its axis."""
 
-    def __init__(self, force: Force, numbers: dict[str, int]) -> None:
-        self._i, self._j = numbers[force.body_i], numbers[force.body_j]
-        self._level, self._transition = force.friction, force.transition
-        hinge = force.joint_kind == "revolute" and force.direction is not None
-        self._axis = np.array(force.direction) if hinge else None
+    def __init__(self, force: JointFriction, joint: PairJoint, numbers: dict[str, int]) -> None:
+        self._i, self._j = numbers[joint.body_i], numbers[joint.body_j]
+        self._level, self._transition = force.level, force.transition
+        self._axis = np.array(joint.axis_i) if isinstance(joint, Revolute) else None
 
     def loads(self, kinematics: Kinematics, w: FloatArray) -> FloatArray:
         frames = kinematics.frames
@@ -264,7 +327,7 @@ class _Bushing:
     is taken as a rotation vector, so the moments are those of a potential for small angles.
     """
 
-    def __init__(self, force: Force, numbers: dict[str, int], orientations: FloatArray) -> None:
+    def __init__(self, force: Bushing, numbers: dict[str, int], orientations: FloatArray) -> None:
         self._i, self._j = numbers[force.body_i], numbers[force.body_j]
         self._s_i, self._s_j = np.array(force.point_i), np.array(force.point_j)
         self._rest = orientations[self._i].T @ orientations[self._j]

@@ -17,16 +17,26 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.pantograph.multibody.elements.moving_vectors import GROUND, Handle, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross, normals
-from models.pantograph.multibody.mechanism_definition import Joint
+from models.pantograph.multibody.mechanism_definition import (
+    Fixed,
+    PairJoint,
+    Perpendicular,
+    PointJoint,
+    Prismatic,
+    Revolute,
+    RevolutePrismatic,
+    Spherical,
+    Universal,
+)
 
 
 @dataclass(frozen=True)
@@ -64,19 +74,19 @@ def _fixed_to(body: int, local: FloatArray) -> Vector:
     return Vector(body, (x, y, z))
 
 
-def coincidence(joint: Joint, pair: Pair) -> list[Row]:
+def coincidence(joint: PointJoint, pair: Pair) -> list[Row]:
     """Return the three rows that hold point_i on point_j."""
     start = Vector(pair.i, joint.point_i)
     to = Vector(pair.j, joint.point_j)
     return [GapRow(_fixed_to(GROUND, axis), start, to) for axis in np.eye(3)]
 
 
-def perpendicular(joint: Joint, pair: Pair) -> list[Row]:
+def perpendicular(joint: Perpendicular | Universal, pair: Pair) -> list[Row]:
     """Return the row that holds axis_i perpendicular to axis_j (added to a ball joint it stops the spin)."""
     return [AxisRow(Vector(pair.i, joint.axis_i), Vector(pair.j, joint.axis_j))]
 
 
-def revolute(joint: Joint, pair: Pair) -> list[Row]:
+def revolute(joint: Revolute, pair: Pair) -> list[Row]:
     """Return the five rows of a hinge about axis_i, which stays parallel to axis_j."""
     axis = Vector(pair.j, joint.axis_j)
     first, second = normals(np.array(joint.axis_i))
@@ -84,37 +94,37 @@ def revolute(joint: Joint, pair: Pair) -> list[Row]:
     return coincidence(joint, pair) + parallel
 
 
-def spherical(joint: Joint, pair: Pair) -> list[Row]:
+def spherical(joint: Spherical, pair: Pair) -> list[Row]:
     """Return the three rows of a ball joint."""
     return coincidence(joint, pair)
 
 
-def universal(joint: Joint, pair: Pair) -> list[Row]:
+def universal(joint: Universal, pair: Pair) -> list[Row]:
     """Return the four rows of a cardan joint with the perpendicular axes axis_i and axis_j."""
     return coincidence(joint, pair) + perpendicular(joint, pair)
 
 
-def fixed_orientation(joint: Joint, pair: Pair) -> list[Row]:
+def fixed_orientation(pair: Pair) -> list[Row]:
     """Return the three rows that hold the bodies' relative orientation as written."""
     x, y, z = np.eye(3)
     pairs = ((x, y), (y, z), (z, x))
     return [AxisRow(_fixed_to(pair.i, pair.A_i.T @ a), _fixed_to(pair.j, pair.A_j.T @ b)) for a, b in pairs]
 
 
-def fixed(joint: Joint, pair: Pair) -> list[Row]:
+def fixed(joint: Fixed, pair: Pair) -> list[Row]:
     """Return the six rows of a rigid connection, with the relative orientation as written."""
-    return coincidence(joint, pair) + fixed_orientation(joint, pair)
+    return coincidence(joint, pair) + fixed_orientation(pair)
 
 
-def prismatic(joint: Joint, pair: Pair) -> list[Row]:
+def prismatic(joint: Prismatic, pair: Pair) -> list[Row]:
     """Return the five rows of a slide along axis_i, with the relative orientation as written."""
     start = Vector(pair.i, joint.point_i)
     to = Vector(pair.j, joint.point_j)
     across: list[Row] = [GapRow(_fixed_to(pair.i, n), start, to) for n in normals(np.array(joint.axis_i))]
-    return across + fixed_orientation(joint, pair)
+    return across + fixed_orientation(pair)
 
 
-def revolute_prismatic(joint: Joint, pair: Pair) -> list[Row]:
+def revolute_prismatic(joint: RevolutePrismatic, pair: Pair) -> list[Row]:
     """Return the four rows of a body j that turns about axis_i and slides along its own axis_j.
 
     The slide's line goes through point_j and stays on point_i; the orientation about it is as written.
@@ -135,15 +145,15 @@ def revolute_prismatic(joint: Joint, pair: Pair) -> list[Row]:
     ]
 
 
-#: Joint kind -> its rows. A prescribed motion has none: the body's motion is known.
-JOINT_ROWS: Final[dict[str, Callable[[Joint, Pair], list[Row]]]] = {
-    "revolute": revolute,
-    "spherical": spherical,
-    "prismatic": prismatic,
-    "revolute_prismatic": revolute_prismatic,
-    "universal": universal,
-    "fixed": fixed,
-    "perpendicular": perpendicular,
+#: What makes the rows of a kind of joint. A prescribed motion has none: the body's motion is known.
+JOINT_ROWS: Final[Mapping[type[PairJoint], Callable[[Any, Pair], list[Row]]]] = {
+    Revolute: revolute,
+    Spherical: spherical,
+    Prismatic: prismatic,
+    RevolutePrismatic: revolute_prismatic,
+    Universal: universal,
+    Fixed: fixed,
+    Perpendicular: perpendicular,
 }
 
 

@@ -47,7 +47,7 @@ def test_variants_are_chosen_by_name(family_folder):
         ("name,a.b\nx,1\n", "first column must be 'variant'"),
         ("variant,a\nx,1\n", "column 'a' is neither"),
         ("variant,a.b\nx,1,2\n", "variants.csv:2: has 3 cells, the head has 2"),
-        ("variant,a.b\nx,1\nx,2\n", "'x' stands there twice"),
+        ("variant,a.b\nx,1\nx,2\n", "'x' appears more than once"),
         ("variant,stop\nx,-1\n", "stop: Input should be greater than 0"),
         ("variant,a.b\n", "has no variant"),
     ],

@@ -151,5 +151,5 @@ def test_a_row_tells_its_band_that_it_is_recalled_and_what_other_filters_give():
     assert remark == said
     plain = _row(value=38.9, tolerance=1)
     assert decide(plain, QUANTITIES["sigma"], measured, {}).remark == ""
-    told = Measured((38.0,), others=(("fft 20 Hz", 30.0),), is_told=True)
+    told = Measured((38.0,), others=(("fft 20 Hz", 30.0),), depends_on_filter=True)
     assert decide(plain, QUANTITIES["sigma"], told, {}).remark == "with other filters 30.0 (fft 20 Hz)"

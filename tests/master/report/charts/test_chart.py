@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex, to_rgb
 
-from master.report.charts.chart import COLOURS, DASHES, Axis, Bars, Chart, Curve, Level, Ticks, stroke
+from master.report.charts.chart import COLOURS, DASHES, GREY, MARK, Axis, Bars, Chart, Curve, Level, Ticks, stroke
 from master.report.charts.interactive_figure import interactive_figure
 from master.report.charts.static_figure import static_figure
+from master.report.html_markup import asset
 
 X = np.linspace(0.0, 1.0, 11)
 
@@ -61,6 +63,21 @@ def lab(colour, sight):
 def test_colours_are_told_apart_without_red_or_green(sight):
     apart = {(a, b): np.linalg.norm(lab(a, sight) - lab(b, sight)) for a, b in combinations(COLOURS, 2)}
     assert min(apart.values()) > 6.0 * 2.3, min(apart, key=apart.get)
+
+
+def test_the_moving_picture_has_the_colours_of_the_charts():
+    root = asset("style.css").partition("@media")[0]
+    found = dict(re.findall(r"--(wire|slack|messenger|raw|mark): (#[0-9a-f]{6})", root))
+    assert found == {"wire": COLOURS[0], "slack": COLOURS[1], "messenger": GREY, "raw": GREY, "mark": MARK}
+
+
+def test_twelve_bars_can_be_told_apart_on_a_page_and_in_a_file():
+    drawn = chart(*(Bars(f"run {i}", ("mean",), X[:1], i) for i in range(12)), x=Axis("figure"))
+    markers = [trace["marker"] for trace in interactive_figure(drawn)["data"]]
+    (axes,) = static_figure([drawn]).axes
+    in_file = [(to_hex(bar.get_facecolor()), bar.get_hatch()) for bars in axes.containers for bar in bars]
+    assert len({(m["color"], m["pattern"]["shape"]) for m in markers}) == len(set(in_file)) == 12
+    assert [colour for colour, _ in in_file] == [m["color"] for m in markers]
 
 
 def test_both_renderers_draw_the_same_numbers_over_the_same_axes():

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from models.catenary.shape.line_matrices import slack_delay
+from models.catenary.shape.dropper_set import dropper_set
 from models.catenary.shape.line_mesh import build_mesh
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import line_names, load_line
@@ -28,7 +28,7 @@ def test_hangers_follow_their_own_law():
             dropper=dataclasses.replace(line.dropper, slack_law=own),
             hanger=dataclasses.replace(line.hanger, slack_law=other),
         )
-        delay = slack_delay(mixed, mesh)
+        delay = dropper_set(mixed, mesh, mesh.points).slack_delay
         assert np.all(delay[mesh.is_hanger] == (0.0272 if other == "tension" else 0.0))
         assert np.all(delay[~mesh.is_hanger] == (0.0272 if own == "tension" else 0.0))
 

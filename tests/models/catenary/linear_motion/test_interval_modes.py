@@ -103,9 +103,9 @@ def test_intervals_cover_a_wire(model):
 
 def test_rotation_to_nodal_axes_changes_no_energy(model):
     """The rotated stiffness, without what rounding leaves of zeros, is the same quadratic form."""
-    matrices, attached = model.static.matrices, attachments(model.mesh)
+    matrices, attached = model.static.shape.matrices, attachments(model.mesh)
     parts = [part for chain in model.mesh.chains for part in intervals(chain, attached)]
-    Q = plan_rotation(plan_angles(parts, model.static.points))
+    Q = plan_rotation(plan_angles(parts, model.static.shape.points))
     rotated = (Q.T @ matrices.K @ Q).tocsr()
     cleaned = without_rounding(rotated, np.sqrt(rotated.diagonal()))
     assert cleaned.nnz < 0.7 * matrices.K.nnz

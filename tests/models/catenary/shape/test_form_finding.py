@@ -8,16 +8,13 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY
-from models.catenary.line_model import CatenaryModel, StripMotion
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import StripMotion
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, find_form, weight
-from models.catenary.shape.line_matrices import (
-    assemble,
-    dropper_lengths,
-    dropper_rows,
-    dropper_stiffness,
-)
+from models.catenary.shape.line_matrices import assemble
 from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.shape.line_shape import line_shape
 from models.commands.physics_main import main
 from models.library.catalogue import line_names, load_line
 
@@ -31,10 +28,9 @@ def found(request):
 
 def droppers_as_springs(line, mesh, state):
     """Return the displacement of the line about its static points, droppers as springs of their unstrained lengths."""
-    matrices = assemble(line, mesh, state.points)
-    B = dropper_rows(mesh, state.points)
-    k = dropper_stiffness(line, mesh, state.points)
-    stretch = dropper_lengths(mesh, state.points) - state.unstrained_length
+    shape = line_shape(line, mesh, state.shape.points)
+    matrices, B, k = shape.matrices, shape.droppers.rows, shape.droppers.stiffness
+    stretch = shape.droppers.length - state.unstrained_length
     free = np.flatnonzero(~mesh.fixed.ravel())
     K = matrices.K + B.T @ sp.diags(k) @ B
     load = matrices.load - B.T @ (k * stretch)
@@ -45,8 +41,8 @@ def droppers_as_springs(line, mesh, state):
 
 def test_forces_balance_at_every_node(found):
     line, mesh, state = found
-    matrices = assemble(line, mesh, state.points)
-    unbalanced = matrices.K @ state.displacement + dropper_rows(mesh, state.positions).T @ state.dropper_force
+    matrices = line_shape(line, mesh, state.shape.points).matrices
+    unbalanced = matrices.K @ state.displacement + state.droppers.rows.T @ state.dropper_force
     unbalanced = (unbalanced - matrices.load).reshape(-1, NODE_DOFS)[~mesh.fixed]
     assert np.abs(unbalanced).max() < 1e-6 * weight(matrices)
     assert state.residual < 1e-6
@@ -57,19 +53,19 @@ def test_the_line_stands_still_on_droppers_of_the_lengths_found(found):
     displacement, force = droppers_as_springs(line, mesh, state)
     moved = (displacement.reshape(-1, NODE_DOFS)[mesh.owner] - state.displacement.reshape(-1, NODE_DOFS))[:, :3]
     assert np.abs(moved).max() < 1e-6
-    assert np.abs(force - state.dropper_force).max() < 1e-6 * weight(state.matrices)
+    assert np.abs(force - state.dropper_force).max() < 1e-6 * weight(state.shape.matrices)
 
 
 def test_supports_carry_the_weight(found):
     line, mesh, state = found
-    M = state.matrices.M
-    internal = state.matrices.K @ state.displacement + dropper_rows(mesh, state.points).T @ state.dropper_force
-    reactions = (internal - state.matrices.load).reshape(-1, NODE_DOFS)
+    matrices = state.shape.matrices
+    internal = matrices.K @ state.displacement + state.shape.droppers.rows.T @ state.dropper_force
+    reactions = (internal - matrices.load).reshape(-1, NODE_DOFS)
     held = np.where(mesh.fixed, reactions, 0.0)[:, :3].sum(axis=0)
     if line.messenger_support is not None:
         held[2] += (line.messenger_support.stiffness * (mesh.seat - state.positions[mesh.sprung, 2])).sum()
-    total = weight(state.matrices)
-    mass = GRAVITY * M.diagonal().reshape(-1, NODE_DOFS)[:, 2].sum()
+    total = weight(matrices)
+    mass = GRAVITY * matrices.M.diagonal().reshape(-1, NODE_DOFS)[:, 2].sum()
     assert total > mass > 0.5 * total  # a consistent mass has the rest beside its diagonal
     assert held == pytest.approx([0.0, 0.0, total], abs=1e-6 * total)
 
@@ -77,11 +73,11 @@ def test_supports_carry_the_weight(found):
 def test_weight_is_that_of_the_parts(found):
     line, mesh, state = found
     per_length = np.array([getattr(getattr(line, c), "mass", 0.0) for c in COMPONENTS])
-    start, end = (state.points[mesh.beams[:, k]] for k in (0, 1))
+    start, end = (state.shape.points[mesh.beams[:, k]] for k in (0, 1))
     wires = per_length[mesh.component] @ np.linalg.norm(end - start, axis=1)
     hung = np.where(mesh.is_hanger, getattr(line.hanger, "mass", 0.0), line.dropper.mass)
-    parts = wires + hung @ dropper_lengths(mesh, state.points) + mesh.clamp_mass.sum()
-    assert weight(state.matrices) == pytest.approx(GRAVITY * parts, rel=1e-6)
+    parts = wires + hung @ state.shape.droppers.length + mesh.clamp_mass.sum()
+    assert weight(state.shape.matrices) == pytest.approx(GRAVITY * parts, rel=1e-6)
 
 
 def test_wires_stand_at_the_wanted_heights(found):
@@ -90,11 +86,11 @@ def test_wires_stand_at_the_wanted_heights(found):
 
 
 def test_every_dropper_is_in_tension(found):
-    _, mesh, state = found
+    _, _, state = found
     assert state.dropper_force.min() > 10.0
     assert state.unstrained_length.min() > 0.0
-    stiffness = dropper_stiffness(found[0], mesh, state.points)
-    assert stiffness * (state.dropper_length - state.unstrained_length) == pytest.approx(state.dropper_force, rel=1e-6)
+    stiffness = state.shape.droppers.stiffness
+    assert stiffness * (state.droppers.length - state.unstrained_length) == pytest.approx(state.dropper_force, rel=1e-6)
 
 
 def test_wires_keep_the_tension_that_they_are_strung_with(found):
@@ -104,7 +100,7 @@ def test_wires_keep_the_tension_that_they_are_strung_with(found):
     assert stretch < 1e-4
     for chain in mesh.chains:
         wire = getattr(line, chain.component)
-        points, move = state.points[chain.nodes], state.displacement.reshape(-1, NODE_DOFS)[chain.nodes, :3]
+        points, move = state.shape.points[chain.nodes], state.displacement.reshape(-1, NODE_DOFS)[chain.nodes, :3]
         along = np.diff(points, axis=0)
         strain = np.einsum("ij,ij->i", along, np.diff(move, axis=0)) / (along**2).sum(axis=1)
         assert np.abs(wire.youngs_modulus * wire.area * strain).max() < 0.01 * wire.tension
@@ -180,7 +176,7 @@ def test_stitch_wire_carries_its_droppers_like_a_string():
     slopes = [(z[i + 1] - z[i]) / (x[i + 1] - x[i]) for i in middles]
     force = state.dropper_force[np.isin(mesh.droppers[:, 1], stitch.nodes)]
     wire = (x[middles[1]] - x[middles[0]]) * line.stitch_wire.mass * GRAVITY
-    hung = GRAVITY * (line.clamps.dropper_upper + 0.5 * line.dropper.mass * state.dropper_length.mean())
+    hung = GRAVITY * (line.clamps.dropper_upper + 0.5 * line.dropper.mass * state.droppers.length.mean())
     assert line.stitch_wire.tension * (slopes[1] - slopes[0]) == pytest.approx(force[0] + wire + hung, rel=5e-3)
 
 
@@ -206,7 +202,7 @@ def test_longer_droppers_lower_the_wire(short_line):
     lines = [with_lengths(short_line, (length,) * 7) for length in (1.10, 1.15)]
     states = [find_form(line, build_mesh(line)) for line in lines]
     lower = build_mesh(lines[0]).droppers[:, 0]
-    inner = np.abs(states[0].points[lower, 0] - 150.0) < 40.0
+    inner = np.abs(states[0].shape.points[lower, 0] - 150.0) < 40.0
     drop = (states[0].positions - states[1].positions)[lower[inner], 2]
     assert drop == pytest.approx(np.full(inner.sum(), 0.05), abs=1e-3)
 
@@ -267,7 +263,7 @@ def test_what_nothing_holds_is_one_sentence(line_maker, monkeypatch):
         kept[inner * NODE_DOFS + 3] = 0.0  # nothing keeps it from twisting
         return dataclasses.replace(matrices, K=(sp.diags(kept) @ matrices.K @ sp.diags(kept)).tocsc())
 
-    monkeypatch.setattr("models.catenary.shape.form_finding.assemble", loose)
+    monkeypatch.setattr("models.catenary.shape.line_shape.assemble", loose)
     with pytest.raises(EquilibriumError, match="equations are singular, as they are where nothing holds a wire"):
         find_form(line, mesh)
 
@@ -282,8 +278,8 @@ def test_a_command_tells_it_without_a_traceback(capfd):
 def test_a_line_without_mass_is_one_sentence(line_maker, monkeypatch):
     def weightless(*given):
         state = find_form(*given)
-        matrices = dataclasses.replace(state.matrices, M=0.0 * state.matrices.M)
-        return dataclasses.replace(state, matrices=matrices)
+        matrices = dataclasses.replace(state.shape.matrices, M=0.0 * state.shape.matrices.M)
+        return dataclasses.replace(state, shape=dataclasses.replace(state.shape, matrices=matrices))
 
     monkeypatch.setattr("models.catenary.line_model.find_form", weightless)
     with pytest.raises(EquilibriumError, match=r"line 'short' cannot move in modes .*not positive"):

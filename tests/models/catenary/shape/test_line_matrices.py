@@ -11,8 +11,10 @@ import pytest
 
 from models.catenary.definition.line_definition import COMPONENTS, Damping, Dropper, MessengerSupport, Rayleigh
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.line_matrices import assemble, beam_properties, compression_ratio, dropper_stiffness
+from models.catenary.shape.dropper_set import dropper_set
+from models.catenary.shape.line_matrices import beam_properties
 from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
+from models.catenary.shape.line_shape import line_shape
 from models.library.catalogue import line_names, load_line
 
 GRAVITY = 9.81
@@ -22,7 +24,7 @@ GRAVITY = 9.81
 def built(request):
     line = load_line(request.param)
     mesh = build_mesh(line)
-    return line, mesh, assemble(line, mesh, mesh.points)
+    return line, mesh, line_shape(line, mesh, mesh.points).matrices
 
 
 def _rigid(mesh, axis):
@@ -161,7 +163,7 @@ def test_a_twisted_wire_stores_what_its_torsion_stores(line_maker):
     (chain,) = mesh.contact_chains()
     points[chain.nodes, 2] = 5.08  # straight and level, so that the axis of every element is x
     bare = dataclasses.replace(mesh, clamp_mass=np.zeros_like(mesh.clamp_mass))
-    matrices = assemble(line, bare, points)
+    matrices = line_shape(line, bare, points).matrices
     x = points[chain.nodes, 0]
     length = x[-1] - x[0]
     twist = _twisted(line, mesh, chain.nodes, (x - x[0]) / length)
@@ -178,7 +180,7 @@ def test_hangers_weigh_what_hangers_weigh():
     line = load_line("Shinkansen")
     mesh = build_mesh(line)
     heavier = dataclasses.replace(line, hanger=dataclasses.replace(line.hanger, mass=line.hanger.mass + 1.0))
-    added = assemble(heavier, mesh, mesh.points).M - assemble(line, mesh, mesh.points).M
+    added = line_shape(heavier, mesh, mesh.points).matrices.M - line_shape(line, mesh, mesh.points).matrices.M
     move = _rigid(mesh, 2)
     hung = _dropper_lengths(mesh, True)
     assert len(hung) > 50
@@ -193,7 +195,7 @@ def test_a_dropper_swings_about_an_end_that_stands_still_with_a_third_of_its_mas
     line = line_maker(spans=4)
     mesh = build_mesh(line)
     heavier = dataclasses.replace(line, dropper=dataclasses.replace(line.dropper, mass=line.dropper.mass + 1.0))
-    added = assemble(heavier, mesh, mesh.points).M - assemble(line, mesh, mesh.points).M
+    added = line_shape(heavier, mesh, mesh.points).matrices.M - line_shape(line, mesh, mesh.points).matrices.M
     whole = sum(_dropper_lengths(mesh, False))
     for ends in (mesh.droppers[:, 0], mesh.droppers[:, 1]):
         for axis in range(3):
@@ -216,7 +218,8 @@ def test_hangers_are_as_stiff_as_hangers_are():
     hanger = Dropper(stiffness=3e5, mass=0.1, compression_ratio=0.25)
     line = dataclasses.replace(load_line("Shinkansen"), hanger=hanger)
     mesh = build_mesh(line)
-    found, ratio = dropper_stiffness(line, mesh, mesh.points), compression_ratio(line, mesh)
+    droppers = dropper_set(line, mesh, mesh.points)
+    found, ratio = droppers.stiffness, droppers.compression_ratio
     assert set(found[mesh.is_hanger].tolist()) == {3e5}
     assert set(ratio[mesh.is_hanger].tolist()) == {0.25}
     assert set(ratio[~mesh.is_hanger].tolist()) == {line.dropper.compression_ratio}
@@ -232,7 +235,7 @@ def test_a_sprung_support_is_a_spring_and_a_damper_under_the_messenger_wire(stif
     line = dataclasses.replace(line, messenger_support=MessengerSupport(stiffness=stiffness, damping=damping))
     mesh = build_mesh(line)
     without = dataclasses.replace(line, messenger_support=None)
-    one, other = assemble(line, mesh, mesh.points), assemble(without, mesh, mesh.points)
+    one, other = line_shape(line, mesh, mesh.points).matrices, line_shape(without, mesh, mesh.points).matrices
     inner = [support.x for support in line.sections[0].supports[1:-1]]
     assert mesh.points[mesh.sprung, 0] == pytest.approx(inner)
     vertical = np.zeros((len(mesh.points), NODE_DOFS))
@@ -244,7 +247,7 @@ def test_a_sprung_support_is_a_spring_and_a_damper_under_the_messenger_wire(stif
         assert abs(added).sum() == pytest.approx(expected.sum(), abs=1e-3)
     sunk = mesh.points.copy()
     sunk[mesh.sprung, 2] = mesh.seat - 0.01
-    pushed = assemble(line, mesh, sunk).load - assemble(without, mesh, sunk).load
+    pushed = line_shape(line, mesh, sunk).matrices.load - line_shape(without, mesh, sunk).matrices.load
     assert pushed == pytest.approx(0.01 * stiffness * vertical.ravel(), abs=1e-6)
 
 
@@ -260,7 +263,7 @@ def test_damping_of_the_whole_is_that_of_its_components(line_maker):
         expected = betas["dropper"] * hung
         expected += sum(betas[name] * masses[name] for name in COMPONENTS[:5] if name in masses)
         move = _rigid(mesh, 1)
-        C = assemble(damped, mesh, mesh.points).C
+        C = line_shape(damped, mesh, mesh.points).matrices.C
         assert move @ (C @ move) == pytest.approx(expected, rel=1e-9)
 
 
@@ -273,7 +276,7 @@ def test_damping_in_proportion_to_stiffness_is_each_component_s_own(line_maker):
     along, alpha = stretch.ravel(), 0.03
     for name in ("contact_wire", "messenger_wire"):
         one = Damping(alpha=0.0, beta=0.0, **{name: Rayleigh(alpha, 0.0)})
-        C = assemble(dataclasses.replace(line, damping=one), mesh, mesh.points).C
+        C = line_shape(dataclasses.replace(line, damping=one), mesh, mesh.points).matrices.C
         item = getattr(line, name)
         # The wires' slopes take a few per mille off the pure stretch.
         assert along @ (C @ along) == pytest.approx(alpha * item.youngs_modulus * item.area * 200.0, rel=0.02)

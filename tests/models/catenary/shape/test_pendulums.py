@@ -50,11 +50,11 @@ def test_every_bar_of_every_line_has_the_stiffness_of_its_nonlinear_force(line_a
     """Droppers and arms, axial and across, at their static places; K is what the motion is about the static shape."""
     line, mesh, static = line_and_form
     droppers = [*zip(mesh.droppers, static.dropper_force, static.unstrained_length, strict=True)]
-    stiffness = [*(static.dropper_force / (static.dropper_length - static.unstrained_length))]
+    stiffness = [*(static.dropper_force / (static.droppers.length - static.unstrained_length))]
     arm_EA = line.steady_arm.youngs_modulus * line.steady_arm.area if line.steady_arm else 0.0
     bars = [(pair, force, k) for (pair, force, _), k in zip(droppers, stiffness, strict=True)]
     for pair, force in zip(mesh.arms, static.arm_force, strict=True):
-        length = np.linalg.norm(np.diff(static.points[pair], axis=0))
+        length = np.linalg.norm(np.diff(static.shape.points[pair], axis=0))
         bars.append((pair, force, arm_EA / length))
     for pair, force, k in bars[:: max(1, len(bars) // 60)] + bars[len(droppers) :]:
         ends = static.positions[pair]
@@ -70,7 +70,7 @@ def test_every_bar_of_every_line_has_the_stiffness_of_its_nonlinear_force(line_a
 
 def test_it_stands_where_droppers_and_arms_stand_and_nowhere_else(line_and_form):
     line, mesh, static = line_and_form
-    found = CatenaryModel(line)._pendulums()
+    found = CatenaryModel(line).static.pendulum_stiffness()
     expected = nodal_line.pendulum_stiffness(CatenaryModel(line))
     assert abs(found - expected).max() < 1e-9 * abs(expected).max()
     rigid = np.zeros((len(mesh.points), NODE_DOFS))
@@ -86,7 +86,7 @@ def test_the_motion_of_a_line_feels_it_in_stiffness_and_not_in_damping(line_make
     assert abs(with_it.modes.C - without.modes.C).max() == 0.0
     assert abs(with_it.modes.M - without.modes.M).max() == 0.0
     assert np.array_equal(with_it.modes.eigenvalue, without.modes.eigenvalue)
-    assert np.array_equal(with_it.static.points, without.static.points)
+    assert np.array_equal(with_it.static.shape.points, without.static.shape.points)
     free = with_it.modes.attached
     added = nodal_line.pendulum_stiffness(with_it).tocsr()[free][:, free]
     difference = with_it.modes.K - without.modes.K
@@ -169,10 +169,10 @@ def test_the_switch_is_a_number_that_an_FMU_offers(ln2):
 def test_an_arm_that_pushes_is_refused(line_maker):
     """Its wire is pulled away from its side: by the listed stagger of its neighbours."""
     stagger = {"listed": [[0.2, -0.2, -0.1, -0.2, 0.2], "m", "test"], "anchor": [0.0, "m", "test"]}
-    with pytest.raises(EquilibriumError) as told:
+    with pytest.raises(EquilibriumError) as raised:
         CatenaryModel(line_maker(spans=6, stagger=stagger))
-    assert "the arm at 150.00 m pushes with" in str(told.value)
-    assert "it must pull; change its side or the stagger" in str(told.value)
+    assert "the arm at 150.00 m pushes with" in str(raised.value)
+    assert "an arm must pull; change its side or the stagger" in str(raised.value)
 
 
 def test_arms_of_a_straight_wire_neither_pull_nor_push(line_maker):
@@ -190,7 +190,7 @@ def test_a_dropper_that_is_slack_at_rest_holds_nothing(line_maker):
     spans = tuple(dataclasses.replace(span, dropper_lengths=lengths) for span in section.spans)
     model = CatenaryModel(dataclasses.replace(line, sections=(dataclasses.replace(section, spans=spans),)))
     slack = np.flatnonzero(model.static.elastic_force < 0.0)
-    K = model._pendulums().toarray()
+    K = model.static.pendulum_stiffness().toarray()
     assert len(slack) >= 4
     for j in slack:
         lower = int(model.mesh.droppers[j, 0]) * NODE_DOFS

@@ -8,7 +8,7 @@ import pytest
 
 from models.catenary.definition.line_definition import Wire
 from models.catenary.line_model import CatenaryModel
-from models.catenary.statics import elasticity
+from models.catenary.statics import elasticity, rest_profile, wire_waves
 from models.commands.physics_main import main
 from models.library.catalogue import line_names, load_line
 from tests.models.nodal_line import NodalLine
@@ -26,9 +26,9 @@ def re330():
 
 def test_wave_speed_of_a_string_and_of_a_beam():
     wire = Wire(area=150e-6, mass=1.25, youngs_modulus=1.0, tension=20000.0, bending_stiffness=0.0)
-    assert elasticity.wave_speed(wire, 50.0) == pytest.approx(math.sqrt(16000.0))
+    assert wire_waves.wave_speed(wire, 50.0) == pytest.approx(math.sqrt(16000.0))
     beam = Wire(area=150e-6, mass=1.25, youngs_modulus=1.0, tension=1e-9, bending_stiffness=200.0)
-    assert elasticity.wave_speed(beam, 2.0) == pytest.approx(math.pi / 2.0 * math.sqrt(200.0 / 1.25))
+    assert wire_waves.wave_speed(beam, 2.0) == pytest.approx(math.pi / 2.0 * math.sqrt(200.0 / 1.25))
 
 
 @pytest.mark.parametrize(
@@ -37,26 +37,26 @@ def test_wave_speed_of_a_string_and_of_a_beam():
 def test_wave_speeds_of_table_2_1(name, speed):
     line = load_line(name)
     length = line.sections[0].spans[5].length
-    assert 3.6 * elasticity.wave_speed(line.contact_wire, length) == pytest.approx(speed, rel=0.01)
+    assert 3.6 * wire_waves.wave_speed(line.contact_wire, length) == pytest.approx(speed, rel=0.01)
 
 
 def test_reflection_doppler_and_amplification():
     equal = Wire(area=1e-4, mass=1.0, youngs_modulus=1e11, tension=20000.0)
-    assert elasticity.reflection_factor(equal, equal) == 0.5
-    waves = elasticity.waves(load_line("LN2"), 300.0 / 3.6, 50.0)
+    assert wire_waves.reflection_factor(equal, equal) == 0.5
+    waves = wire_waves.waves(load_line("LN2"), 300.0 / 3.6, 50.0)
     C, V = waves.speed, 300.0 / 3.6
     r = math.sqrt(14000.0 * 0.605) / (math.sqrt(14000.0 * 0.605) + math.sqrt(20000.0 * 1.334))
     assert waves.reflection == pytest.approx(r)
     assert waves.doppler == pytest.approx((C - V) / (C + V))
     assert waves.amplification == pytest.approx(r * (C + V) / (C - V))
     assert waves.limit == pytest.approx(0.7 * C)
-    assert elasticity.waves(load_line("LN2"), 130.0, 50.0).amplification == math.inf
+    assert wire_waves.waves(load_line("LN2"), 130.0, 50.0).amplification == math.inf
 
 
 def test_droppers_of_a_compound_line_reflect_at_the_auxiliary_wire():
     line = load_line("Shinkansen")
-    expected = elasticity.reflection_factor(line.auxiliary_wire, line.contact_wire)
-    assert elasticity.waves(line, 80.0, 50.0).reflection == expected
+    expected = wire_waves.reflection_factor(line.auxiliary_wire, line.contact_wire)
+    assert wire_waves.waves(line, 80.0, 50.0).reflection == expected
 
 
 def string_on_springs(x, F1, F2, k, positions, length):
@@ -139,7 +139,7 @@ def test_non_uniformity():
 
 def test_steady_arms_balance_the_kink_of_the_wire_in_plan(re330):
     """Lateral load = F (sin of the angle on one side + on the other): 2 x 27 kN x 0.6 m / 65 m = 498 N."""
-    arms = elasticity.arm_loads(re330)
+    arms = rest_profile.arm_loads(re330)
     inner = (arms.x > 300.0) & (arms.x < 800.0)
     assert arms.lateral[inner] == pytest.approx(np.full(inner.sum(), 2 * 27000.0 * 0.6 / 65.0), rel=0.03)
     assert arms.lift == pytest.approx(arms.lateral * math.tan(math.radians(6.0)), rel=1e-3)
@@ -147,14 +147,14 @@ def test_steady_arms_balance_the_kink_of_the_wire_in_plan(re330):
 
 def test_the_sign_of_the_arms_angle_decides_between_lift_and_pull(re330):
     line = re330.definition.with_values({"steady_arm.angle": math.radians(6.0)})
-    risen = elasticity.arm_loads(CatenaryModel(line))
+    risen = rest_profile.arm_loads(CatenaryModel(line))
     assert (risen.lift < -30.0).all()
-    assert (elasticity.arm_loads(re330).lift > 30.0).all()
+    assert (rest_profile.arm_loads(re330).lift > 30.0).all()
 
 
 def test_profile_and_droppers_belong_together(re330):
-    contact = next(p for p in elasticity.profiles(re330) if p.component == "contact_wire")
-    droppers = elasticity.droppers(re330, 496.0, 561.0)
+    contact = next(p for p in rest_profile.profiles(re330) if p.component == "contact_wire")
+    droppers = rest_profile.droppers(re330, 496.0, 561.0)
     assert len(droppers.x) == 9
     assert (np.diff(droppers.x) > 0.0).all()
     z = np.interp(droppers.x, contact.x, contact.z)

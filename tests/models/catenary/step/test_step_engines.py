@@ -1,15 +1,13 @@
-"""The fast step against the plain one in nodal coordinates, and the solvers below it."""
+"""The step engines against a plain step in nodal coordinates, and against each other."""
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from models.catenary.line_model import CatenaryModel, StripMotion
-from models.catenary.linear_motion.attachment_solver import CUT, Banded, Sparse, factorised
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_state import StripMotion
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.interval_modes import slower_than
-from models.catenary.linear_motion.sparse_products import BlockProduct, Product, TransposedProduct
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.step.engine_choice import kernels, make_engine
 from models.catenary.step.numba_engine import NumbaEngine
@@ -61,7 +59,7 @@ def test_steps_are_those_of_newmark_s_method_in_nodal_coordinates(model, dt):
 
 
 def test_momentum_stays_that_of_the_velocities(model):
-    """It is carried on from step to step, not computed anew."""
+    """It is carried on from step to step, not recomputed."""
     state, _ = _moving(model, 4)
     modes = model.modes
     for _ in range(200):
@@ -80,120 +78,12 @@ def test_a_change_of_the_step_size_keeps_the_energy_law(model):
     assert np.all(np.diff(energy) < 0.0)
 
 
-def _band(n=900, width=7, seed=1):
-    rng = np.random.default_rng(seed)
-    diagonals = [rng.uniform(-1.0, 0.0, n) for _ in range(width)]
-    lower = sp.diags(diagonals, [-k - 1 for k in range(width)], shape=(n, n))
-    return (lower + lower.T + 14.5 * sp.eye(n)).tocsr()
-
-
-def test_both_factorisations_solve():
-    matrix = _band()
-    load = np.random.default_rng(3).standard_normal(matrix.shape[0])
-    expected = splu(matrix.tocsc()).solve(load)
-    assert isinstance(factorised(matrix), Banded)
-    for factor in (factorised(matrix), Sparse(matrix.tocsc())):
-        assert factor.solve(load) == pytest.approx(expected, rel=1e-12)
-
-
-def test_wide_bands_are_solved_as_well():
-    rng = np.random.default_rng(3)
-    root = sp.random(200, 200, density=0.2, random_state=rng)
-    matrix = (root @ root.T + 50.0 * sp.eye(200)).tocsc()
-    load = rng.standard_normal(200)
-    factor = factorised(matrix)
-    assert isinstance(factor, Sparse)
-    assert factor.solve(load) == pytest.approx(np.linalg.solve(matrix.toarray(), load), rel=1e-10)
-
-
-def test_a_matrix_that_is_not_positive_definite_is_refused():
-    with pytest.raises(np.linalg.LinAlgError, match="row 3"):
-        factorised(sp.diags([1.0, 1.0, -1.0, 1.0]))
-
-
-@pytest.mark.parametrize("first", [0, 3, 440, 890, 898])
-def test_a_solution_near_its_load_is_the_whole_one(first):
-    matrix = _band()
-    local = np.random.default_rng(first).standard_normal((min(12, 900 - first), 3))
-    load = np.zeros((900, 3))
-    load[first : first + len(local)] = local
-    whole = splu(matrix.tocsc()).solve(load)
-    begin, values = factorised(matrix).near(first, local)
-    near = np.zeros_like(whole)
-    near[begin : begin + len(values)] = values
-    assert np.abs(near - whole).max() < 1e-13 * np.abs(whole).max()
-
-
-def test_a_solution_that_does_not_die_out_is_whole():
-    n = 700
-    matrix = sp.diags([-1.0, 2.0 + 1e-6, -1.0], [-1, 0, 1], shape=(n, n))
-    load = np.zeros(n)
-    load[300] = 1.0
-    begin, values = factorised(matrix).near(300, np.ones((1, 1)))
-    assert (begin, len(values)) == (0, n)
-    assert values[:, 0] == pytest.approx(splu(matrix.tocsc()).solve(load), rel=1e-9)
-
-
 def _matrices(model, step=1e-3):
     return StepMatrices(model.modes, Newmark(step))
 
 
 def _compliance(model, matrices):
     return Compliance(matrices.factor, model.dropper_law.B, model.dropper_law.stiffness)
-
-
-def test_responses_to_unit_loads_are_columns_of_the_inverse(model):
-    matrices = _matrices(model)
-    interval = model.wires[0].intervals[40]
-    columns = _compliance(model, matrices).units(interval.ends)
-    everywhere = np.arange(len(model.modes.attached))
-    unit = np.eye(len(everywhere))[interval.ends]
-    whole = np.stack([matrices.factor.solve(load) for load in unit], axis=1)
-    assert columns.at(everywhere) == pytest.approx(whole, abs=1e-14 * np.abs(whole).max())
-    stretch = np.zeros((len(model.dropper_law.stiffness), len(interval.ends)))
-    near = columns.dropper_index
-    stretch[near] = columns.dropper_force / model.dropper_law.stiffness[near, None]
-    # Both ends of a dropper may lie where a column is cut.
-    assert stretch == pytest.approx(model.dropper_law.B @ whole, abs=4.0 * CUT * np.abs(whole).max())
-
-
-def test_what_a_strip_comes_to_is_prepared_one_response_at_a_time(model):
-    compliance = _compliance(model, _matrices(model))
-    places = model.wires[0].intervals[30].sides[1]
-    for count in range(1, len(places) + 1):
-        compliance.prepare(places)
-        assert sum(place in compliance._kept for place in places.tolist()) == count
-
-
-def test_compliance_of_droppers_is_symmetric(model):
-    columns = _compliance(model, _matrices(model)).dropper_columns
-    i, j = 20, 22
-    response = {}
-    for k in (i, j):
-        stretch = columns[k].dropper_force[:, 0] / model.dropper_law.stiffness[columns[k].dropper_index]
-        response[k] = dict(zip(columns[k].dropper_index.tolist(), stretch, strict=True))
-    assert response[i][j] == pytest.approx(response[j][i], rel=1e-9)
-    assert response[i][i] > abs(response[i][j])
-
-
-@pytest.mark.parametrize("routine", [None, "scipy's"])
-def test_products_with_and_without_scipy_s_routine(routine):
-    rng = np.random.default_rng(1)
-    matrix = sp.random(30, 20, density=0.3, random_state=rng, format="csr")
-    product = Product(matrix, None) if routine is None else Product(matrix)
-    vector, result = rng.standard_normal(20), rng.standard_normal(30)
-    expected = result + matrix @ vector
-    product.add(vector, result)
-    assert result == pytest.approx(expected, rel=1e-14)
-    transposed = TransposedProduct(product, None) if routine is None else TransposedProduct(product)
-    expected = vector + matrix.T @ result
-    transposed.add(result, vector)
-    assert vector == pytest.approx(expected, rel=1e-14)
-    blocks = matrix.tobsr((5, 4))
-    by_blocks = BlockProduct(blocks, None) if routine is None else BlockProduct(blocks)
-    expected = result + matrix @ vector
-    by_blocks.add(vector, result)
-    assert result == pytest.approx(expected, rel=1e-14)
 
 
 def test_the_coupling_by_blocks_is_the_coupling(model):

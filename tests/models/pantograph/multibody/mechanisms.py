@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from models.pantograph.multibody import mechanism_definition
+import models
+from models.definition_files.toml_reader import Table
 from models.pantograph.multibody.mechanism import Mechanism
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+from models.pantograph.multibody.mechanism_reading import load_mechanism, read_mechanism
 
-LIBRARY = Path(mechanism_definition.__file__).parents[2] / "library" / "pantographs"
+LIBRARY = Path(models.__file__).parent / "library" / "pantographs"
 
 
 def q(value: Any, unit: str) -> list[Any]:
@@ -50,8 +52,12 @@ def mechanism_data(
     }
 
 
+def mechanism_from(data: dict[str, Any]) -> MechanismDefinition:
+    return read_mechanism(Table.from_dict(data))
+
+
 def mechanism(*args: Any, **changes: Any) -> Mechanism:
-    return Mechanism(mechanism_definition.from_dict(mechanism_data(*args) | changes))
+    return Mechanism(mechanism_from(mechanism_data(*args) | changes))
 
 
 def library_data(name: str) -> dict[str, Any]:
@@ -59,7 +65,7 @@ def library_data(name: str) -> dict[str, Any]:
 
 
 def library(name: str) -> MechanismDefinition:
-    return mechanism_definition.load(LIBRARY / f"{name}.toml")
+    return load_mechanism(LIBRARY / f"{name}.toml")
 
 
 def pendulum_data(euler: Any = (0.0, 0.0, 0.0)) -> dict[str, Any]:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from models.pantograph.multibody import mechanism_definition
 from models.pantograph.multibody.analysis.linearisation import (
     apparent_mass,
     base_transmission,
@@ -17,7 +16,7 @@ from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble, constraint_rank, null_space
 from models.pantograph.multibody.mechanism_integrator import Integrator
 from tests.models.pantograph.multibody import independent
-from tests.models.pantograph.multibody.mechanisms import library, library_data
+from tests.models.pantograph.multibody.mechanisms import library, library_data, mechanism_from
 from tests.models.pantograph.multibody.test_mechanisms import line_force, run
 
 
@@ -37,7 +36,7 @@ def test_thirty_one_independent_constraints_and_five_degrees_of_freedom():
     """As printed: raise, heave, roll and the two links' spins; the two locks take the spins."""
     data = library_data("generic_multibody")
     del data["joint"]["lock_4"], data["joint"]["lock_6"]
-    free = Mechanism(mechanism_definition.from_dict(data))
+    free = Mechanism(mechanism_from(data))
     y = assemble(free)
     assert constraint_rank(free, y) == free.constraints.count == 31
     assert null_space(free, y).shape[1] == 6 * 7 - 6 - 31 == 5
@@ -48,7 +47,7 @@ def test_thirty_one_independent_constraints_and_five_degrees_of_freedom():
 def test_lower_links_spin_is_unstable_as_printed_and_locking_changes_nothing_else(generic):
     data = library_data("generic_multibody")
     del data["joint"]["lock_4"], data["joint"]["lock_6"]
-    free = Mechanism(mechanism_definition.from_dict(data))
+    free = Mechanism(mechanism_from(data))
     e = equilibrium(free, contact_force=100.0)
     found = modes(free, linearise(free, e.y, e.inputs))
     growing = [m for m in found if m.eigenvalue.real > 0.1]
@@ -192,7 +191,7 @@ def undamped():
     data["force"]["wire"] = line_force(
         stiffness=(3000.0, "N/m"), free_length=(1.787, "m"), direction=([0, 0, 1], "1")
     ) | {"body_j": "pan_head"}
-    mechanism = Mechanism(mechanism_definition.from_dict(data))
+    mechanism = Mechanism(mechanism_from(data))
     return mechanism, assemble(mechanism)
 
 

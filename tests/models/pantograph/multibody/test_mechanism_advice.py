@@ -23,7 +23,7 @@ def test_masses_on_slides_are_left_what_the_springs_leave():
     text = said("CX_multibody", 250.0, 5.30, static_force=178.0)
     assert text == (
         "the static force of 178 N is that at the reference height, 5.02 m; at the wire's, 5.30 m, "
-        f"{left:.0f} N are left: set reference_height to the wire's height, or find static_force anew"
+        f"{left:.0f} N are left: set reference_height to the wire's height, or find another static_force"
     )
 
 
@@ -33,7 +33,7 @@ def test_a_moment_is_told_with_the_force_that_the_rig_finds():
     text = said("generic_multibody", 250.0, 5.30)
     assert "the static moment of 1313.7 N.m is that at the reference height" in text
     assert f"5.30 m, {left.contact_force[-1]:.0f} N are left" in text
-    assert "find static_moment anew" in text
+    assert "find another static_moment" in text
     assert left.contact_force[-1] < 0.85 * left.contact_force[0]
 
 
@@ -54,6 +54,12 @@ def test_reference_height_at_the_wire_is_the_cure():
     assert said("generic_multibody", 250.0, 5.35, reference_height=5.30) == ""
 
 
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_a_spring_that_carries_the_weights_keeps_a_stiffness(value):
+    with pytest.raises(ParameterError, match=r"'force\.stage_1\.stiffness': .* must be greater than 0"):
+        load_pantograph("CX_multibody").with_values({"force.stage_1.stiffness": value})
+
+
 @pytest.mark.parametrize(
     ("name", "value", "unit"),
     [
@@ -62,7 +68,7 @@ def test_reference_height_at_the_wire_is_the_cure():
         ("joint.slide_1.point_i.x", 200.0, "m"),
         ("force.stage_1.stiffness", 1.7845e9, "N/m"),
         ("force.stage_1.damping", 1.1e6, "N.s/m"),
-        ("force.stage_1.stiffness", -1.0, "N/m"),
+        ("force.stage_1.damping", -1.0, "N.s/m"),
         ("static_force", 1.68e5, "N"),
     ],
 )

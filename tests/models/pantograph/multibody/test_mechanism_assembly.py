@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from models.definition_files.toml_reader import DefinitionError
-from models.pantograph.multibody import mechanism_definition
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_assembly import assemble
-from tests.models.pantograph.multibody.mechanisms import library, library_data, q
+from tests.models.pantograph.multibody.mechanisms import library, library_data, mechanism_from, q
 from tests.models.pantograph.multibody.test_mechanisms import four_bar
 
 
@@ -15,7 +14,7 @@ def test_misprinted_joint_is_named_with_its_gap():
     data = library_data("generic_multibody")
     data["joint"]["joint_1"]["point_i"][0] = [0.020, 0.0, 0.132]
     with pytest.raises(MechanismError, match=r"joint 'joint_1' gapes by 182 mm"):
-        assemble(Mechanism(mechanism_definition.from_dict(data)))
+        assemble(Mechanism(mechanism_from(data)))
 
 
 def test_mechanism_that_cannot_close_names_the_joint_and_what_stays_open():
@@ -50,7 +49,7 @@ def test_all_mistakes_of_a_file_come_at_once_with_names():
     data["force"]["raising_spring"]["stiffness"] = q(2.0, "N")
     data["force"]["lift"]["colour"] = 1
     with pytest.raises(DefinitionError) as error:
-        mechanism_definition.from_dict(data)
+        mechanism_from(data)
     text = str(error.value)
     for part in (
         "joint.joint_2.body_j", "'uper_arm'", "joint.joint_3.kind", "'hinge'", "body.pan_head.mass",
@@ -63,7 +62,7 @@ def test_roll_and_slide_axes_must_be_perpendicular():
     data = library_data("generic_multibody")
     data["joint"]["joint_8"]["axis_j"] = q([1, 0, 0], "1")
     with pytest.raises(MechanismError, match=r"joint_8.*perpendicular"):
-        Mechanism(mechanism_definition.from_dict(data))
+        Mechanism(mechanism_from(data))
 
 
 def test_every_number_is_a_parameter_that_can_be_set():

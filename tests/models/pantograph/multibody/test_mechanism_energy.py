@@ -10,7 +10,7 @@ from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 def run(name, step, roof=0.0, stop=0.5):
     """Run under a force that swings, on a roof that may move."""
     part = MultibodyPantographPart(load_pantograph(name).with_values({"monitor_energy": 1}))
-    speed = part.definition.operation.speed
+    speed = part.definition.speed
     part.initialise(0.0, 150.0, np.zeros(3), np.zeros(2))
     for n in range(round(stop / step)):
         t = n * step

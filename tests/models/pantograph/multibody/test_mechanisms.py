@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from models.pantograph.multibody import mechanism_definition
 from models.pantograph.multibody.elements.rotations import rotation_matrices
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble
 from models.pantograph.multibody.mechanism_integrator import Integrator
-from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism, pendulum_data, q
+from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism, mechanism_from, pendulum_data, q
 
 
 def run(m, y, duration, *, inputs=lambda t: Inputs(), tolerance=1e-10, step=1e-3, largest=1e-3, watch=None):
@@ -24,7 +23,7 @@ def run(m, y, duration, *, inputs=lambda t: Inputs(), tolerance=1e-10, step=1e-3
 
 
 def test_pendulum_swings_as_its_equation_says():
-    m = Mechanism(mechanism_definition.from_dict(pendulum_data((0.0, 0.1, 0.0))))
+    m = Mechanism(mechanism_from(pendulum_data((0.0, 0.1, 0.0))))
     y = assemble(m)
     inertia = 0.2 + 2.0 * 0.25  # about the hinge
     start = 2.0 * np.arcsin(0.1)
@@ -39,7 +38,7 @@ def test_pendulum_swings_as_its_equation_says():
 
 
 def test_integration_is_of_fourth_order():
-    m = Mechanism(mechanism_definition.from_dict(pendulum_data((0.0, 0.1, 0.0))))
+    m = Mechanism(mechanism_from(pendulum_data((0.0, 0.1, 0.0))))
     y = assemble(m)
     ends = [run(m, y, 0.8, tolerance=1.0, step=h, largest=h)[3:6] for h in (0.01, 0.005, 0.001)]
     errors = [np.linalg.norm(e - ends[-1]) for e in ends[:-1]]
@@ -226,7 +225,7 @@ def test_joint_friction_stops_a_pendulum():
     data["force"]["rub"] = {
         "kind": "joint_friction", "joint": "hinge", "moment": q(1.5, "N.m"), "transition": q(0.01, "rad/s")
     }  # fmt: skip
-    m = Mechanism(mechanism_definition.from_dict(data))
+    m = Mechanism(mechanism_from(data))
     energies = []
     y = run(m, assemble(m), 3.0, watch=lambda t, done: energies.append(m.energy(done.y)), tolerance=1e-8)
     assert (np.diff(energies) <= 1e-9).all()

@@ -255,7 +255,7 @@ def test_a_pantograph_on_a_moving_roof_begins_with_its_velocity():
     part = MultibodyPantographPart(library("generic_multibody"))
     part.initialise(0.0, 0.0, np.zeros(3), np.array([0.03, 0.25]))
     assert part.strip[:, 1, 2] == pytest.approx(0.25)
-    assert part.strip[:, 0, 2] == pytest.approx(part.definition.operation.reference_height + 0.03)
+    assert part.strip[:, 0, 2] == pytest.approx(part.definition.reference_height + 0.03)
     velocities = [value for name, value in named(part).items() if name.endswith(".vz")]
     assert velocities == pytest.approx([0.25] * len(velocities))
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from models.pantograph.multibody import mechanism_definition
 from models.pantograph.multibody.elements.rotations import euler_parameters, rotation_matrices, turned
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble, constraint_rank, joint_gaps
-from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism, one_of_each_joint
+from tests.models.pantograph.multibody.mechanisms import body, joint, mechanism, mechanism_from, one_of_each_joint
 
 FREEDOM = {
     "revolute": 1, "spherical": 3, "prismatic": 1, "universal": 2, "fixed": 0, "revolute_prismatic": 2,
@@ -17,7 +16,7 @@ FREEDOM = {
 
 @pytest.fixture(scope="module")
 def chain():
-    m = Mechanism(mechanism_definition.from_dict(one_of_each_joint()))
+    m = Mechanism(mechanism_from(one_of_each_joint()))
     y = m.written_state()
     random = np.random.default_rng(4)
     s = m.split(y)
@@ -92,7 +91,7 @@ def test_each_joint_leaves_its_degrees_of_freedom(kind):
 def test_chain_of_all_joints_assembles_and_stays_together():
     data = one_of_each_joint()
     data["assembly"] = {"largest_gap": [2.0, "m", "test"]}
-    m = Mechanism(mechanism_definition.from_dict(data))
+    m = Mechanism(mechanism_from(data))
     y = assemble(m)
     assert max(max(gap) for gap in joint_gaps(m, y).values()) < 1e-11
     acceleration = m.evaluate(y, Inputs()).constraints

@@ -1,0 +1,83 @@
+"""A mechanism read from its definition file, with what must hold between its bodies, joints and force elements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from models.definition_files import field_schema
+from models.definition_files.toml_reader import Table
+from models.pantograph.multibody.mechanism_definition import (
+    JointFriction,
+    LiftingForce,
+    LiftingMoment,
+    MechanismDefinition,
+    PairForce,
+    PairJoint,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
+
+
+def load_mechanism(path: Path) -> MechanismDefinition:
+    """Read a mechanism's definition file; raises ``DefinitionError`` with every mistake."""
+    return read_mechanism(Table.load(path))
+
+
+def read_mechanism(table: Table) -> MechanismDefinition:
+    """Read a mechanism's definition from a parsed table; raises ``DefinitionError``."""
+    table.text("type", choices=("multibody",))
+    definition = field_schema.read(MechanismDefinition, table, provenance=table.provenance)
+    _check_references(table, definition)
+    _check_pairs(table, definition)
+    _check_lift(table, definition)
+    _check_friction(table, definition)
+    table.finish()
+    return definition
+
+
+def _check_references(table: Table, d: MechanismDefinition) -> None:
+    names = {b.name for b in d.bodies}
+    if not names:
+        table.problem("body", "there is no [body.NAME]")
+    sections = (("joint", d.joints), ("force", d.forces))
+    uses = [
+        (f"{section}.{element.name}.{key}", getattr(element, key, ""))
+        for section, elements in sections
+        for element in elements
+        for key in ("body_i", "body_j")
+    ]
+    uses += [("strip.body", d.strip.body)] if d.strip is not None else []
+    uses += [("assembly.body", d.assembly.body)]
+    for key, body in uses:
+        if body and body not in names:
+            table.problem(key, f"there is no body '{body}' (bodies: {', '.join(sorted(names))})")
+    if d.strip is not None and d.strip.body in d.driven:
+        text = f"body '{d.strip.body}' has a prescribed motion; put the strip on one that the contact can move"
+        table.problem("strip.body", text)
+    if not d.driven:
+        table.problem("joint", "no body has a prescribed_motion (the base needs one)")
+
+
+def _check_pairs(table: Table, d: MechanismDefinition) -> None:
+    for section, elements in (("joint", d.joints), ("force", d.forces)):
+        for e in elements:
+            if isinstance(e, PairJoint | PairForce) and e.body_i and e.body_i == e.body_j:
+                table.problem(f"{section}.{e.name}", f"connects body '{e.body_i}' with itself")
+
+
+def _check_lift(table: Table, d: MechanismDefinition) -> None:
+    lifting = [f.name for f in d.forces if isinstance(f, LiftingForce | LiftingMoment)]
+    if len(lifting) > 1:
+        table.problem("force", f"only one element can have lift = true ({', '.join(lifting)})")
+
+
+def _check_friction(table: Table, d: MechanismDefinition) -> None:
+    joints = {j.name: j for j in d.joints}
+    for f in (f for f in d.forces if isinstance(f, JointFriction)):
+        joint = joints.get(f.joint)
+        if joint is None:
+            table.problem(f"force.{f.name}.joint", f"there is no joint '{f.joint}'")
+        elif not isinstance(joint, Revolute | Spherical | Prismatic | Universal):
+            table.problem(f"force.{f.name}.joint", f"a {joint.kind} joint takes no friction")

@@ -211,3 +211,8 @@ def test_changing_every_parameter_to_its_own_value_changes_nothing(name):
 def test_unknown_lines_are_told_with_the_known_ones():
     with pytest.raises(UnknownNameError, match="Re330"):
         load_line("LN7")
+
+
+def test_a_file_may_set_what_the_line_declares_at_its_root(line_maker):
+    line = line_maker(extrapolation_order=1, monitor_energy=1, time_step=[2.0, "ms", "test"])
+    assert (line.extrapolation_order, line.monitor_energy, line.time_step) == (1, 1, 0.002)

@@ -20,13 +20,18 @@ OURS = ("models", "fmus", "master", "openpanto")
 LACKING = {
     "win32": (
         ("fcntl", "resource", "pwd", "grp", "termios", "tty", "pty", "syslog", "readline", "posix", "_posixsubprocess"),
-        ("fork", "forkpty", "setsid", "setpgid", "getpgid", "killpg", "geteuid", "getuid", "getegid", "uname", "O_CLOEXEC",
-         "O_NOFOLLOW", "WNOHANG", "mkfifo", "chown", "fchmod", "set_blocking", "sched_getaffinity", "sched_setaffinity",
-         "nice", "wait3", "wait4", "register_at_fork", "sysconf", "RTLD_NOLOAD", "RTLD_GLOBAL", "RTLD_NOW", "RTLD_LAZY"),
+        ("fork", "forkpty", "setsid", "setpgid", "getpgid", "killpg", "geteuid", "getuid", "getegid", "uname",
+         "O_CLOEXEC", "O_NOFOLLOW", "WNOHANG", "mkfifo", "chown", "fchmod", "set_blocking", "sched_getaffinity",
+         "sched_setaffinity", "nice", "wait3", "wait4", "register_at_fork", "sysconf", "RTLD_NOLOAD", "RTLD_GLOBAL", "RTLD_NOW",
+         "RTLD_LAZY"),
         ("SIGHUP", "SIGKILL", "SIGQUIT", "SIGSTOP", "SIGCONT", "SIGTSTP", "SIGCHLD", "SIGALRM", "SIGPIPE", "SIGUSR1",
          "SIGBUS", "SIG_BLOCK", "SIG_UNBLOCK", "pthread_sigmask", "pthread_kill", "setitimer", "alarm", "sigwait"),
     ),
-    "darwin": ((), ("sched_getaffinity", "sched_setaffinity", "memfd_create", "pidfd_open", "getrandom"), ("sigtimedwait",)),
+    "darwin": (
+        (),
+        ("sched_getaffinity", "sched_setaffinity", "memfd_create", "pidfd_open", "getrandom"),
+        ("sigtimedwait",),
+    ),
 }
 
 def names():

@@ -58,7 +58,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"scenario", "recording"},
         {"evaluation"},
         {"results"},
-        {"report", "run"},
+        {"report", "run_session"},
         {"batch"},
         {"commands"},
         {"__main__"},

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from master.errors import MasterError, Problem, RequestError, ScenarioError
+from master.errors import MasterError, Problem, RequestError, ScenarioError, suggestion
 from master.results.results_folder import write_text
 
 STUDY: Final = "study.toml"
@@ -122,7 +122,9 @@ class Family(_Model):
         known = [v.name for v in self.variants]
         for name in names:
             if name not in known:
-                raise RequestError(f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}")
+                raise RequestError(
+                    f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}{suggestion(name, known)}"
+                )
         return tuple(v for v in self.variants if v.name in names or not names)
 
 
@@ -144,7 +146,8 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
     folder = Path(name) if (Path(name) / STUDY).is_file() else root / f"{name}.ssp"
     if not (folder / STUDY).is_file():
         known = ", ".join(family_names(root)) or "none"
-        raise RequestError(f"there is no study '{name}'; known: {known} (or give a scenario's folder with a {STUDY})")
+        text = f"there is no study '{name}'; known: {known} (or give a scenario's folder with a {STUDY})"
+        raise RequestError(text + suggestion(name, family_names(root)))
     settings = _read_settings(folder / STUDY)
     variants = _read_variants(folder / VARIANTS)
     _check_names(folder / STUDY, settings, variants)

@@ -31,14 +31,14 @@ def one_line(text: str) -> str:
     return "".join(map(_shown, text))
 
 
-def suggestion(name: str, known: Iterable[str], most: int = 1) -> str:
+def hint(name: str, known: Iterable[str], most: int = 1) -> str:
     """Return the question whether a known name was meant, empty if none is near: one that is very near, or the nearest.
 
     Examples
     --------
-    >>> suggestion("Sigmaa", ["mean", "sigma"])
+    >>> hint("Sigmaa", ["mean", "sigma"])
     "; did you mean 'sigma'?"
-    >>> suggestion("height", ["mean", "sigma"])
+    >>> hint("height", ["mean", "sigma"])
     ''
     """
     folded = {k.casefold(): k for k in known}

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from master.errors import Problem, RequestError, suggestion
+from master.errors import Problem, RequestError, hint
 from master.scenario.start_values import out_of_range, settable
 from master.ssp.archive import SSD_NAME
 from master.ssp.run_settings import DEFAULT_RECORDS, Record, RunSettings, Scheme
@@ -94,11 +94,11 @@ def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterat
     for record in settings.records:
         for pattern in record.variables if record not in DEFAULT_RECORDS else ():
             if not any(map(matcher(pattern), recordable)):
-                near = suggestion(pattern, recordable)
+                near = hint(pattern, recordable)
                 yield f"Record variables: '{pattern}' fits no output or local variable of the components{near}"
     wanted = settings.calibration
     if wanted is not None and (wanted.parameter not in variables or settable(variables[wanted.parameter], "Real")):
-        near = suggestion(wanted.parameter, variables)
+        near = hint(wanted.parameter, variables)
         yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components{near}"
 
 
@@ -152,7 +152,7 @@ def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, V
     settables = [
         f"{c.name}.{v.name}" for c in components for v in c.fmu.variables.values() if v.causality == "parameter"
     ]
-    raise RequestError(f"there is no parameter '{full}' in the scenario{suggestion(full, settables, most=3)}")
+    raise RequestError(f"there is no parameter '{full}' in the scenario{hint(full, settables, most=3)}")
 
 
 def _typed(fmu: Fmu, variable: Variable, full: str, text: str) -> float | int | bool | str:
@@ -194,7 +194,7 @@ def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
         return number
     known = {**fmu.units, **COMMON}
     if unit not in known:
-        listed = f"(known: {', '.join(known)}){suggestion(unit, known)}"
+        listed = f"(known: {', '.join(known)}){hint(unit, known)}"
         raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known {listed}")
     found = conversion(known[unit], known[variable.unit]) if variable.unit in known else None
     if found is None:

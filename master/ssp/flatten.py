@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from master.errors import suggestion
+from master.errors import hint
 from master.ssp.ssd_elements import Binding, Component, Connection, Connector, Feed, Joint, Leg, Stop, SystemNode
 from master.ssp.ssp_xml import Reader
 
@@ -129,7 +129,7 @@ def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Read
         connector = _connector(path, element, name, systems)
         if connector is None:
             what = f"'{element}' has no connector '{name}'" if element else f"the system has no connector '{name}'"
-            near = suggestion(name, (x.name for x in _connectors(path, element, systems)))
+            near = hint(name, (x.name for x in _connectors(path, element, systems)))
             reader.report(c.line, "connection", what + near)
             return None
         if connector.kind not in (*_SIGNALS, *_PARAMETERS):

@@ -35,9 +35,13 @@ def main(argv: Sequence[str]) -> int:
     subparsers = parser.add_subparsers(dest="verb", required=True)
     for verb in _VERBS:
         verb.add(subparsers)
-    arguments = parser.parse_args(argv)
+    return carry_out(parser.parse_args(argv))
+
+
+def carry_out(options: argparse.Namespace) -> int:
+    """Carry out a verb that was understood and return the exit code; what a user can cause is one message."""
     try:
-        code = int(arguments.run(arguments))
+        code = int(options.run(options))
         if sys.stdout is not None:  # closed by the caller
             sys.stdout.flush()  # here, where an error can still be reported
     except OSError as error:

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeVar, runtime_checkable
 
-from models.definition_files.message_text import suggestion
+from models.definition_files.message_text import hint
 from models.definition_files.parameter import Parameter, ParameterError
 from models.definition_files.si_units import shown
 from models.definition_files.toml_reader import SMALLEST, Quantity, Table, beyond_all, in_its_unit
@@ -275,7 +275,7 @@ def with_values(obj: T, values: Mapping[str, float]) -> T:
     for name, value in values.items():
         changed = _replaced(obj, name, name, value)
         if changed is None:
-            near = suggestion(name, (p.name for p in parameters(obj, {})), most=3)
+            near = hint(name, (p.name for p in parameters(obj, {})), most=3)
             raise ParameterError(f"parameter '{name}': there is none of this name{near}")
         obj = changed
     if found := [": ".join(filter(None, problem)) for problem in _problems(obj) if values]:

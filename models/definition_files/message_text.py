@@ -29,14 +29,14 @@ class _Shown(reprlib.Repr):
 shown_value = _Shown().repr
 
 
-def suggestion(name: str, known: Iterable[str], most: int = 1) -> str:
+def hint(name: str, known: Iterable[str], most: int = 1) -> str:
     """Return the question whether a known name was meant, empty if none is near: one that is very near, or the nearest.
 
     Examples
     --------
-    >>> suggestion("ln2", ["CA160", "LN2"])
+    >>> hint("ln2", ["CA160", "LN2"])
     "; did you mean 'LN2'?"
-    >>> suggestion("height", ["CA160", "LN2"])
+    >>> hint("height", ["CA160", "LN2"])
     ''
     """
     folded = {k.casefold(): k for k in known}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from models.definition_files.message_text import suggestion
+from models.definition_files.message_text import hint
 
 #: Unit -> (SI unit, factor).  A quantity in a file is multiplied by the factor.
 SI: Final[dict[str, tuple[str, float]]] = {
@@ -63,7 +63,7 @@ def to_si(value: float, unit: str, wanted: str) -> float:
     20000.0
     """
     if unit not in SI:
-        raise ValueError(f"unknown unit '{unit}' (known for '{wanted}': {units_of(wanted)}){suggestion(unit, SI)}")
+        raise ValueError(f"unknown unit '{unit}' (known for '{wanted}': {units_of(wanted)}){hint(unit, SI)}")
     si, factor = SI[unit]
     if si != wanted:
         raise ValueError(f"unit '{unit}' where a unit of '{wanted}' is needed ({units_of(wanted)})")

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from models.definition_files.message_text import one_line, shown_value, suggestion
+from models.definition_files.message_text import hint, one_line, shown_value
 from models.definition_files.si_units import shown, to_si
 
 #: Largest number of problems listed.
@@ -261,7 +261,7 @@ class Table:
             return default or ""
         allowed = list(choices) if choices is not None else None
         if allowed is not None and entry not in allowed:
-            self.problem(name, f"'{entry}' is none of {', '.join(allowed)}{suggestion(entry, allowed)}")
+            self.problem(name, f"'{entry}' is none of {', '.join(allowed)}{hint(entry, allowed)}")
         return entry
 
     def flag(self, name: str, *, default: bool | None = None) -> bool:
@@ -379,9 +379,7 @@ class Table:
         for name in self._data:
             if name not in self._known:
                 known = ", ".join(sorted(self._known)) or "none"
-                self.problem(
-                    name, f"unknown key (known here: {known}){suggestion(name, self._known - set(self._data))}"
-                )
+                self.problem(name, f"unknown key (known here: {known}){hint(name, self._known - set(self._data))}")
         for child in self._children:
             child._report_unknown()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from models.definition_files import field_schema
-from models.definition_files.message_text import suggestion
+from models.definition_files.message_text import hint
 from models.definition_files.toml_reader import Table
 from models.pantograph.multibody.mechanism_definition import (
     JointFriction,
@@ -53,9 +53,7 @@ def _check_references(table: Table, d: MechanismDefinition) -> None:
     uses += [("assembly.body", d.assembly.body)]
     for key, body in uses:
         if body and body not in names:
-            table.problem(
-                key, f"there is no body '{body}' (bodies: {', '.join(sorted(names))}){suggestion(body, names)}"
-            )
+            table.problem(key, f"there is no body '{body}' (bodies: {', '.join(sorted(names))}){hint(body, names)}")
     if d.strip is not None and d.strip.body in d.driven:
         text = f"body '{d.strip.body}' has a prescribed motion; put the strip on one that the contact can move"
         table.problem("strip.body", text)
@@ -83,7 +81,7 @@ def _check_friction(table: Table, d: MechanismDefinition) -> None:
         if joint is None:
             table.problem(
                 f"force.{f.name}.joint",
-                f"there is no joint '{f.joint}' (joints: {', '.join(joints)}){suggestion(f.joint, joints)}",
+                f"there is no joint '{f.joint}' (joints: {', '.join(joints)}){hint(f.joint, joints)}",
             )
         elif not isinstance(joint, Revolute | Spherical | Prismatic | Universal):
             table.problem(f"force.{f.name}.joint", f"a {joint.kind} joint takes no friction")

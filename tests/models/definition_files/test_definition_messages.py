@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from models.definition_files.message_text import suggestion
+from models.definition_files.message_text import hint
 from models.definition_files.si_units import to_si
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import line_path, load_line
@@ -42,14 +42,14 @@ def test_a_mistyped_key_names_the_one_that_may_be_meant(tmp_path):
 
 
 def test_a_mistyped_parameter_names_those_that_may_be_meant():
-    with pytest.raises(ValueError, match="did you mean 'contact_wire.tension' or 'messenger_wire.tension'"):
+    with pytest.raises(ValueError, match=r"did you mean 'contact_wire\.tension' or 'messenger_wire\.tension'"):
         load_line("LN2").with_values({"wire.tension": 1e4})
     with pytest.raises(ValueError, match=r"did you mean 'contact_wire\.tension'\?"):
         load_line("LN2").with_values({"contact_wire.tention": 1e4})
 
 
 def test_one_very_near_name_is_enough():
-    assert suggestion("static_farce", ["static_force", "static_friction", "statics"]) == "; did you mean 'static_force'?"
+    assert hint("static_farce", ["static_force", "static_friction", "statics"]) == "; did you mean 'static_force'?"
 
 
 def test_a_mistake_of_a_rule_is_reported_once_for_all_spans(tmp_path):

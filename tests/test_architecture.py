@@ -25,6 +25,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"definition_files", "numerics", "contact_law"},
         {"catenary", "pantograph"},
         {"library", "coupled"},
+        {"interface"},
         {"commands"},
         {"__main__"},
     ],
@@ -60,6 +61,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"results"},
         {"report", "run_session"},
         {"batch"},
+        {"interface"},
         {"commands"},
         {"__main__"},
     ],
@@ -75,10 +77,11 @@ ONLY_IN = {
     "fmpy": lambda name: name.startswith("master.fmu."),
     "lxml": lambda name: name.startswith("master.ssp."),
     "pythonfmu": lambda name: name.startswith("fmus."),
-    "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.")),
+    "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.", "master.interface.")),
+    "pandas": lambda name: name.startswith(("models.interface.", "master.interface.")),
 }
 #: What runs inside an FMU: all of models but these, and fmus/slave.
-OUTSIDE_FMU = ("models.commands", "models.__main__")
+OUTSIDE_FMU = ("models.commands", "models.interface", "models.__main__")
 
 
 @cache

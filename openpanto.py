@@ -7,11 +7,25 @@ a sentence, like every other one (`master.safety.supervision`).
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+
+
+def _end(*_: object) -> None:
+    """End this process with a sentence."""
+    os.write(2, b"error: interrupted\n")
+    os._exit(1)
+
+
+if os.path.basename(sys.argv[0]).partition(".")[0] == "openpanto":  # the command, which supervision is yet to begin for
+    for _signal in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(_signal) != signal.SIG_IGN:  # as under nohup
+            signal.signal(_signal, _end)
+
 import argparse
 import importlib
-import os
 import re
-import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn

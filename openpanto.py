@@ -48,7 +48,7 @@ _MODELS: Final = "models.commands.physics_main:carry_out"
 _FMUS: Final = "fmus.__main__:carry_out"
 
 #: Packages that nothing works without, as pyproject.toml has them.
-REQUIRED: Final = ("numpy", "scipy", "pythonfmu", "fmpy", "lxml", "pydantic", "filelock", "rich", "matplotlib")
+REQUIRED: Final = ("numpy", "scipy", "pythonfmu", "fmpy", "lxml", "pydantic", "filelock", "rich", "matplotlib", "shtab")
 
 #: In the order of the help.
 VERBS: Final[Mapping[str, Verb]] = {
@@ -155,6 +155,62 @@ class Parser(argparse.ArgumentParser):
         self.error(text + (hint(given[0].partition("=")[0], options) if given[0].startswith("-") else ""))
 
 
+class Completion(argparse.Action):
+    """Prints the script that completes verbs, options, names and files in a shell, and ends.
+
+    It is made once and holds all it needs: pressing TAB starts no Python.
+    """
+
+    def __call__(self, parser: argparse.ArgumentParser, _namespace: object, shell: Any, _option: object = None) -> None:
+        """Print the script."""
+        print(completion(shell))
+        parser.exit()
+
+
+def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
+    """Return the script for a shell, with the names of the library as they are now."""
+    import shtab
+
+    from fmus.builder.recipe import known_names
+    from master.batch.study.family import family_names
+    from master.batch.verification.case import CASES
+    from master.scenario.scenario_place import scenario_names
+    from models.library.catalogue import line_names, pantograph_names
+
+    known = {
+        "scenario": scenario_names(),
+        "line": line_names(),
+        "pantograph": pantograph_names(),
+        "name": family_names(),
+        "cases": [case.stem for case in CASES.glob("*.toml")],
+        "names": known_names(),
+    }
+    parser, functions = command_line(), []
+    for verb in _verbs(parser).values():
+        for action in verb._actions:
+            if action.dest in known and action.choices is None:
+                name = f"_openpanto_{verb.prog.split()[-1].replace('-', '_')}_{action.dest}"
+                functions.append(_COMPLETING[shell].format(name=name, known=" ".join(sorted(known[action.dest]))))
+                action.complete = {"bash": name, "zsh": name, "fish": f"({name})"}  # type: ignore[attr-defined]
+            elif action.type is Path:
+                is_folder = action.metavar == "DIR"
+                action.complete = shtab.DIRECTORY if is_folder else shtab.FILE  # type: ignore[attr-defined]
+    return str(shtab.complete(parser, shell, preamble={shell: "\n".join(functions)}))  # type: ignore[arg-type]
+
+
+#: Shell functions that offer known names, and files as well.
+_COMPLETING: Final = {
+    "bash": '{name}() {{ compgen -W "{known}" -- "$1"; compgen -f -- "$1"; }}',
+    "zsh": "{name}() {{ compadd {known}; _files; }}",
+    "fish": "function {name}; string split ' ' '{known}'; __fish_complete_path (commandline -ct); end",
+}
+
+
+def _verbs(parser: argparse.ArgumentParser) -> Mapping[str, argparse.ArgumentParser]:
+    """Return the parsers of the verbs."""
+    return next(a.choices for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return the exit code: 0 done, 1 failed, 2 a command line that was not understood."""
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -190,6 +246,9 @@ def command_line(wanted: Collection[str] = tuple(VERBS)) -> Parser:
         epilog="openpanto VERB --help says more of a verb. Start with: openpanto run cx_ln2",
     )
     parser.add_argument("--version", action="version", version=f"openpanto {_version() or '(not installed)'}")
+    parser.add_argument(
+        "--completion", action=Completion, choices=("bash", "zsh", "fish"), help="print a script for TAB"
+    )
     verbs = parser.add_subparsers(required=True, metavar="VERB", parser_class=Parser)
     for name, verb in VERBS.items():
         if name not in wanted:

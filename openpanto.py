@@ -139,6 +139,13 @@ VERBS: Final[Mapping[str, Verb]] = {
 }
 
 
+EPILOG: Final = """\
+openpanto VERB --help says more of a verb and has examples. To begin with:
+  openpanto run cx_ln2
+Completion with TAB, in bash (zsh, fish likewise):
+  openpanto --completion bash > ~/.local/share/bash-completion/completions/openpanto"""
+
+
 class Parser(argparse.ArgumentParser):
     """A parser that suggests what a mistyped option or choice may have been meant to be."""
 
@@ -243,7 +250,8 @@ def command_line(wanted: Collection[str] = tuple(VERBS)) -> Parser:
     parser = Parser(
         prog="openpanto",
         description="Simulate pantographs under overhead contact lines and judge the contact quality.",
-        epilog="openpanto VERB --help says more of a verb. Start with: openpanto run cx_ln2",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"openpanto {_version() or '(not installed)'}")
     parser.add_argument(

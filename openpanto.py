@@ -27,6 +27,7 @@ import argparse
 import importlib
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn
 
@@ -232,17 +233,22 @@ def _worked(given: Sequence[str]) -> int:
         parser.print_help()
         return 2
     if not verb.startswith("-") and verb not in VERBS:
-        parser.error(f"there is no verb '{verb}'{hint(verb, VERBS) or _wanted_run(verb)}")
+        parser.error(f"there is no verb '{verb}'{_wanted_run(verb) or hint(verb, VERBS)}")
     options, unknown = parser.parse_known_args(given)
     if unknown:
         options.parser.unknown(unknown)
-    with phase("computing"):  # a factorisation may never come back to Python
-        return int(_named(VERBS[verb].execution)(options))
+    execution = VERBS[verb].execution
+    # The master says itself what it is at; of the physics, a factorisation may never come back to Python.
+    with nullcontext() if execution == _MASTER else phase("computing"):
+        return int(_named(execution)(options))
 
 
 def _wanted_run(name: str) -> str:
     """Return the hint that a scenario is run by a verb, if the name may be one."""
-    return f"; to run a scenario: openpanto run {name}" if os.path.lexists(name) or name.endswith(".ssp") else ""
+    from master.scenario.scenario_place import scenario_names
+
+    is_scenario = os.path.lexists(name) or name.endswith(".ssp") or name in scenario_names()
+    return f"; to run a scenario: openpanto run {name}" if is_scenario else ""
 
 
 def command_line(wanted: Collection[str] = tuple(VERBS)) -> Parser:

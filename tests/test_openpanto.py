@@ -92,6 +92,7 @@ def test_version_and_help_import_nothing_that_takes_time(asked):
     [
         (["rnu", "x"], "there is no verb 'rnu'; did you mean 'run'?"),
         (["quux"], "there is no verb 'quux'"),
+        (["cx_ln2"], "there is no verb 'cx_ln2'; to run a scenario: openpanto run cx_ln2"),
         (["cx_ln2.ssp"], "there is no verb 'cx_ln2.ssp'; to run a scenario: openpanto run cx_ln2.ssp"),
         (["run", "x", "--sheme", "jacobi"], "unrecognized arguments: --sheme jacobi; did you mean '--scheme'?"),
         (["run", "x", "--scheme", "jacoby"], "'gauss-seidel', 'iterative'); did you mean 'jacobi'?"),

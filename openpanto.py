@@ -22,6 +22,8 @@ if os.path.basename(sys.argv[0]).partition(".")[0] == "openpanto":  # the comman
     for _signal in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(_signal) != signal.SIG_IGN:  # as under nohup
             signal.signal(_signal, _end)
+if __name__ == "__main__" and sys.path[0] != os.path.dirname(__file__) and not sys.flags.safe_path:
+    del sys.path[0]  # the working folder of ``python -m openpanto``
 
 import argparse
 import importlib
@@ -81,7 +83,7 @@ VERBS: Final[Mapping[str, Verb]] = {
         "run a family of variants of a scenario and report them side by side",
         "master.commands.study_command:add_study",
         _MASTER,
-        ("study --list", "study cx_ln2_overlap", "study cx_generic_pair --only distance_100"),
+        ("study --list", "study cx_ln2_overlap", "study cx_ln2_overlap --only '200 m'"),
     ),
     "compare": Verb(
         "show two or more runs side by side",
@@ -314,7 +316,7 @@ def _examine(options: argparse.Namespace) -> int:
 def _packages() -> Iterator[tuple[Literal["ok", "note", "missing"], str]]:
     for name in REQUIRED:
         version = _version(name)
-        yield ("ok", f"{name} {version}") if version else ("missing", f"{name} lacks: pip install {name}")
+        yield ("ok", f"{name} {version}") if version else ("missing", f"{name} is not installed: pip install {name}")
 
 
 def _kernels() -> tuple[Literal["ok", "note", "missing"], str]:

@@ -15,9 +15,10 @@ from master.errors import MasterError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
 from master.report.charts.measured_charts import comparison_rows
-from master.report.comparison_page import columns, comparison_page
+from master.report.comparison_page import MOST_INPUTS, columns, comparison_page, run_names
 from master.report.film_file import FilmOptions, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
+from master.report.run_inputs import differing_inputs
 from master.report.terminal_summary import WIDTH, Terminal
 from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
 from master.results.run_results import Results
@@ -146,7 +147,8 @@ def _show(
 ) -> None:
     console = Terminal(width=WIDTH, highlight=False)
     found = columns(runs)
-    heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
+    heads = [c.name for c in found]
+    _show_inputs(console, runs)
     console.print(
         result_tables.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs])
     )
@@ -160,6 +162,18 @@ def _show(
         console.print(f"report in {options.report}", markup=False, soft_wrap=True)
 
 
+def _show_inputs(console: Terminal, runs: Sequence[Results]) -> None:
+    """Print what differs in the inputs of runs."""
+    rows = differing_inputs([run.summary for run in runs])
+    if not rows:
+        console.print("the inputs are the same")
+        return
+    heads = ["input that differs", *run_names([run.folder for run in runs])]
+    console.print(result_tables.plain_table(heads, rows[:MOST_INPUTS]))
+    if len(rows) > MOST_INPUTS:
+        console.print(f"and {len(rows) - MOST_INPUTS} more inputs; --report FILE lists them all", markup=False)
+
+
 def _as_json(c: run_difference.RunDifference, first: Results, other: Results) -> Mapping[str, Any]:
     names = ("mean", "sigma", "minimum", "maximum")
     one, two = c.first.quality, c.second.quality
@@ -169,4 +183,5 @@ def _as_json(c: run_difference.RunDifference, first: Results, other: Results) ->
     notes = list(run_difference.setting_notes([first, other]))
     forces = {"rms": c.rms, "largest": c.largest, "apart": c.apart}
     known = {"notes": notes, "contact": one.contact, "difference": difference, **forces}
-    return {**known, "filters": filters, "same_filter": same}
+    inputs = {name: values for name, *values in differing_inputs([first.summary, other.summary])}
+    return {**known, "filters": filters, "same_filter": same, "inputs": inputs}

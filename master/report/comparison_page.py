@@ -110,6 +110,7 @@ def comparison_page(runs: Sequence[Results]) -> str:
         f"<h1>{html_markup.text(' | '.join(dict.fromkeys(names)))}</h1>",
         *map(_note, run_names([r.folder for r in runs]), runs),
         *_input_section(runs),
+        "<h2>Verdict</h2>",
         *map(_verdict, found),
         *(f"<p class='warning'>Warning: {html_markup.text(note)}.</p>" for note in setting_notes(runs)),
         "<h2>Figures</h2>",

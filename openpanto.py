@@ -173,7 +173,10 @@ class Completion(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, _namespace: object, shell: Any, _option: object = None) -> None:
         """Print the script."""
-        print(completion(shell))
+        try:
+            print(completion(shell), flush=True)
+        except ModuleNotFoundError as error:
+            parser.exit(1, f"error: {error.name} is not installed: pip install {error.name}\n")
         parser.exit()
 
 

@@ -2,7 +2,8 @@
 
 The only file that knows all three packages. A verb's options are declared by its package, which is imported when the
 verb is asked for and not before: so ``--version`` and ``--help`` are quick, and an interrupt during the imports ends in
-a sentence, like every other one (`master.safety.supervision`).
+a sentence, like every other one (`master.safety.supervision`). The table of verbs and ``new``, which takes from all
+packages, make it longer than other files.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ if os.path.basename(sys.argv[0]).partition(".")[0] == "openpanto":  # the comman
     for _signal in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(_signal) != signal.SIG_IGN:  # as under nohup
             signal.signal(_signal, _end)
+if __name__ == "__main__" and sys.path[0] != os.path.dirname(__file__) and not sys.flags.safe_path:
+    del sys.path[0]  # the working folder of ``python -m openpanto``
 
 import argparse
 import importlib
@@ -81,7 +84,7 @@ VERBS: Final[Mapping[str, Verb]] = {
         "run a family of variants of a scenario and report them side by side",
         "master.commands.study_command:add_study",
         _MASTER,
-        ("study --list", "study cx_ln2_overlap", "study cx_generic_pair --only distance_100"),
+        ("study --list", "study cx_ln2_overlap", "study cx_ln2_overlap --only '200 m'"),
     ),
     "compare": Verb(
         "show two or more runs side by side",
@@ -173,7 +176,10 @@ class Completion(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, _namespace: object, shell: Any, _option: object = None) -> None:
         """Print the script."""
-        print(completion(shell))
+        try:
+            print(completion(shell), flush=True)
+        except ModuleNotFoundError as error:
+            parser.exit(1, f"error: {error.name} is not installed: pip install {error.name}\n")
         parser.exit()
 
 
@@ -191,6 +197,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
         "scenario": scenario_names(),
         "line": line_names(),
         "pantograph": pantograph_names(),
+        "like": (*line_names(), *pantograph_names()),
         "name": family_names(),
         "cases": [case.stem for case in CASES.glob("*.toml")],
         "names": known_names(),
@@ -316,7 +323,7 @@ def _examine(options: argparse.Namespace) -> int:
 def _packages() -> Iterator[tuple[Literal["ok", "note", "missing"], str]]:
     for name in REQUIRED:
         version = _version(name)
-        yield ("ok", f"{name} {version}") if version else ("missing", f"{name} lacks: pip install {name}")
+        yield ("ok", f"{name} {version}") if version else ("missing", f"{name} is not installed: pip install {name}")
 
 
 def _kernels() -> tuple[Literal["ok", "note", "missing"], str]:

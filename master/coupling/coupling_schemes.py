@@ -14,7 +14,7 @@ import numpy as np
 from master.arrays import FloatArray
 from master.coupling.network import Network
 from master.errors import RunError
-from master.ssp.run_settings import Coupling, Scheme
+from master.ssp.run_settings import Coupling
 
 #: Exchanges at the start before the values must be consistent, and their relative tolerance.
 MAX_INITIAL_EXCHANGES: Final = 50
@@ -175,11 +175,7 @@ class Iterative:
 
 
 #: What makes the schemes, out of their options.
-ALGORITHMS: Final[dict[Scheme, Callable[..., Algorithm]]] = {
-    "jacobi": Jacobi,
-    "gauss-seidel": GaussSeidel,
-    "iterative": Iterative,
-}
+ALGORITHMS: Final[dict[str, Callable[..., Algorithm]]] = {made.name: made for made in (Jacobi, GaussSeidel, Iterative)}
 
 
 def make_algorithm(coupling: Coupling) -> Algorithm:

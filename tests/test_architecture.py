@@ -203,6 +203,15 @@ def test_file_names_are_unique():
     assert sorted(wrong) == []
 
 
+def test_the_command_knows_the_packages_and_nobody_knows_the_command():
+    tree = ast.parse((ROOT / "openpanto.py").read_text(encoding="utf-8"))
+    at_once = {node.module for node in tree.body if isinstance(node, ast.ImportFrom)} & set(modules())
+    assert at_once == {"master.errors", "master.safety.supervision"}
+    ours = {n for n in imported(ROOT / "openpanto.py") if n.split(".")[0] not in sys.stdlib_module_names}
+    assert {n for n in ours if module_of(n) is None} == {"shtab"}
+    assert not [name for name, path in modules().items() if "openpanto" in set(imported(path))]
+
+
 def test_rooms_say_their_duty_and_hand_nothing_on():
     """An ``__init__.py`` holds a docstring alone, but for the public faces of the packages."""
     wrong = set()

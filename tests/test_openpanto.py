@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -91,6 +92,7 @@ def test_version_and_help_import_nothing_that_takes_time(asked):
     [
         (["rnu", "x"], "there is no verb 'rnu'; did you mean 'run'?"),
         (["quux"], "there is no verb 'quux'"),
+        (["cx_ln2"], "there is no verb 'cx_ln2'; to run a scenario: openpanto run cx_ln2"),
         (["cx_ln2.ssp"], "there is no verb 'cx_ln2.ssp'; to run a scenario: openpanto run cx_ln2.ssp"),
         (["run", "x", "--sheme", "jacobi"], "unrecognized arguments: --sheme jacobi; did you mean '--scheme'?"),
         (["run", "x", "--scheme", "jacoby"], "'gauss-seidel', 'iterative'); did you mean 'jacobi'?"),
@@ -111,7 +113,7 @@ def test_the_packages_that_nothing_works_without_are_those_of_pyproject():
 
 def test_doctor_names_versions_and_what_is_there(call):
     done = call("doctor")
-    assert done.returncode == 0, done.stdout
+    assert done.returncode == ("missing " in done.stdout)
     assert "ok       numpy " in done.stdout
     assert "lines are stepped by " in done.stdout
     assert done.stderr == ""
@@ -176,12 +178,11 @@ sys.meta_path.insert(0, Sender())
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
-@pytest.mark.parametrize("number", ["SIGINT", "SIGHUP"])
 @pytest.mark.parametrize(
-    "module",
-    ["argparse", "master.safety.supervision", "rich", "numpy", "scipy.sparse", "matplotlib", "models.catenary"],
+    ("module", "number"),
+    [("argparse", "SIGINT"), ("master.errors", "SIGHUP"), ("numpy", "SIGINT"), ("matplotlib", "SIGHUP")],
 )
-def test_an_interrupt_during_the_imports_is_one_sentence(number, module, tmp_path):
+def test_an_interrupt_during_the_imports_is_one_sentence(module, number, tmp_path):
     path = tmp_path / "openpanto"
     path.write_text(AT_IMPORT + SCRIPT)
     command = [sys.executable, "-P", path, module, number, "couple", "LN2", "CX", "--quiet"]
@@ -191,13 +192,60 @@ def test_an_interrupt_during_the_imports_is_one_sentence(number, module, tmp_pat
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
-@pytest.mark.parametrize("line", [["couple", "LN2", "CX", "--quiet"], ["build"], ["doctor"]], ids=lambda line: line[0])
-def test_an_interrupt_of_any_verb_is_one_sentence(line, script, tmp_path):
-    process = subprocess.Popen(
-        [sys.executable, script, *line], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+def test_an_interrupt_of_the_physics_is_one_sentence(script, tmp_path):
+    command = [sys.executable, script, "couple", "LN2", "CX", "--quiet"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     time.sleep(2.0)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode in (0, 1)  # it may have been quick
     assert said in (b"", b"error: interrupted\n")
+
+
+#: The last word of a command line as bash completes it.
+BASH_TAB = """
+source {script}
+COMP_WORDS=({line}); COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 )); COMP_LINE="{line}"; COMP_POINT=${{#COMP_LINE}}
+$(complete -p openpanto | sed 's/.*-F \\([^ ]*\\).*/\\1/')
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+TAB = {"bash": BASH_TAB, "fish": "source {script}; complete -C '{line}'"}
+
+
+@pytest.fixture(scope="module", params=["bash", "zsh", "fish"])
+def completion(request, tmp_path_factory):
+    """A shell, and the script for it."""
+    pytest.importorskip("shtab")
+    if shutil.which(request.param) is None:
+        pytest.skip(f"no {request.param} here")
+    path = tmp_path_factory.mktemp("completion") / "openpanto"
+    path.write_text(openpanto.completion(request.param))
+    return request.param, path
+
+
+def test_every_shell_reads_its_script(completion):
+    shell, path = completion
+    done = subprocess.run([shell, "-n", path], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("line", "word"),
+    [
+        ("openpanto va", "validate"),
+        ("openpanto run --sch", "--scheme"),
+        ("openpanto run cx_ln", "cx_ln2"),
+        ("openpanto run own", "own.ssp"),
+        ("openpanto couple LN2 C", "CX"),
+        ("openpanto build Cat", "Catenary_LN2"),
+        ("openpanto study cx_", "cx_ln2_overlap"),
+    ],
+)
+def test_verbs_options_names_and_files_are_completed(completion, line, word, tmp_path):
+    shell, path = completion
+    if shell not in TAB:
+        pytest.skip(f"{shell} completes at its own terminal only")
+    (tmp_path / "own.ssp").touch()
+    command = [shell, "-c", TAB[shell].format(script=path, line=line)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert word in [offered.partition("\t")[0] for offered in done.stdout.splitlines()], done.stderr

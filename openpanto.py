@@ -2,7 +2,8 @@
 
 The only file that knows all three packages. A verb's options are declared by its package, which is imported when the
 verb is asked for and not before: so ``--version`` and ``--help`` are quick, and an interrupt during the imports ends in
-a sentence, like every other one (`master.safety.supervision`).
+a sentence, like every other one (`master.safety.supervision`). The table of verbs and ``new``, which takes from all
+packages, make it longer than other files.
 """
 
 from __future__ import annotations
@@ -173,7 +174,10 @@ class Completion(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, _namespace: object, shell: Any, _option: object = None) -> None:
         """Print the script."""
-        print(completion(shell))
+        try:
+            print(completion(shell), flush=True)
+        except ModuleNotFoundError as error:
+            parser.exit(1, f"error: {error.name} is not installed: pip install {error.name}\n")
         parser.exit()
 
 
@@ -191,6 +195,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
         "scenario": scenario_names(),
         "line": line_names(),
         "pantograph": pantograph_names(),
+        "like": (*line_names(), *pantograph_names()),
         "name": family_names(),
         "cases": [case.stem for case in CASES.glob("*.toml")],
         "names": known_names(),

@@ -154,10 +154,12 @@ class Parser(argparse.ArgumentParser):
     """A parser that suggests what a mistyped option or choice may have been meant to be."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage and the mistake, and end with exit code 2."""
+        """Print the mistake in one sentence, and end with exit code 2."""
         if found := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message, re.DOTALL):
             message += hint(found[1], re.findall(r"'(.*?)'", found[2]))
-        super().error(message)
+        if "required" in message:
+            message += f" ({self.prog} --help has examples)"
+        self.exit(2, f"{self.prog}: error: {message}\n")
 
     def unknown(self, given: Sequence[str]) -> NoReturn:
         """Refuse arguments that the verb does not have."""
@@ -210,7 +212,8 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
             elif action.type is Path:
                 is_folder = action.metavar == "DIR"
                 action.complete = shtab.DIRECTORY if is_folder else shtab.FILE  # type: ignore[attr-defined]
-    return str(shtab.complete(parser, shell, preamble={shell: "\n".join(functions)}))  # type: ignore[arg-type]
+    preamble: Any = {shell: "\n".join(functions)}
+    return str(shtab.complete(parser, shell, preamble=preamble))
 
 
 #: Shell functions that offer known names, and files as well.

@@ -25,7 +25,8 @@ ROOTS: Mapping[str, Path] = {
     "fmus": REPOSITORY / "fmus",
     "pythonfmu": PYTHONFMU,
 }
-_EMPTIED = frozenset({"pythonfmu"})
+#: Packages of which an FMU takes single modules: their __init__ hand out more than it needs.
+_EMPTIED = frozenset({"pythonfmu", "models"})
 #: Kind of pantograph, as its definition says -> module and class of the adapter.
 _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
     "lumped": ("fmus.slave.lumped_slave", "LumpedPantographSlave"),

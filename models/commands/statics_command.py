@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
     result = analyse(arguments)
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
-    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result.span_droppers))
+    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
     if arguments.out is not None:
         folder = new_folder(arguments.out)
         write(folder, result)
@@ -65,6 +65,7 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
         (f"elasticity at {e.force:g} N, minimum [mm/N]", f"{1e3 * e.minimum:.4f}"),
         (f"elasticity at {e.force:g} N, maximum [mm/N]", f"{1e3 * e.maximum:.4f}"),
         ("non-uniformity of elasticity u [%]", f"{100.0 * e.non_uniformity:.1f}"),
+        *_other_rows(result),
         *_arm_rows(result),
         ("law by which droppers slacken", result.model.definition.dropper.slack_law),
         ("wave speed C [km/h]", f"{3.6 * w.speed:.1f}"),
@@ -90,7 +91,7 @@ def write(folder: Path, result: LineStatics) -> None:
         write_figure(folder / f"{name}.png", figure, 150)
 
 
-_DROPPER_COLUMNS = ("from the support [m]", "length [m]", "tension [N]")
+_DROPPER_COLUMNS = ("x [m]", "from the support [m]", "unstrained length [m]", "tension [N]")
 
 
 def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
@@ -101,6 +102,17 @@ def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
     rows.append(("dropper lengths, longest and shortest [m]", f"{d.length.max():.4f}, {d.length.min():.4f}"))
     rows.append(("dropper tensions, largest and smallest [N]", f"{d.force.max():.1f}, {d.force.min():.1f}"))
     return rows
+
+
+def _other_rows(result: LineStatics) -> list[tuple[str, str]]:
+    """Return the elasticity of the other sections of a line with overlaps, each in its middle span."""
+    return [
+        (
+            f"section {section + 1}, span {number}: elasticity [mm/N], u [%]",
+            f"{1e3 * e.minimum:.4f} ... {1e3 * e.maximum:.4f}, {100.0 * e.non_uniformity:.1f}",
+        )
+        for section, (number, e) in result.others.items()
+    ]
 
 
 def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
@@ -115,6 +127,8 @@ def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
     ]
 
 
-def _dropper_rows(droppers: rest_profile.Droppers) -> Iterable[Sequence[str]]:
-    for x, length, force, hanger in zip(droppers.x, droppers.length, droppers.force, droppers.is_hanger, strict=True):
-        yield f"{x:.2f}{' (hanger)' if hanger else ''}", f"{length:.4f}", f"{force:.1f}"
+def _dropper_rows(result: LineStatics) -> Iterable[Sequence[str]]:
+    d = result.span_droppers
+    for x, length, force, hanger in zip(d.x, d.length, d.force, d.is_hanger, strict=True):
+        place = f"{x:.2f}{' (hanger)' if hanger else ''}", f"{x - result.span.start:.2f}"
+        yield *place, f"{length:.4f}", f"{force:.1f}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,6 +49,8 @@ class LineStatics:
         ``x`` [m], ``lateral``, ``lift`` [N] of every steady arm.
     elasticity : Elasticity
         ``x`` [m], ``value`` [m/N] along the span, ``minimum``, ``maximum``, ``non_uniformity``.
+    others : dict
+        Number and elasticity of the middle span of every other section, by its index.
     waves : Waves
         ``speed``, ``limit`` [m/s], ``reflection``, ``doppler``, ``amplification``.
     warnings : tuple of str
@@ -62,6 +65,7 @@ class LineStatics:
     droppers: rest_profile.Droppers
     arms: rest_profile.ArmLoads
     elasticity: elasticity.Elasticity
+    others: dict[int, tuple[int, elasticity.Elasticity]]
     waves: wire_waves.Waves
     warnings: tuple[str, ...]
 
@@ -76,17 +80,18 @@ class LineStatics:
     @property
     def tables(self) -> dict[str, Table]:
         """Titles and columns by name: ``droppers``, ``elasticity``, ``steady_arms``, and every kind of wire."""
-        d, e, a = self.droppers, self.elasticity, self.arms
+        d, a = self.droppers, self.arms
+        all_sections = {self.section: self.elasticity} | {section: other for section, (_, other) in self.others.items()}
+        parts = [(np.full_like(e.x, section + 1), e.x, 1e3 * e.value) for section, e in sorted(all_sections.items())]
         titles = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
         found: dict[str, Table] = {
             "droppers": (titles, (d.x, d.length, d.force, d.is_hanger)),
-            "elasticity": (("x [m]", "elasticity [m/N]"), (e.x, e.value)),
+            "elasticity": (("section", "x [m]", "elasticity [mm/N]"), _joined(parts)),
             "steady_arms": (("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift)),
         }
         for component in dict.fromkeys(p.component for p in self.profiles):
-            same = [p for p in self.profiles if p.component == component]  # stitch wires one after the other
-            columns = tuple(np.concatenate(c) for c in zip(*((p.x, p.y, p.z) for p in same), strict=True))
-            found[component] = (("x [m]", "y [m]", "z [m]"), columns)
+            same = [(p.x, p.y, p.z) for p in self.profiles if p.component == component]  # stitch wires one by one
+            found[component] = (("x [m]", "y [m]", "z [m]"), _joined(same))
         return found
 
     def frame(self, name: str) -> pandas.DataFrame:
@@ -195,7 +200,22 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         profiles=rest_profile.profiles(model, index),
         droppers=rest_profile.droppers(model, section=index),
         arms=rest_profile.arm_loads(model, index),
-        elasticity=elasticity.elasticity(model, elasticity.positions_in_span(chosen), force, index),
+        elasticity=_elasticity(model, index, number, force),
+        others={
+            other: (middle := (len(s.spans) + 1) // 2, _elasticity(model, other, middle, force))
+            for other, s in enumerate(definition.sections)
+            if other != index
+        },
         waves=wire_waves.waves(definition, speed, chosen.length),
         warnings=tuple(filter(None, warnings)),
     )
+
+
+def _elasticity(model: CatenaryModel, section: int, number: int, force: float) -> elasticity.Elasticity:
+    span = model.definition.sections[section].spans[number - 1]
+    return elasticity.elasticity(model, elasticity.positions_in_span(span), force, section)
+
+
+def _joined(parts: Sequence[tuple[FloatArray, ...]]) -> tuple[FloatArray, ...]:
+    """Return columns of several tables, one table after the other."""
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))

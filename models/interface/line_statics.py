@@ -14,7 +14,8 @@ from models.catenary import line_advice
 from models.catenary.definition.line_definition import CatenaryDefinition, Span
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
-from models.catenary.statics import elasticity, rest_profile, wire_waves
+from models.catenary.statics import elasticity as under_force
+from models.catenary.statics import rest_profile, wire_waves
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.interface.column_frames import column_frame
@@ -64,8 +65,8 @@ class LineStatics:
     profiles: tuple[rest_profile.Profile, ...]
     droppers: rest_profile.Droppers
     arms: rest_profile.ArmLoads
-    elasticity: elasticity.Elasticity
-    others: dict[int, tuple[int, elasticity.Elasticity]]
+    elasticity: under_force.Elasticity
+    others: dict[int, tuple[int, under_force.Elasticity]]
     waves: wire_waves.Waves
     warnings: tuple[str, ...]
 
@@ -211,9 +212,9 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
     )
 
 
-def _elasticity(model: CatenaryModel, section: int, number: int, force: float) -> elasticity.Elasticity:
+def _elasticity(model: CatenaryModel, section: int, number: int, force: float) -> under_force.Elasticity:
     span = model.definition.sections[section].spans[number - 1]
-    return elasticity.elasticity(model, elasticity.positions_in_span(span), force, section)
+    return under_force.elasticity(model, under_force.positions_in_span(span), force, section)
 
 
 def _joined(parts: Sequence[tuple[FloatArray, ...]]) -> tuple[FloatArray, ...]:

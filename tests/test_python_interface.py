@@ -6,6 +6,7 @@ import ast
 import builtins
 import json
 import os
+import pickle
 import re
 import shutil
 import subprocess
@@ -176,6 +177,22 @@ def test_frames_have_units_in_their_titles(toy_run):
     assert "uplift [m]" in results.uplifts
     assert "duration [s]" in results.events
     assert "mean [N]" in results.spans
+
+
+def test_scenario_and_results_travel_between_processes(toy_run):
+    scenario, results = (pickle.loads(pickle.dumps(each)) for each in toy_run)
+    assert scenario.parameters == toy_run[0].parameters
+    assert results.figures_of() == pytest.approx(toy_run[1].figures_of(), nan_ok=True)
+
+
+def test_a_run_of_the_command_and_one_from_python_are_the_same(toy_run, tmp_path):
+    from master.commands.main import main
+
+    arguments = [str(toy_run[0].path), "--quiet", "--no-report", "--set", "pantograph.static_force=160 N"]
+    assert main([*arguments, "--out", str(tmp_path / "command")]) == 0
+    own = master.run(toy_run[0].set(static_force=160), tmp_path / "python")
+    for name in ("timeseries.csv", "contact_force.csv"):
+        assert (own.folder / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
 
 
 def test_verdict_and_words(toy_run):

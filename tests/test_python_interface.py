@@ -129,7 +129,7 @@ def test_values_are_numbers_or_texts_with_units(toy_run):
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"pantograph.static_forc": 1}, "did you mean pantograph.static_force"),
+        ({"pantograph.static_forc": 1}, "did you mean 'pantograph.static_force'"),
         ({"static_forc": 1}, "there is no parameter 'static_forc' in the scenario"),
         ({"pantograph.static_force": "much"}, "'much' is not a number"),
         ({"pantograph.static_force": float("nan")}, "pantograph.static_force"),
@@ -188,7 +188,7 @@ def test_scenario_and_results_travel_between_processes(toy_run):
 def test_a_run_of_the_command_and_one_from_python_are_the_same(toy_run, tmp_path):
     from master.commands.main import main
 
-    arguments = [str(toy_run[0].path), "--quiet", "--no-report", "--set", "pantograph.static_force=160 N"]
+    arguments = [str(toy_run[0].path), "--quiet", "--no-report", "--set", "pantograph.static_force=160"]
     assert main([*arguments, "--out", str(tmp_path / "command")]) == 0
     own = master.run(toy_run[0].set(static_force=160), tmp_path / "python")
     for name in ("timeseries.csv", "contact_force.csv"):

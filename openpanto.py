@@ -2,7 +2,8 @@
 
 The only file that knows all three packages. A verb's options are declared by its package, which is imported when the
 verb is asked for and not before: so ``--version`` and ``--help`` are quick, and an interrupt during the imports ends in
-a sentence, like every other one (`master.safety.supervision`).
+a sentence, like every other one (`master.safety.supervision`). The table of verbs and ``new``, which takes from all
+packages, make it longer than other files.
 """
 
 from __future__ import annotations
@@ -153,10 +154,12 @@ class Parser(argparse.ArgumentParser):
     """A parser that suggests what a mistyped option or choice may have been meant to be."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage and the mistake, and end with exit code 2."""
+        """Print the mistake in one sentence, and end with exit code 2."""
         if found := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message, re.DOTALL):
             message += hint(found[1], re.findall(r"'(.*?)'", found[2]))
-        super().error(message)
+        if "required" in message:
+            message += f" ({self.prog} --help has examples)"
+        self.exit(2, f"{self.prog}: error: {message}\n")
 
     def unknown(self, given: Sequence[str]) -> NoReturn:
         """Refuse arguments that the verb does not have."""
@@ -173,7 +176,10 @@ class Completion(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, _namespace: object, shell: Any, _option: object = None) -> None:
         """Print the script."""
-        print(completion(shell))
+        try:
+            print(completion(shell), flush=True)
+        except ModuleNotFoundError as error:
+            parser.exit(1, f"error: {error.name} is not installed: pip install {error.name}\n")
         parser.exit()
 
 
@@ -191,6 +197,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
         "scenario": scenario_names(),
         "line": line_names(),
         "pantograph": pantograph_names(),
+        "like": (*line_names(), *pantograph_names()),
         "name": family_names(),
         "cases": [case.stem for case in CASES.glob("*.toml")],
         "names": known_names(),
@@ -205,7 +212,8 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
             elif action.type is Path:
                 is_folder = action.metavar == "DIR"
                 action.complete = shtab.DIRECTORY if is_folder else shtab.FILE  # type: ignore[attr-defined]
-    return str(shtab.complete(parser, shell, preamble={shell: "\n".join(functions)}))  # type: ignore[arg-type]
+    preamble: Any = {shell: "\n".join(functions)}
+    return str(shtab.complete(parser, shell, preamble=preamble))
 
 
 #: Shell functions that offer known names, and files as well.

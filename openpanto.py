@@ -212,7 +212,8 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
             elif action.type is Path:
                 is_folder = action.metavar == "DIR"
                 action.complete = shtab.DIRECTORY if is_folder else shtab.FILE  # type: ignore[attr-defined]
-    return str(shtab.complete(parser, shell, preamble={shell: "\n".join(functions)}))  # type: ignore[arg-type]
+    preamble: Any = {shell: "\n".join(functions)}
+    return str(shtab.complete(parser, shell, preamble=preamble))
 
 
 #: Shell functions that offer known names, and files as well.

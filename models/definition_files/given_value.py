@@ -9,7 +9,7 @@ from typing import Final
 from models.definition_files.si_units import to_si
 
 #: A number, as Python writes it, and a unit or none.
-_WITH_UNIT: Final = re.compile(
+WITH_UNIT: Final = re.compile(
     r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf))\s*(\S*)\s*", re.ASCII | re.IGNORECASE
 )
 
@@ -36,7 +36,7 @@ def in_si(value: float | str, wanted: str | None) -> float:
     """
     if not isinstance(value, str):
         return float(value)
-    match = _WITH_UNIT.fullmatch(value)
+    match = WITH_UNIT.fullmatch(value)
     if match is None:
         raise ValueError(f"'{value}' is not a number, or a number with its unit ('12 kN')")
     number, unit = float(match[1]), match[2]

@@ -117,7 +117,7 @@ def _settings(summary: Mapping[str, Any]) -> dict[str, str]:
     found |= {"scheme": str(coupling.get("scheme", "-")), "step [s]": number(settings.get("step"))}
     found |= {f"scheme, {name}": text for name, text in scheme_options(coupling)}
     for section in ("interval", "filter", "limits"):
-        found |= {f"{section}, {k}": str(v) for k, v in (settings.get(section) or {}).items() if v is not None}
+        found |= {f"{section}, {k}": number(v) for k, v in (settings.get(section) or {}).items() if v is not None}
     return found
 
 

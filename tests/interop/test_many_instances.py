@@ -63,7 +63,7 @@ def pantograph(tmp_path_factory):
 
 
 def folder_of(instance):
-    return Path(instance._unpacked.folder)
+    return Path(instance._extracted.folder)
 
 
 def test_an_unpacked_fmu_serves_one_instance_at_a_time(pantograph):

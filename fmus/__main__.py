@@ -7,20 +7,25 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from fmus.builder.fmu_build import build, why_no_loader
 from fmus.builder.recipe import MAX_PORTS, BuildError, Recipe, UnknownFmuError, fingerprint, known_names, recipe
 from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
 from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
-from models.definition_files.toml_reader import printable
+from models.definition_files.message_text import printable
 
 DEFAULT_FOLDER = Path("build/fmus")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return 0 for success, 1 for failure, 2 for a command line that was not understood."""
-    options = _parser().parse_args(arguments)
+    return carry_out(_parser().parse_args(arguments))
+
+
+def carry_out(options: argparse.Namespace) -> int:
+    """Carry out a verb that was understood and return the exit code; what a user can cause is one message."""
     try:
         code: int | None = options.run(options)
         if sys.stdout is not None:  # closed by the caller
@@ -47,7 +52,26 @@ def _fail(text: str) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs and check whether they run here.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
-    verb = verbs.add_parser("build", help="build FMUs, by default all of the library")
+    add_build(verbs)
+    verb = verbs.add_parser("runtime", help="write the Python that several FMUs share (OPENPANTO_RUNTIME)")
+    verb.add_argument("--out", type=Path, default=Path("build/runtime"), metavar="DIR", help="folder (%(default)s)")
+    verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to take it from (the present one)")
+    verb.set_defaults(run=_write_runtime)
+    add_doctor(verbs)
+    verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
+    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
+    verb.add_argument("name", metavar="NAME", help="as for build")
+    verb.add_argument("--if-known", action="store_true", help="print nothing for a name that no FMU has")
+    verb.set_defaults(run=_fingerprint)
+    verb = verbs.add_parser("list", help="list the FMUs that can be built")
+    verb.set_defaults(run=_list)
+    return parser
+
+
+def add_build(verbs: Any) -> None:
+    """Declare ``build`` and its options."""
+    text = "build FMUs, by default all of the library"
+    verb = verbs.add_parser("build", help=text, description=text)
     verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, path/to/LINE.toml ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
@@ -59,21 +83,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to bring along (the present one)")
     verb.set_defaults(run=_build)
-    verb = verbs.add_parser("runtime", help="write the Python that several FMUs share (OPENPANTO_RUNTIME)")
-    verb.add_argument("--out", type=Path, default=Path("build/runtime"), metavar="DIR", help="folder (%(default)s)")
-    verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to take it from (the present one)")
-    verb.set_defaults(run=_write_runtime)
-    verb = verbs.add_parser("doctor", help="report what this machine lacks to run an FMU")
+
+
+def add_doctor(verbs: Any) -> None:
+    """Declare ``doctor``."""
+    text = "report what this machine lacks to run an FMU"
+    verb = verbs.add_parser("doctor", help=text, description=text)
     verb.add_argument("fmu", type=Path, metavar="FILE", help="X.fmu")
     verb.set_defaults(run=_examine)
-    verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
-    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
-    verb.add_argument("name", metavar="NAME", help="as for build")
-    verb.add_argument("--if-known", action="store_true", help="print nothing for a name that no FMU has")
-    verb.set_defaults(run=_fingerprint)
-    verb = verbs.add_parser("list", help="list the FMUs that can be built")
-    verb.set_defaults(run=_list)
-    return parser
 
 
 def _count(text: str) -> int:

@@ -34,6 +34,8 @@ def parser_of(call: str) -> argparse.ArgumentParser | None:
     if not found:
         return None
     module = importlib.import_module(found[0])
+    if hasattr(module, "command_line"):  # it imports what a verb needs only when that is asked for
+        return module.command_line()
     start = getattr(module, "main", None) or module._main
 
     def stop(parser: argparse.ArgumentParser, *_: Any, **__: Any) -> None:

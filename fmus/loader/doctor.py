@@ -1,4 +1,4 @@
-"""What a machine lacks to run an FMU, in words: ``python -m fmus doctor X.fmu``."""
+"""What a machine lacks to make FMUs, or to run one, in words: ``python -m fmus doctor X.fmu``."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import sys
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 from xml.etree import ElementTree
 
-from fmus.loader.loader_build import DESCRIPTION, INNER_SUFFIX, PROBE, needed_versions
+from fmus.loader.loader_build import DESCRIPTION, INNER_SUFFIX, PROBE, LoaderError, loader_library, needed_versions
 
 Level = Literal["ok", "note", "missing"]
 #: (system, machine) -> folder and suffix of an FMU's library.
@@ -118,6 +118,20 @@ class Package:
     def has_loader(self) -> bool:
         """Whether it brings Python into hosts that are not Python."""
         return f"binaries/linux64/{self.identifier}{INNER_SUFFIX}" in self.names
+
+
+def examine_machine() -> list[Finding]:
+    """Examine what building FMUs, and running them in other tools, takes on this machine; return all findings."""
+    here = f"Python {platform.python_version()} ({sys.executable}) on {platform.system()}, {platform.machine()}"
+    return [Finding("ok", here), _loader(), *_python(ask())]
+
+
+def _loader() -> Finding:
+    try:
+        loader_library()
+    except LoaderError as error:
+        return Finding("note", f"FMUs built here get pythonfmu's own library only, without our loader: {error}")
+    return Finding("ok", "FMUs built here get our loader, which tools that are not Python run them with")
 
 
 def examine(path: Path) -> list[Finding]:
@@ -314,8 +328,12 @@ def _other_hosts(package: Package, python: Interpreter) -> Iterator[Finding]:
 
 
 def main(path: Path) -> int:
-    """Print the findings; return 1 if something is missing."""
-    found = examine(path)
+    """Print the findings on an FMU; return 1 if something is missing."""
+    return show(examine(path))
+
+
+def show(found: Sequence[Finding]) -> int:
+    """Print findings; return 1 if something is missing."""
     for finding in found:
         print(finding)
     sys.stdout.flush()

@@ -40,7 +40,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     if given and given[0] not in VERBS and given[0] not in ("-h", "--help"):
         given.insert(0, "run")
-    options = _parser().parse_args(given)
+    return carry_out(_parser().parse_args(given))
+
+
+def carry_out(options: argparse.Namespace) -> int:
+    """Carry out a verb that was understood and return the exit code; what a user can cause is one message."""
     error = Terminal(stderr=True, width=WIDTH if not sys.stderr.isatty() else None, soft_wrap=True)
     try:
         code: int = options.verb(options)

@@ -26,7 +26,7 @@ from master.safety.interruption import end_signals, raise_on_signals
 #: prctl(2): the signal that a process gets when its parent ends.
 _PR_SET_PDEATHSIG: Final = 1
 #: Phases in which native code may keep the child from reacting to a signal, and how long it may [s].
-_PATIENCE: Final = {"loading": 2.0, "stepping": 10.0, "closing": 10.0}
+_PATIENCE: Final = {"loading": 2.0, "computing": 5.0, "stepping": 10.0, "closing": 10.0}
 #: Seconds within which a child that has finished has to be gone.
 _ENDING_SECONDS: Final = 10.0
 
@@ -79,7 +79,7 @@ def die_with(parent: int) -> None:
 
 @contextmanager
 def phase(name: str) -> Iterator[None]:
-    """Tell the supervisor that native code is about to be called: ``loading``, ``stepping`` or ``closing``."""
+    """Tell the supervisor that native code is about to be called: in which of the phases that it has patience for."""
     _tell(phase=name)
     try:
         yield

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
 from models.commands import couple_command, identify_command, pantograph_command, statics_command
+from models.definition_files.message_text import printable
 from models.definition_files.parameter import ParameterError
-from models.definition_files.toml_reader import DefinitionError, printable
+from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import UnknownNameError
 from models.numerics.kernel_cache import KernelError
 from models.pantograph.multibody.mechanism import MechanismError
@@ -34,9 +35,13 @@ def main(argv: Sequence[str]) -> int:
     subparsers = parser.add_subparsers(dest="verb", required=True)
     for verb in _VERBS:
         verb.add(subparsers)
-    arguments = parser.parse_args(argv)
+    return carry_out(parser.parse_args(argv))
+
+
+def carry_out(options: argparse.Namespace) -> int:
+    """Carry out a verb that was understood and return the exit code; what a user can cause is one message."""
     try:
-        code = int(arguments.run(arguments))
+        code = int(options.run(options))
         if sys.stdout is not None:  # closed by the caller
             sys.stdout.flush()  # here, where an error can still be reported
     except OSError as error:

@@ -14,9 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
+from models.definition_files.message_text import printable
 from models.definition_files.parameter import Definition, ParameterError
 from models.definition_files.si_units import to_si
-from models.definition_files.toml_reader import LARGEST, SMALLEST, printable
+from models.definition_files.toml_reader import LARGEST, SMALLEST
 
 _PARTS = ("line", "pantograph")
 #: A number, as Python writes it, and a unit or none.

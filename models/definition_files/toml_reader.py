@@ -12,39 +12,22 @@ A source that begins with ``choice`` marks a value that the data leave open.
 from __future__ import annotations
 
 import math
-import reprlib
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from models.definition_files.message_text import one_line, shown_value
 from models.definition_files.si_units import shown, to_si
 
-#: Longest message shown in full [characters], as a value may be megabytes of nested lists; most problems shown.
-_LONGEST: Final = 400
+#: Largest number of problems listed.
 _MOST: Final = 100
 #: Deepest allowed nesting of tables and lists; a definition needs five levels.
 _DEEPEST: Final = 20
 #: Limits of magnitude in SI: no quantity of a line or pantograph lies beyond, and squares and quotients stay finite.
 LARGEST: Final = 1e15
 SMALLEST: Final = 1e-15
-
-
-class _Shown(reprlib.Repr):
-    """Values as shown in messages: short, whatever they hold."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxlist = self.maxdict = self.maxlevel = 4
-        self.maxstring = self.maxother = self.maxlong = 80
-
-    def repr_int(self, x: int, level: int) -> str:
-        """Return a number as text; Python refuses to write out thousands of digits."""
-        return f"(a whole number of {x.bit_length()} bits)" if x.bit_length() > 1000 else super().repr_int(x, level)
-
-
-_shown = _Shown().repr
 
 
 def beyond_all(value: float) -> str:
@@ -57,23 +40,6 @@ def beyond_all(value: float) -> str:
 def in_its_unit(unit: str) -> str:
     """Return advice on a value out of range: most such values are in the wrong unit."""
     return "" if unit == "1" else ": check its size and its unit"
-
-
-def one_line(text: str) -> str:
-    """Return text on one line without control characters, and without its middle if it is very long."""
-    if len(text) > _LONGEST:
-        half = _LONGEST // 2
-        text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
-    return "".join(map(_printed, text))
-
-
-def printable(text: str) -> str:
-    """Return text with printable characters only, its lines kept, so that foreign text is safe on a terminal."""
-    return "".join(c if c == "\n" else _printed(c) for c in text)
-
-
-def _printed(c: str) -> str:
-    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
 
 
 @dataclass(frozen=True)
@@ -274,10 +240,10 @@ class Table:
                 return fallback
             value = int(numbers[0]) if numbers[0].is_integer() else numbers[0]
         if isinstance(value, bool) or not isinstance(value, int):
-            self.problem(name, f"{_shown(value)} is not a whole number")
+            self.problem(name, f"{shown_value(value)} is not a whole number")
             return fallback
         if not minimum <= value <= maximum:
-            self.problem(name, f"{_shown(value)} is outside {minimum} ... {maximum}")
+            self.problem(name, f"{shown_value(value)} is outside {minimum} ... {maximum}")
             return fallback
         return value
 
@@ -287,7 +253,7 @@ class Table:
         if entry is None:
             return default or ""
         if not isinstance(entry, str):
-            self.problem(name, f"{_shown(entry)} is not a text in quotation marks")
+            self.problem(name, f"{shown_value(entry)} is not a text in quotation marks")
             return default or ""
         allowed = list(choices) if choices is not None else None
         if allowed is not None and entry not in allowed:
@@ -300,7 +266,7 @@ class Table:
         if entry is None:
             return bool(default)
         if not isinstance(entry, bool):
-            self.problem(name, f"{_shown(entry)} is neither true nor false")
+            self.problem(name, f"{shown_value(entry)} is neither true nor false")
             return bool(default)
         return entry
 
@@ -364,14 +330,14 @@ class Table:
     ) -> tuple[float, ...] | None:
         form = "[[v1, v2, ...]" if many else "[value"
         if not (isinstance(entry, list) and len(entry) == 3 and all(isinstance(e, str) for e in entry[1:])):
-            self.problem(name, f'{_shown(entry)} must be written {form}, "unit", "source"]')
+            self.problem(name, f'{shown_value(entry)} must be written {form}, "unit", "source"]')
             return None
         raw, written_unit, source = entry
         if not source.strip():
             self.problem(name, "names no source; where none states the value, write 'choice: why'")
         values = raw if many and isinstance(raw, list) else [raw]
         if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
-            self.problem(name, f"{_shown(raw)} is not a number")
+            self.problem(name, f"{shown_value(raw)} is not a number")
             return None
         if self._has_absurd(name, values):
             return None
@@ -392,7 +358,7 @@ class Table:
     def _has_absurd(self, name: str, values: Sequence[float]) -> bool:
         for value in values:
             if text := beyond_all(value):
-                self.problem(name, f"{_shown(value)} {text}")
+                self.problem(name, f"{shown_value(value)} {text}")
                 return True
         return False
 

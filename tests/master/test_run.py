@@ -186,7 +186,7 @@ def test_an_interrupted_run_loses_nothing(toy, tmp_path, number):
     assert "Traceback" not in said
     left = run_results.read(tmp_path / "out")
     assert left.summary["status"] == "interrupted"
-    assert "<b>Incomplete.</b> This run is interrupted" in (tmp_path / "out" / "report.html").read_text()
+    assert "<b>Incomplete.</b> This run was interrupted" in (tmp_path / "out" / "report.html").read_text()
     assert left.recordings[0].time[-1] == pytest.approx(left.summary["time_reached"])
     assert len(left.recordings[0].time) == left.summary["steps"] + 1
 

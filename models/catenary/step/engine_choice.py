@@ -51,6 +51,6 @@ def kernels() -> ModuleType:
     Raises
     ------
     ImportError
-        If numba is not installed, or no folder takes their source.
+        If numba is not installed, or no folder can hold their source.
     """
     return load_kernels("kernels", _SOURCE)

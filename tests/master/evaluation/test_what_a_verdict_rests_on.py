@@ -60,7 +60,7 @@ def test_limits_that_nothing_was_held_to_are_named():
     (found,) = bare.assessments()
     assert found.passed
     assert found.unchecked.startswith("not checked: uplift at supports, because no support")
-    assert "contact height range, for the height" in found.unchecked
+    assert "contact height range, because the height" in found.unchecked
     assert run_summary.figures(bare)["quality"][0]["unchecked"] == found.unchecked
     assert found.unchecked in page(bare)
     between = made(interval=(110.0, 140.0), **LIMITS).assessments()[0]

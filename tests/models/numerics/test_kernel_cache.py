@@ -221,7 +221,7 @@ def test_no_folder_at_all_means_no_kernels(cache, twice, monkeypatch):
         raise FileNotFoundError(2, "No usable temporary directory found")
 
     monkeypatch.setattr("tempfile.mkdtemp", none)
-    with pytest.raises(ImportError, match="no folder takes what the kernels are compiled from"):
+    with pytest.raises(ImportError, match="no folder can hold what the kernels are compiled from"):
         twice()
 
 

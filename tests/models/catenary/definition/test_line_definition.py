@@ -32,7 +32,7 @@ def problems(data: dict) -> dict[str, str]:
         read(Table.from_dict(data, "line.toml"))
     assert all(p.file == "line.toml" for p in caught.value.problems)
     texts = [str(p) for p in caught.value.problems]
-    assert len(texts) == len(set(texts)), "a mistake is told once"
+    assert len(texts) == len(set(texts)), "a mistake is reported once"
     return {p.key: p.text for p in caught.value.problems}
 
 
@@ -211,3 +211,8 @@ def test_changing_every_parameter_to_its_own_value_changes_nothing(name):
 def test_unknown_lines_are_told_with_the_known_ones():
     with pytest.raises(UnknownNameError, match="Re330"):
         load_line("LN7")
+
+
+def test_a_file_may_set_what_the_line_declares_at_its_root(line_maker):
+    line = line_maker(extrapolation_order=1, monitor_energy=1, time_step=[2.0, "ms", "test"])
+    assert (line.extrapolation_order, line.monitor_energy, line.time_step) == (1, 1, 0.002)

@@ -170,7 +170,7 @@ def test_supports_of_one_section_are_plain_numbers(line_maker):
 
 
 def test_a_wire_that_is_not_near_would_not_be_met_either(pair):
-    """What is told without looking, and what looking tells: strips before, at and beyond the ends of a wire."""
+    """What is known without searching, and what a search finds: strips before, at and beyond the ends of a wire."""
     model = CatenaryModel(pair)
     wire, state = model.wires[0], model.initial_state()
     first, last = wire.ends

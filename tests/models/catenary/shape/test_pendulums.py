@@ -169,10 +169,10 @@ def test_the_switch_is_a_number_that_an_FMU_offers(ln2):
 def test_an_arm_that_pushes_is_refused(line_maker):
     """Its wire is pulled away from its side: by the listed stagger of its neighbours."""
     stagger = {"listed": [[0.2, -0.2, -0.1, -0.2, 0.2], "m", "test"], "anchor": [0.0, "m", "test"]}
-    with pytest.raises(EquilibriumError) as told:
+    with pytest.raises(EquilibriumError) as raised:
         CatenaryModel(line_maker(spans=6, stagger=stagger))
-    assert "the arm at 150.00 m pushes with" in str(told.value)
-    assert "an arm must pull; change its side or the stagger" in str(told.value)
+    assert "the arm at 150.00 m pushes with" in str(raised.value)
+    assert "an arm must pull; change its side or the stagger" in str(raised.value)
 
 
 def test_arms_of_a_straight_wire_neither_pull_nor_push(line_maker):

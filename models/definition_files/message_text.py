@@ -1,0 +1,43 @@
+"""Text for messages: short, printable, whatever was written in a file."""
+
+from __future__ import annotations
+
+import reprlib
+from typing import Final
+
+#: Longest message shown in full [characters], as a value may be megabytes of nested lists.
+_LONGEST: Final = 400
+
+
+class _Shown(reprlib.Repr):
+    """Values as shown in messages: short, whatever they hold."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlist = self.maxdict = self.maxlevel = 4
+        self.maxstring = self.maxother = self.maxlong = 80
+
+    def repr_int(self, x: int, level: int) -> str:
+        """Return a number as text; Python refuses to write out thousands of digits."""
+        return f"(a whole number of {x.bit_length()} bits)" if x.bit_length() > 1000 else super().repr_int(x, level)
+
+
+#: Return a value as shown in messages.
+shown_value = _Shown().repr
+
+
+def one_line(text: str) -> str:
+    """Return text on one line without control characters, and without its middle if it is very long."""
+    if len(text) > _LONGEST:
+        half = _LONGEST // 2
+        text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
+    return "".join(map(_printed, text))
+
+
+def printable(text: str) -> str:
+    """Return text with printable characters only, its lines kept, so that foreign text is safe on a terminal."""
+    return "".join(c if c == "\n" else _printed(c) for c in text)
+
+
+def _printed(c: str) -> str:
+    return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")

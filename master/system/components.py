@@ -69,6 +69,8 @@ class Fmu:
         Of its default experiment.
     is_single : bool
         Whether a process can hold only one instance of it.
+    definition : str
+        Definition file that one of ours was built from, as it says itself.
     """
 
     path: Path
@@ -82,6 +84,7 @@ class Fmu:
     units: dict[str, Unit] = field(default_factory=dict)
     tolerance: float | None = None
     is_single: bool = False
+    definition: str = ""
 
 
 @dataclass(frozen=True)

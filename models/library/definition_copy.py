@@ -24,16 +24,18 @@ def checked_name(name: str) -> str:
         If it has other characters than letters, digits and _, or is too long.
     """
     if not _ALLOWED.fullmatch(name):
-        raise CopyError(f"'{name}' cannot name a definition, its file and its FMU: take letters, digits and _ (1 to 60)")
+        raise CopyError(
+            f"'{name}' cannot name a definition, its file and its FMU: take letters, digits and _ (1 to 60)"
+        )
     return name
 
 
 def renamed(text: str, name: str) -> str:
-    """Return the text of a definition with another name, all else as it is.
+    r"""Return the text of a definition with another name, all else as it is.
 
     Examples
     --------
-    >>> print(renamed('# LN2\\nname = "LN2"  # short\\ntype = "simple"', "demo_LN2"))
+    >>> print(renamed('# LN2\nname = "LN2"  # short\ntype = "simple"', "demo_LN2"))
     # LN2
     name = "demo_LN2"  # short
     type = "simple"

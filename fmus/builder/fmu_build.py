@@ -160,7 +160,7 @@ def why_no_loader() -> str:
 
 
 def _origin(wanted: Recipe, folder: Path) -> dict[str, str]:
-    """Return which definition it is: the library's, or a user's relative to the FMU, which is stale once that changes."""
+    """Return which definition it is, a user's relative to the FMU, which is stale once that changes."""
     if not wanted.is_own:
         return {"library": f"{wanted.definition.parent.name}/{wanted.definition.name}"}
     path = wanted.definition.resolve()

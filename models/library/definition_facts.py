@@ -38,6 +38,7 @@ class LiftFacts(NamedTuple):
     Attributes
     ----------
     parameter, unit : str
+    value : float
     softening : float or None
         How much less of it is left for every metre that the strip is above the reference height [N/m]; None if the
         parameter is no force on the strip, or that is not known.
@@ -45,6 +46,7 @@ class LiftFacts(NamedTuple):
 
     parameter: str
     unit: str
+    value: float
     softening: float | None
 
 
@@ -59,16 +61,11 @@ def line_facts(line: CatenaryDefinition) -> LineFacts:
 
 def lift_facts(pantograph: LumpedDefinition | MechanismDefinition) -> LiftFacts:
     """Return what lifts a pantograph."""
-    if isinstance(pantograph, LumpedDefinition):
-        return LiftFacts("static_force", "N", _to_ground(pantograph))
+    if isinstance(pantograph, LumpedDefinition):  # only the spring to the roof pulls the raised strip back
+        return LiftFacts("static_force", "N", pantograph.static_force, pantograph.stage[0].stiffness)
     if pantograph.static_moment is not None:
-        return LiftFacts("static_moment", "N.m", None)
-    return LiftFacts("static_force", "N", None)
-
-
-def _to_ground(pantograph: LumpedDefinition) -> float:
-    """Return the static stiffness with which the raised strip is held back: that of the spring to the ground."""
-    return pantograph.stage[0].stiffness
+        return LiftFacts("static_moment", "N.m", pantograph.static_moment, None)
+    return LiftFacts("static_force", "N", pantograph.static_force or 0.0, None)
 
 
 def _working(section: Section) -> tuple[float, float]:

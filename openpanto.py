@@ -8,7 +8,6 @@ a sentence, like every other one (`master.safety.supervision`).
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import os
 import re
@@ -16,6 +15,9 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn
+
+from master.errors import hint
+from master.safety.supervision import phase, supervised
 
 
 class Verb(NamedTuple):
@@ -129,36 +131,19 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the usage and the mistake, and end with exit code 2."""
         if found := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message, re.DOTALL):
-            message += suggestion(found[1], re.findall(r"'(.*?)'", found[2]))
+            message += hint(found[1], re.findall(r"'(.*?)'", found[2]))
         super().error(message)
 
     def unknown(self, given: Sequence[str]) -> NoReturn:
         """Refuse arguments that the verb does not have."""
         options = [option for action in self._actions for option in action.option_strings]
         text = f"unrecognized arguments: {' '.join(given)}"
-        self.error(text + (suggestion(given[0].partition("=")[0], options) if given[0].startswith("-") else ""))
-
-
-def suggestion(name: str, known: Collection[str]) -> str:
-    """Return the question whether one of the known names was meant, empty if none is near.
-
-    Examples
-    --------
-    >>> suggestion("vaildate", ["run", "validate"])
-    "; did you mean 'validate'?"
-    >>> suggestion("film", ["run", "validate"])
-    ''
-    """
-    folded = {other.casefold(): other for other in known}
-    near = difflib.get_close_matches(name.casefold(), folded, n=1)
-    return f"; did you mean '{folded[near[0]]}'?" if near else ""
+        self.error(text + (hint(given[0].partition("=")[0], options) if given[0].startswith("-") else ""))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return the exit code: 0 done, 1 failed, 2 a command line that was not understood."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    from master.safety.supervision import supervised
-
     return supervised(lambda: _worked(given))
 
 
@@ -170,12 +155,10 @@ def _worked(given: Sequence[str]) -> int:
         parser.print_help()
         return 2
     if not verb.startswith("-") and verb not in VERBS:
-        parser.error(f"there is no verb '{verb}'{suggestion(verb, VERBS) or _wanted_run(verb)}")
+        parser.error(f"there is no verb '{verb}'{hint(verb, VERBS) or _wanted_run(verb)}")
     options, unknown = parser.parse_known_args(given)
     if unknown:
         options.parser.unknown(unknown)
-    from master.safety.supervision import phase
-
     with phase("computing"):  # a factorisation may never come back to Python
         return int(_named(VERBS[verb].execution)(options))
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -45,6 +46,21 @@ def printable(text: str) -> str:
 
 def _shown(c: str) -> str:
     return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """Return the question whether one of the known names was meant, empty if none is near.
+
+    Examples
+    --------
+    >>> hint("ln_cx2", ["atr95_c270", "cx_ln2"])
+    "; did you mean 'cx_ln2'?"
+    >>> hint("film", ["run", "validate"])
+    ''
+    """
+    folded = {other.casefold(): other for other in known}
+    near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
+    return f"; did you mean '{folded[near[0]]}'?" if near else ""
 
 
 @dataclass(frozen=True)

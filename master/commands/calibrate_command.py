@@ -17,6 +17,7 @@ from master.errors import MasterError, Problem, RequestError, ScenarioError
 from master.results import run_results
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import find_parameter
+from master.scenario.scenario_place import located, refuse_installed
 from master.ssp.archive import SSD_NAME, Package, Sources
 from master.ssp.run_settings import Calibration
 from master.ssp.ssd import read_structure
@@ -41,8 +42,11 @@ def add_calibrate(verbs: Any) -> None:
 
 def _calibrate(options: argparse.Namespace) -> int:
     is_stored = not (options.dry_run or options.set)
-    is_folder = options.scenario.is_dir()
-    with calibration.unchanged(options.scenario) if is_stored and is_folder else nullcontext(lambda: None) as check:
+    folder = located(options.scenario)
+    if is_stored:
+        refuse_installed(folder)
+    is_folder = folder.is_dir()
+    with calibration.unchanged(folder) if is_stored and is_folder else nullcontext(lambda: None) as check:
         return _calibrated(options, is_stored, check)
 
 

@@ -101,7 +101,8 @@ def add_verb(
     parser: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text)
     parser.set_defaults(verb=verb)
     if scenario:
-        parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="folder NAME.ssp/ or archive NAME.ssp")
+        text = "folder NAME.ssp/, archive NAME.ssp, folder of a project, or name of a scenario in the library"
+        parser.add_argument("scenario", type=Path, metavar="SCENARIO", help=text)
         parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
     return parser
 

@@ -29,7 +29,7 @@ from master.report.progress import ProgressObserver
 from master.report.terminal_summary import Terminal, printable_json, show_run
 from master.results import parquet_export, results_folder
 from master.results.run_results import Results
-from master.run import RunOptions, run
+from master.run_session import RunOptions, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.ssp.archive import Package

@@ -54,7 +54,7 @@ def provide_fmu(
     tell : callable
         Called with what takes time, and what is kept.
     scratch : Path, optional
-        Folder to build into instead, where nothing may be written next to ``path``.
+        Folder to build into instead, where nothing may be written next to ``path``; what it holds is used if it fits.
     library : Path, optional
         Folder in which, and in whose parents up to the project, definitions are looked up first.
 
@@ -81,7 +81,9 @@ def provide_fmu(
         tell(f"{path.name} is used as it is: {why}; to have it rebuilt, remove it")
         return path
     place = scratch / path.name if scratch else path
-    tell(f"building {path.name}" + (" again: its sources have changed" if path.is_file() else ""))
+    if place.is_file() and _matches(wanted, stored_guid(place)):
+        return place
+    tell(f"building {path.name}" + (" again: its sources have changed" if place.is_file() else ""))
     build(place, lookup)
     return place
 

@@ -14,7 +14,7 @@ from master.coupling.macro_steps import TimeGrid, simulate
 from master.errors import RequestError, SlaveError
 from master.fmu.isolation.isolated_instance import Isolation
 from master.fmu.typed_values import TEXTS
-from master.run import RunOptions, connected_fmus
+from master.run_session import RunOptions, connected_fmus
 from tests.foreign_fmus import (
     binding,
     component,

@@ -147,7 +147,7 @@ def project_name(folder: Path) -> str:
     name = _ALLOWED.sub("_", folder.resolve().name).strip("_")
     if not name:
         raise RequestError(f"'{folder}' gives the project no name: take a folder with letters or digits in its name")
-    return name[:40]
+    return name[:30]
 
 
 def check_folder(folder: Path) -> None:
@@ -192,6 +192,7 @@ def project_files(request: Request) -> dict[str, bytes]:
             files[place], definitions[place] = part.source.text.encode(), part.source.origin
     said = ProjectPage(
         name=name,
+        folder=request.folder.resolve().name,
         definitions=definitions,
         foreign=tuple(dict.fromkeys(part.fmu for part in (line, *train) if part.foreign is not None)),
         train=tuple(p.name for p in train),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, Literal, NamedTuple
 
-from master.errors import RequestError
+from master.errors import RequestError, hint
 from master.system.components import Fmu, Variable
 
 Side = Literal["line", "pantograph"]
@@ -113,9 +112,8 @@ def _said(fmu: Fmu, causality: str, name: str, wanted: str) -> PortVariable:
     known = [v.name for v in fmu.variables.values() if v.causality == causality and v.type == "Real"]
     if wanted in known:
         return _port_variable(fmu.variables[wanted])
-    near = difflib.get_close_matches(wanted, known, n=1)
-    hint = f"did you mean '{near[0]}'?" if near else f"it has {', '.join(known[:16]) or 'none'}"
-    raise RequestError(f"--map {name}={wanted}: {fmu.path.name} has no real {causality} '{wanted}'; {hint}")
+    others = hint(wanted, known) or f"; it has {', '.join(known[:16]) or 'none'}"
+    raise RequestError(f"--map {name}={wanted}: {fmu.path.name} has no real {causality} '{wanted}'{others}")
 
 
 def _port_variable(variable: Variable) -> PortVariable:

@@ -33,6 +33,8 @@ class ProjectPage:
     Attributes
     ----------
     name : str
+    folder : str
+        Name of the project's folder.
     definitions : mapping
         Files of own definitions, and what each was copied from.
     foreign : sequence of str
@@ -51,6 +53,7 @@ class ProjectPage:
     """
 
     name: str
+    folder: str
     definitions: Mapping[str, str]
     foreign: Sequence[str]
     train: Sequence[str]
@@ -71,7 +74,7 @@ class ProjectPage:
                 "",
                 "In the folder that holds this one:",
                 "",
-                *(f"    openpanto {verb} {self.name}".ljust(44) + f"# {what}" for verb, what in commands),
+                *(f"    openpanto {verb} {self.folder}".ljust(44) + f"# {what}" for verb, what in commands),
                 "",
                 "| file | what it is |",
                 "|---|---|",
@@ -106,7 +109,7 @@ class ProjectPage:
         start, end = (f"{x:g}" for x in self.way.interval)
         places = ", ".join(f"`{n}` at {x:g} m" for n, x in zip(self.train, self.way.starts, strict=True))
         yield f"Speed {self.speed * 3.6:g} km/h; start of the strip: {places}."
-        yield f"Figures are taken from {start} to {end} m (`Interval`); the run ends 0.5 s after the last strip has passed."
+        yield f"Figures are taken from {start} to {end} m (`Interval`); 0.5 s after the last strip has passed, it ends."
         target = f"the mean force that EN 50367 allows at most at this speed, AC (recalled): {self.mean_force:.1f} N"
         if self.calibrated:
             yield f"`openpanto calibrate` seeks {target}, by `{self.calibrated}`; the value written is a first guess."

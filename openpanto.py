@@ -235,7 +235,7 @@ def add_new(verbs: Any) -> None:
 
     parser = verbs.add_parser("new", help=VERBS["new"].text)
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the project, new or empty")
-    what = "name (openpanto new --help does not list them: a wrong one is answered by all), file NAME.toml, or X.fmu"
+    what = "name in the library or the project, file NAME.toml, or an FMU, X.fmu"
     parser.add_argument("--line", required=True, metavar="LINE", help=what)
     text = "the same for a pantograph; once for each, the leading one first"
     parser.add_argument("--pantograph", required=True, action="append", metavar="PANTOGRAPH", help=text)
@@ -353,10 +353,13 @@ def _renamed(path: Path, text: str, name: str) -> tuple[str, str]:
     from models.library import definition_copy
 
     try:
-        definition_copy.checked_name(name)
+        name = definition_copy.checked_name(name)
+    except definition_copy.CopyError as error:
+        raise RequestError(str(error)) from error
+    try:
         return name, definition_copy.renamed(text, name)
     except definition_copy.CopyError as error:
-        raise RequestError(f"{path.name}: {error}") from error
+        raise RequestError(f"{path}: {error}") from error
 
 
 def add_doctor(verbs: Any) -> None:

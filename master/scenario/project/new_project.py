@@ -182,8 +182,8 @@ def project_files(request: Request) -> dict[str, bytes]:
     name, count = project_name(request.folder), len(request.pantographs)
     if not 1 <= count <= MOST:
         raise RequestError(f"a train has 1 to {MOST} pantographs, not {count}: give --pantograph as often")
-    way = stretch(request.wire, request.speed, _separations(request), request.interval)
     line, *train = _parts(request)
+    way = stretch(request.wire, request.speed, _separations(request), request.interval)
     files = {f"{name}.ssp/{place}": data for place, data in _scenario(name, request, way, line, train).items()}
     definitions = {}
     for part in (line, *train):
@@ -206,16 +206,15 @@ def project_files(request: Request) -> dict[str, bytes]:
 
 
 def _separations(request: Request) -> list[float]:
-    gaps = len(request.pantographs) - 1
-    given = list(request.separations)
+    gaps, given = len(request.pantographs) - 1, list(request.separations)
     if gaps and len(given) == 1:
         return given * gaps
-    if len(given) != gaps:
-        text = (
-            f"{gaps + 1} pantographs need one --separation for all, or {gaps}" if gaps else "one pantograph needs none"
-        )
-        raise RequestError(f"{len(given)} times --separation: {text}; it is the distance in m from one to the next")
-    return given
+    if len(given) == gaps:
+        return given
+    if not gaps:
+        raise RequestError("--separation: there is one pantograph only; give --pantograph once for each")
+    often = "once" if gaps == 1 else f"once, or {gaps} times"
+    raise RequestError(f"{gaps + 1} pantographs: give --separation, the distance in m from one to the next, {often}")
 
 
 def _parts(request: Request) -> list[_Part]:
@@ -241,7 +240,7 @@ def _parts(request: Request) -> list[_Part]:
             raise RequestError(f"{part.source} and {places[part.fmu]} have one name: rename one of these FMUs")
         if count > 1 and part.name != LINE and not part.is_placed:
             text = "start_position and speed cannot be set, as a train needs: name the parameters by --map"
-            raise RequestError(f"{part.fmu}: {text} start_position=NAME --map speed=NAME")
+            raise RequestError(f"{part.fmu}: {text} start_position=NAME, --map speed=NAME")
     return found
 
 
@@ -267,7 +266,8 @@ def _given(maps: Sequence[tuple[str, str]], foreign: Sequence[str], names: Seque
         owners = [owner] if owner else [LINE] if _PORT.match(key) or not pantographs else pantographs
         for name in owners:
             if name not in found:
-                raise RequestError(f"--map {key}={variable}: {name} is no FMU from elsewhere, so its ports are known")
+                text = f"{name} is made from a definition, so its ports are known; --map is for FMUs, X.fmu"
+                raise RequestError(f"--map {key}={variable}: {text}")
             found[name][key.removeprefix(f"{name}.")] = variable
     return found
 
@@ -318,7 +318,7 @@ def _scenario(name: str, request: Request, way: Stretch, line: _Part, train: Seq
         connections=connections,
         stop=way.stop,
         interval=way.interval,
-        until_end=all(p.is_placed for p in train),
+        until_end=all(p.variable(name) == name for p in train for name in ("start_position", "speed")),
         calibrated=_calibrated(train, request.lifts),
         mean_force=request.mean_force,
     )
@@ -352,6 +352,9 @@ def _parameters(part: _Part, request: Request, start: float) -> list[WrittenPara
     if part.foreign is None:
         return values
     variables = part.foreign.variables
+    if (lift := part.variable("static_force")) is not None:
+        remark = f"as in the FMU; 'openpanto calibrate' finds the value for a mean force of {request.mean_force:.1f} N"
+        values.append(WrittenParameter("static_force", float(variables[lift].start or 0.0), "N", remark))
     known = [(part.variable(v.name), v) for v in values]
     return [v._replace(name=own, unit=v.unit if variables[own].unit else "") for own, v in known if own is not None]
 

@@ -69,7 +69,7 @@ def find_ports(fmu: Fmu, side: Side, count: int = 1, given: Mapping[tuple[int, s
                 raise RequestError(_several(file, names, [next(iter(g.values())).name for g in groups]))
             port |= (groups[number] if number < len(groups) else {}) | said
         if lacking := [name for name in _needed(side) if name not in port]:
-            raise RequestError(_unfound(file, side, lacking, kinds, count, number))
+            raise RequestError(_unfound(file, side, lacking, count, number))
         found.append(port)
     return found
 
@@ -125,10 +125,9 @@ def _several(file: str, names: Sequence[str], examples: Sequence[str]) -> str:
     return f"{file} has several variables that could be {names[0]} ({listed}): say which by --map {names[0]}=NAME ..."
 
 
-def _unfound(file: str, side: Side, lacking: Sequence[str], kinds: Sequence[str], count: int, number: int) -> str:
+def _unfound(file: str, side: Side, lacking: Sequence[str], count: int, number: int) -> str:
     listed = f"{', '.join(lacking[:4])}{' ...' if len(lacking) > 4 else ''}"
-    kind = kinds[0] if lacking[0] in ENDS else kinds[1]
-    port = f" of port {number + 1} (of {count} that are needed)" if count > 1 else ""
+    port = f" at port {number + 1} of {count}" if count > 1 else ""
     name = f"pantograph[{number + 1}].{lacking[0]}" if count > 1 else lacking[0]
-    text = f"{file}: found no {kind} for {listed}{port} by name, as a {side} needs: say which by --map {name}=NAME"
-    return f"{text} (for each)" if len(lacking) > 1 else text
+    text = f"{file}: no variable is named as a {side}'s {listed}{port}: say which it is by --map {name}=NAME"
+    return f"{text}, and so on" if len(lacking) > 1 else text

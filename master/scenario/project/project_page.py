@@ -84,8 +84,8 @@ class ProjectPage:
                 "",
                 *(f"- {text}" for text in self._choices()),
                 "",
-                "More definitions, in this folder: `openpanto new-line NAME --like LN2`, `openpanto new-pantograph NAME "
-                "--like CX`.",
+                "More definitions: in this folder, `openpanto new-line NAME --like LN2` or `openpanto new-pantograph "
+                "NAME --like CX`.",
                 "",
             ]
         )
@@ -119,7 +119,7 @@ class ProjectPage:
             yield "The other pantographs are calibrated by `--parameter`, as in `--parameter trailing.static_force`."
         for name in self.own_start:
             yield (
-                f"`{name}` has no parameters `start_position` and `speed` that can be set: it must start there by "
-                f"itself, and the run ends at {self.way.stop:g} s."
+                f"`{name}` has no parameters that set its start and its speed: both must be these by themselves. The "
+                f"run ends at {self.way.stop:g} s."
             )
         yield _LIFT

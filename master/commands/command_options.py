@@ -17,6 +17,7 @@ from master.report.progress import progress_shown
 from master.report.terminal_summary import Terminal
 from master.scenario.overrides import Overrides
 from master.ssp.run_settings import SCHEMES
+from master.ssp.ssp_units import split_quantity
 from master.system.components import System
 
 
@@ -57,7 +58,8 @@ def finite_number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or "_" in text or not text.isascii():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+        advice = "; write it without its unit" if split_quantity(text)[1] else ""
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number{advice}")
     return value
 
 

@@ -65,6 +65,7 @@ def read_fmu(path: Path) -> Fmu:
         tolerance=_tolerance(description.defaultExperiment),
         is_single=bool(description.coSimulation.canBeInstantiatedOnlyOncePerProcess),
         definition=definition_of(path),
+        description=description.description or "",
     )
 
 

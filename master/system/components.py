@@ -71,6 +71,8 @@ class Fmu:
         Whether a process can hold only one instance of it.
     definition : str
         Definition file that one of ours was built from, as it says itself.
+    description : str
+        What it says that it is.
     """
 
     path: Path
@@ -85,6 +87,7 @@ class Fmu:
     tolerance: float | None = None
     is_single: bool = False
     definition: str = ""
+    description: str = ""
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,8 @@ class System:
         What in the scenario can be run but may not be intended.
     may_stop_early : bool
         Whether the stop time may lie before the end of the interval of interest: nothing is judged then.
+    title : str
+        What the scenario says that it is.
     """
 
     name: str
@@ -138,6 +143,7 @@ class System:
     settings: RunSettings
     warnings: tuple[str, ...] = ()
     may_stop_early: bool = False
+    title: str = ""
 
     @cached_property
     def contacts(self) -> tuple[Contact, ...]:

@@ -116,7 +116,8 @@ def finite(text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST or "_" in text or not text.isascii():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g})")
+        advice = "; write it without its unit" if (match := _WITH_UNIT.fullmatch(text)) and match[2] else ""
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g}){advice}")
     return value
 
 

@@ -16,6 +16,7 @@ from models.catenary.definition.line_reading import read
 from models.commands.physics_main import main
 from models.definition_files.toml_reader import DefinitionError, Table
 from models.library.catalogue import line_path, load_line, load_pantograph, pantograph_path
+from tests.effort import count
 from tests.robustness.mutation import changes
 from tests.robustness.support import ANSWER_SECONDS, PROFILE, TRIED, ask, assert_quick, assert_worded
 
@@ -180,7 +181,7 @@ def numbers(data) -> list:
     return [x for v in data for x in numbers(v)] if isinstance(data, list) else [data]
 
 
-@settings(PROFILE, max_examples=900)
+@settings(PROFILE, max_examples=count(300, 900))
 @given(kind=st.sampled_from(sorted(FILES)), change=changes())
 def test_blindly(tmp_path_factory, kind, change):
     TRIED["definition, blindly"] += 1

@@ -98,6 +98,8 @@ def _setting(text: str) -> Setting:
 def _value(setting: Setting, wanted: str | None) -> float:
     what = f"--set {setting.part}.{setting.parameter}"
     match = _WITH_UNIT.fullmatch(setting.value)
+    if comma := _comma(setting.value):
+        raise ParameterError(f"{what}: '{setting.value}' is not a number{comma}")
     if match is None:
         raise ParameterError(f"{what}: '{setting.value}' is not a number, or a number with its unit ('12 kN')")
     number, unit = float(match[1]), match[2]
@@ -109,6 +111,11 @@ def _value(setting: Setting, wanted: str | None) -> float:
         raise ParameterError(f"{what}={setting.value}: {error}; give it in {wanted}") from error
 
 
+def _comma(text: str) -> str:
+    """Return advice if a text has what looks like a decimal comma, otherwise nothing."""
+    return "; write a decimal point" if re.search(r"\d,\d", text, re.ASCII) else ""
+
+
 def finite(text: str) -> float:
     """Read a finite number from the command line; argparse reports what is wrong with another."""
     try:
@@ -116,7 +123,8 @@ def finite(text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST or "_" in text or not text.isascii():
-        advice = "; write it without its unit" if (match := _WITH_UNIT.fullmatch(text)) and match[2] else ""
+        match = _WITH_UNIT.fullmatch(text)
+        advice = _comma(text) or ("; write it without its unit" if match is not None and match[2] else "")
         raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g}){advice}")
     return value
 

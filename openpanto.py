@@ -410,6 +410,7 @@ def _source(kind: Any, given: str, project: str, load: Callable[[str], Any]) -> 
 def _copy(options: argparse.Namespace) -> int:
     """Write a copy of a definition under another name."""
     from master.errors import RequestError
+    from master.safety.safe_files import write_atomically
     from models.library import search_path as places
     from models.library.catalogue import load_line, load_pantograph
 
@@ -421,7 +422,7 @@ def _copy(options: argparse.Namespace) -> int:
     project = places.project_folder(Path())
     copy = (project or Path()) / options.kind / f"{name}.toml"
     copy.parent.mkdir(parents=True, exist_ok=True)
-    copy.write_text(text, encoding="utf-8")
+    write_atomically(copy, text.encode())
     print(copy)
     if project is None:
         text = f"for other folders, add {Path().resolve()} to {places.VARIABLE}"

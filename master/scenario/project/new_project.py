@@ -19,6 +19,7 @@ from typing import Final, NamedTuple
 
 from master.errors import RequestError
 from master.fmu.fmu_description import read_fmu
+from master.safety.safe_files import write_atomically
 from master.scenario.project.port_finding import ENDS, REPLY, Port, Side, check_given, find_ports, own_port
 from master.scenario.project.project_page import PROJECT_FILE, ProjectPage, project_text
 from master.scenario.project.stretch import Stretch, Wire, stretch
@@ -171,7 +172,7 @@ def new_project(request: Request) -> Path:
     for place, data in files.items():
         path = request.folder / place
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
+        write_atomically(path, data)
     for folder in ("lines", "pantographs"):
         (request.folder / folder).mkdir(exist_ok=True)
     return request.folder / f"{project_name(request.folder)}.ssp"

@@ -30,7 +30,10 @@ def soak(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_a_multibody_pantograph_for_many_spans(soak):
-    """At 30 m/s over seven spans, in `.ci/long` over twelve: joints stay closed, nothing is kept, and the contact never opens after the raise."""
+    """At 30 m/s over seven spans, in `.ci/long` over twelve.
+
+    Joints stay closed, nothing is kept, and the contact never opens after the raise.
+    """
     pantograph = soak.at_speed(soak.load_pantograph("generic_multibody"), 30.0)
     system = soak.system_of(soak.line(STOP * 30.0), pantograph)
     windows = list(soak.run(system, STOP, WINDOW))

@@ -194,9 +194,11 @@ def _tutorial_lines():
 
 
 def test_every_command_of_the_tutorials_is_understood():
-    parser = _module("command_pages").parser_of("openpanto")
+    command_pages = _module("command_pages")
+    parser = command_pages.parser_of("openpanto")
+    known = command_pages.verbs(parser)
     calls = [shlex.split(line, comments=True)[1:] for _, line in _tutorial_lines()]
     assert len(calls) > 15
     for call in calls:
-        if call[0] not in COMING:
+        if call[0] not in COMING - set(known):
             parser.parse_args(call)

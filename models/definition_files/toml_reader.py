@@ -7,6 +7,8 @@ source::
     encumbrance = [1.2, "m", "choice: gives the printed first dropper"]
 
 A source that begins with ``choice`` marks a value that the data leave open.
+
+The file is longer than others because a table of the file and all that may be wrong with an entry stand together.
 """
 
 from __future__ import annotations

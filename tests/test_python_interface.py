@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +143,19 @@ def test_wrong_values_are_refused_at_once(toy_run, values, said):
         toy_run[0].set(values)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_short_names_must_be_of_one_parameter(toy_run):
+    scenario = toy_run[0]
+    fmu = scenario.system.components[0].fmu
+    wires = ("contact_wire.tension", "messenger_wire.tension")
+    variables = {n: replace(fmu.variables["stiffness"], name=n) for n in (*wires, "damping")}
+    line = replace(scenario.system.components[0], fmu=replace(fmu, variables={**fmu.variables, **variables}))
+    system = replace(scenario.system, components=(line, *scenario.system.components[1:]))
+    with pytest.raises(master.MasterError, match="there are catenary.contact_wire.tension, catenary.mess"):
+        replace(scenario, system=system).set(tension=2e4)
+    with pytest.raises(master.MasterError, match="catenary and pantograph have a parameter .damping."):
+        replace(scenario, system=system).set(damping=1.0)
 
 
 def test_changed_values_reach_the_run_and_the_figures_are_those_of_the_folder(toy_run, tmp_path):

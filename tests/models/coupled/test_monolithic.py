@@ -28,7 +28,7 @@ def pantograph(cx):
 
 
 def _assembled(line, pantograph, dt, steps):
-    """One matrix for line, pantograph and contact spring, assembled and solved anew every step."""
+    """One matrix for line, pantograph and contact spring, assembled and solved again every step."""
     model, lumped = CatenaryModel(line), LumpedModel(pantograph)
     catenary = NodalLine(model)
     newmark, n, m = Newmark(dt), catenary.size, lumped.size

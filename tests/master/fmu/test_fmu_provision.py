@@ -32,6 +32,8 @@ class Builder:
         self.asked.append(arguments[0])
         self.orders.append(arguments)
         if arguments[0] == "fingerprint":
+            if "--built-from" in arguments and not Path(arguments[arguments.index("--built-from") + 1]).is_file():
+                return subprocess.CompletedProcess(arguments, 0, "", "")  # as for a name that it does not know
             return subprocess.CompletedProcess(arguments, self.code, self.fingerprint + "\n", self.said)
         if not self.said:
             name, folder = arguments[-1], arguments[2]
@@ -111,18 +113,64 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     path, reported = tmp_path / "Mine.fmu", []
     write_fmu(path, "ab-12", definition="lines/Mine.toml", pantographs="2")
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
+<<<<<<< HEAD
     fmu_provision.provide_fmu(path, reported.append)
     assert reported == []
     ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+||||||| 2fe8dca
+    fmu_provision.provide_fmu(path, told.append)
+    assert told == []
+    ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+=======
+    fmu_provision.provide_fmu(path, told.append)
+    assert told == []
+    ports = ("--built-from", f"{tmp_path}/lines/Mine.toml", "--pantographs", "2", "--", "Mine")
+>>>>>>> main
     assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
     fmu_provision.provide_fmu(path, reported.append)
     assert reported == ["building Mine.fmu again: its sources have changed"]
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
+<<<<<<< HEAD
     fmu_provision.provide_fmu(path, reported.append)
     assert "which it was built from, is missing" in reported[-1]
     assert len(builder.asked) == 3
+||||||| 2fe8dca
+    fmu_provision.provide_fmu(path, told.append)
+    assert "which it was built from, is missing" in told[-1]
+    assert len(builder.asked) == 3
+=======
+    fmu_provision.provide_fmu(path, told.append)
+    assert "which it was built from, is missing" in told[-1]
+    assert builder.asked == ["fingerprint", "fingerprint", "build", "fingerprint"]
+
+
+def test_definitions_are_looked_up_where_the_scenario_lies(builder, tmp_path):
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", print, library=tmp_path)
+    assert builder.orders[0] == ("fingerprint", "--if-known", "--library", str(tmp_path), "--", "X")
+    assert builder.orders[1][3:] == ("--library", str(tmp_path), "--", "X")
+
+
+def test_notes_of_the_builder_are_passed_on(monkeypatch, tmp_path):
+    said = "note: two definitions are named 'X': a is used, b is not\nanything else\n"
+    answer = subprocess.CompletedProcess((), 0, "", said)
+    monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: answer)
+    told = []
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append)
+    assert told == ["two definitions are named 'X': a is used, b is not"]
+
+
+def test_an_fmu_says_which_definition_it_was_built_from(tmp_path):
+    path = tmp_path / "demo.ssp" / "resources" / "X.fmu"
+    path.parent.mkdir(parents=True)
+    write_fmu(path, "ab-12", definition="../../lines/X.toml", pantographs="1")
+    assert fmu_provision.definition_of(path) == str(tmp_path / "lines" / "X.toml")
+    write_fmu(path, "ab-12", library="lines/X.toml")
+    assert fmu_provision.definition_of(path) == "library: lines/X.toml"
+    write_fmu(path, "ab-12")
+    assert fmu_provision.definition_of(path) == ""
+>>>>>>> main
 
 
 def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
@@ -152,9 +200,9 @@ def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypa
     (tmp_path / "slavemodule.txt").write_text("x")
     (tmp_path / "pythonfmu").mkdir()
     (tmp_path / "pythonfmu" / "__init__.py").write_text("raise ImportError('of another FMU')")
-    before = fmu_provision.fingerprint("Pantograph_CX")
+    before = fmu_provision.fingerprint(fmu_provision.Lookup("Pantograph_CX"))
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert fmu_provision.fingerprint("Pantograph_CX") == before
+    assert fmu_provision.fingerprint(fmu_provision.Lookup("Pantograph_CX")) == before
 
 
 def test_the_builders_words_are_passed_on(builder, tmp_path):
@@ -174,7 +222,7 @@ def test_without_fmus_nothing_is_asked(monkeypatch, tmp_path):
 
 
 def test_a_name_that_looks_like_an_option_is_a_name():
-    assert fmu_provision.fingerprint("--help") is None
+    assert fmu_provision.fingerprint(fmu_provision.Lookup("--help")) is None
 
 
 @pytest.mark.parametrize("data", [b"", b"not a zip"])

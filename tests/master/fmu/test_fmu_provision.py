@@ -113,36 +113,17 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     path, reported = tmp_path / "Mine.fmu", []
     write_fmu(path, "ab-12", definition="lines/Mine.toml", pantographs="2")
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
-<<<<<<< HEAD
     fmu_provision.provide_fmu(path, reported.append)
     assert reported == []
-    ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
-||||||| 2fe8dca
-    fmu_provision.provide_fmu(path, told.append)
-    assert told == []
-    ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
-=======
-    fmu_provision.provide_fmu(path, told.append)
-    assert told == []
     ports = ("--built-from", f"{tmp_path}/lines/Mine.toml", "--pantographs", "2", "--", "Mine")
->>>>>>> main
     assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
     fmu_provision.provide_fmu(path, reported.append)
     assert reported == ["building Mine.fmu again: its sources have changed"]
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
-<<<<<<< HEAD
     fmu_provision.provide_fmu(path, reported.append)
     assert "which it was built from, is missing" in reported[-1]
-    assert len(builder.asked) == 3
-||||||| 2fe8dca
-    fmu_provision.provide_fmu(path, told.append)
-    assert "which it was built from, is missing" in told[-1]
-    assert len(builder.asked) == 3
-=======
-    fmu_provision.provide_fmu(path, told.append)
-    assert "which it was built from, is missing" in told[-1]
     assert builder.asked == ["fingerprint", "fingerprint", "build", "fingerprint"]
 
 
@@ -156,9 +137,9 @@ def test_notes_of_the_builder_are_passed_on(monkeypatch, tmp_path):
     said = "note: two definitions are named 'X': a is used, b is not\nanything else\n"
     answer = subprocess.CompletedProcess((), 0, "", said)
     monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: answer)
-    told = []
-    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append)
-    assert told == ["two definitions are named 'X': a is used, b is not"]
+    reported = []
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append)
+    assert reported == ["two definitions are named 'X': a is used, b is not"]
 
 
 def test_an_fmu_says_which_definition_it_was_built_from(tmp_path):
@@ -170,7 +151,6 @@ def test_an_fmu_says_which_definition_it_was_built_from(tmp_path):
     assert fmu_provision.definition_of(path) == "library: lines/X.toml"
     write_fmu(path, "ab-12")
     assert fmu_provision.definition_of(path) == ""
->>>>>>> main
 
 
 def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):

@@ -163,8 +163,8 @@ def test_changed_values_reach_the_run_and_the_figures_are_those_of_the_folder(to
     stiff = master.run(scenario.set(static_force="170"), tmp_path / "stiff")
     difference = stiff.figures_of()["mean force [N]"] - results.figures_of()["mean force [N]"]
     assert difference == pytest.approx(30.0, abs=1.5)
-    told = json.loads((stiff.folder / "summary.json").read_text())["quality"][0]
-    assert stiff.figures_of()["mean force [N]"] == told["mean"]
+    reported = json.loads((stiff.folder / "summary.json").read_text())["quality"][0]
+    assert stiff.figures_of()["mean force [N]"] == reported["mean"]
     assert master.read_results(tmp_path / "stiff").figures_of() == pytest.approx(stiff.figures_of(), nan_ok=True)
     assert stiff.status == "complete"
     assert stiff.pantographs == ("pantograph",)

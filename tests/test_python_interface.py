@@ -152,9 +152,9 @@ def test_short_names_must_be_of_one_parameter(toy_run):
     variables = {n: replace(fmu.variables["stiffness"], name=n) for n in (*wires, "damping")}
     line = replace(scenario.system.components[0], fmu=replace(fmu, variables={**fmu.variables, **variables}))
     system = replace(scenario.system, components=(line, *scenario.system.components[1:]))
-    with pytest.raises(master.MasterError, match="there are catenary.contact_wire.tension, catenary.mess"):
+    with pytest.raises(master.MasterError, match=r"are catenary\.contact_wire\.tension, catenary\.mess"):
         replace(scenario, system=system).set(tension=2e4)
-    with pytest.raises(master.MasterError, match="catenary and pantograph have a parameter .damping."):
+    with pytest.raises(master.MasterError, match="catenary and pantograph have a parameter 'damping'"):
         replace(scenario, system=system).set(damping=1.0)
 
 

@@ -32,6 +32,7 @@ import re
 import shlex
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn
 
@@ -343,7 +344,8 @@ def add_new(verbs: Any) -> None:
     text = "where figures are taken [m]; by default as many spans as the line has room for, ten at most"
     parser.add_argument("--interval", nargs=2, type=finite_number, metavar=("START", "END"), help=text)
     text = "which variable of an FMU a port is (A.x ... B.vz, contact.force), if its name does not say; repeatable"
-    parser.add_argument("--map", action="append", type=assignment, default=[], metavar="PORT=VARIABLE", help=text)
+    port = partial(assignment, form="PORT=VARIABLE")
+    parser.add_argument("--map", action="append", type=port, default=[], metavar="PORT=VARIABLE", help=text)
     parser.set_defaults(verb=_new)
 
 
@@ -368,11 +370,12 @@ def _new(options: argparse.Namespace) -> int:
     """Write a project."""
     from master.evaluation.en50367_limits import LimitChoice, limits_at
     from master.scenario.project import new_project as projects
-    from master.scenario.project.stretch import Wire
+    from master.scenario.project.stretch import Wire, check_speed
     from models.library import definition_facts as facts
     from models.library.catalogue import load_line, load_pantograph
 
     projects.check_folder(options.folder)
+    check_speed(options.speed / 3.6)
     name, speed = projects.project_name(options.folder), options.speed / 3.6
     wire, lifts = None, {}
     line, definition = _source("lines", options.line, name, load_line)

@@ -190,6 +190,14 @@ def test_an_interrupt_during_the_imports_is_one_sentence(module, number, tmp_pat
     assert (done.returncode, done.stdout, done.stderr) == (1, "", "error: interrupted\n")
 
 
+def test_an_interrupt_that_an_import_makes_another_error_of_is_one_sentence(tmp_path):
+    text = "def work():\n    try:\n        raise KeyboardInterrupt\n    except KeyboardInterrupt as error:\n"
+    text += "        raise RuntimeError('Error calling __set_name__') from error\n"
+    code = f"from master.safety.supervision import supervised\n{text}raise SystemExit(supervised(work))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "error: interrupted\n")
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
 def test_an_interrupt_of_the_physics_is_one_sentence(script, tmp_path):
     line = ["couple", "LN2", "CX", "--speed", "5", "--quiet"]  # takes minutes

@@ -236,6 +236,8 @@ def test_runs_side_by_side(toy_run, tmp_path):
     assert frame.attrs["notes"] == ()
     with pytest.raises(master.MasterError, match="nothing to compare"):
         master.compare(results)
+    with pytest.raises(master.MasterError, match="nothing to compare: give the results of two runs"):
+        master.compare()
 
 
 def test_calibration_returns_a_scenario_and_stores_nothing(toy_run):

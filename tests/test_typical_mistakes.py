@@ -101,6 +101,15 @@ FMI_ENGINEER = {
     "no stop time": Mistake("validate toy.ssp", 1, "give a stop time", (' stopTime="1.0"', "")),
     "a step that is none": Mistake("run toy.ssp --step 0", 2, "must be greater than 0"),
     "a scheme cut short": Mistake("run toy.ssp --scheme gauss", 2, "did you mean 'gauss-seidel'?"),
+    "a speed of no train": Mistake(
+        "new project --line LN2 --pantograph CX --speed 1e300", 1, "give the speed of the train in km/h"
+    ),
+    "line and pantograph exchanged": Mistake(
+        "new project --line CX --pantograph LN2 --speed 300", 1, "no line 'CX' in the library, but a pantograph"
+    ),
+    "a port without its variable": Mistake(
+        "new project --line LN2 --pantograph X.fmu --speed 300 --map contact.force", 2, "must be written PORT=VARIABLE"
+    ),
     "an FMU of another name": Mistake("build LN3", 1, "known are Catenary_C270"),
 }
 DATA_SCIENTIST = {

@@ -73,7 +73,7 @@ folder, script, name = sys.argv[1:]
 sys.path.insert(0, folder)
 import importlib, scipy.linalg
 slave = getattr(importlib.import_module(script), name)(instance_name="trial", resources=folder)
-slave.setup_experiment(0.0)
+slave.setup_experiment(0.0, None, None)
 slave.enter_initialization_mode()
 slave.exit_initialization_mode()
 sys.exit(0 if slave.do_step(0.0, 1e-3) else 1)

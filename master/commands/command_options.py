@@ -70,11 +70,11 @@ def positive_number(text: str) -> float:
     return value
 
 
-def assignment(text: str) -> tuple[str, str]:
-    """Return name and value of an argument COMPONENT.PARAMETER=VALUE."""
+def assignment(text: str, form: str = "COMPONENT.PARAMETER=VALUE") -> tuple[str, str]:
+    """Return name and value of an argument, which has this form."""
     name, sign, value = text.partition("=")
     if not (name and sign and value):
-        raise argparse.ArgumentTypeError(f"'{text}' must be written COMPONENT.PARAMETER=VALUE")
+        raise argparse.ArgumentTypeError(f"'{text}' must be written {form}")
     return name, value
 
 

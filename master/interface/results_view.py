@@ -317,6 +317,8 @@ def compare(*results: Results) -> pandas.DataFrame:
     MasterError
         If fewer than two contacts have figures.
     """
+    if not results:
+        raise RequestError("nothing to compare: give the results of two runs, or of one with several pantographs")
     runs = [r.stored for r in results]
     frame = side_by_side({c.name: figure_values(c.assessment) for c in columns(runs)}, _FIGURE)
     frame.attrs["notes"] = run_difference.setting_notes(runs)

@@ -118,12 +118,21 @@ def _worked(work: Callable[[], int]) -> int:
         print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
     except BrokenPipeError:  # the reader of the output has closed it, and knows
         pass
-    except BaseException:
-        traceback.print_exc()
+    except BaseException as error:
+        if _is_interrupt(error):
+            print("error: interrupted", file=sys.stderr)
+        else:
+            traceback.print_exc()
     with suppress(OSError, ValueError):
         sys.stdout.flush()
     _tell(finished=code)
     return code
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    """Whether an error is what was made of an interrupt on the way, as by Python 3.11 where a class is being made."""
+    cause = error.__cause__
+    return isinstance(error, KeyboardInterrupt) or (cause is not None and _is_interrupt(cause))
 
 
 class _Supervisor:

@@ -96,6 +96,8 @@ def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:
     found = definition_files(kind, name, searched)
     if not found:
         known = definition_names(kind, searched)
-        text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{hint(name, known)}"
-        raise UnknownNameError(text)
+        other: Kind = "pantographs" if kind == "lines" else "lines"
+        meant = f", but a {other.removesuffix('s')}" if definition_files(other, name, searched) else ""
+        text = f"no {kind.removesuffix('s')} '{name}' in the library{meant}; known: {', '.join(known)}"
+        raise UnknownNameError(text + hint(name, known))
     return found[0]

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -138,14 +139,15 @@ class _Part:
 
 
 def project_name(folder: Path) -> str:
-    """Return the name that a project gets from its folder: letters, digits and _.
+    """Return the name that a project gets from its folder: letters without their accents, digits and _.
 
     Raises
     ------
     RequestError
         If nothing of the folder's name is left.
     """
-    name = _ALLOWED.sub("_", folder.resolve().name).strip("_")
+    plain = unicodedata.normalize("NFKD", folder.resolve().name)
+    name = _ALLOWED.sub("_", "".join(c for c in plain if not unicodedata.combining(c))).strip("_")
     if not name:
         raise RequestError(f"'{folder}' gives the project no name: take a folder with letters or digits in its name")
     return name[:30]
@@ -153,6 +155,8 @@ def project_name(folder: Path) -> str:
 
 def check_folder(folder: Path) -> None:
     """Refuse a folder that a project cannot be written into."""
+    if folder.is_symlink() and not folder.exists():  # to itself, too
+        raise RequestError(f"{folder} is a link that leads nowhere: name a new folder")
     if folder.exists() and not folder.is_dir():
         raise RequestError(f"{folder} is a file: name a new folder")
     if folder.is_dir() and any(folder.iterdir()):

@@ -60,6 +60,13 @@ class Stretch:
     stop: float
 
 
+def check_speed(speed: float) -> None:
+    """Refuse a speed [m/s] that no train has."""
+    if not 0.0 < speed <= FASTEST:
+        text = f"give the speed of the train in km/h, more than 0 and at most {3.6 * FASTEST:g}"
+        raise RequestError(f"--speed {3.6 * speed:g}: {text}")
+
+
 def stretch(
     wire: Wire | None, speed: float, separations: Sequence[float], interval: tuple[float, float] | None
 ) -> Stretch:
@@ -81,9 +88,7 @@ def stretch(
     RequestError
         If that is not possible on this line.
     """
-    if not 0.0 < speed <= FASTEST:
-        text = f"give the speed of the train in km/h, more than 0 and at most {3.6 * FASTEST:g}"
-        raise RequestError(f"--speed {3.6 * speed:g}: {text}")
+    check_speed(speed)
     for separation in separations:
         if not NEAREST <= separation < math.inf:
             text = f"pantographs of a train stand at least {NEAREST:g} m apart; give the distance in m"

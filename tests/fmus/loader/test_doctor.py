@@ -98,6 +98,14 @@ def test_an_older_machine(toy_fmu, monkeypatch):
     assert "need glibc 2.32 or newer; this machine is older, it has 2.17" in _said(toy_fmu)["missing"]
 
 
+def test_code_that_takes_the_arguments_of_pythonfmu_alone(toy_fmu, tmp_path):
+    def plain(name, data):
+        old = b"stop_time: float | None = None, tolerance: float | None = None"
+        return name, data.replace(old, b"stop_time: float | None, tolerance: float | None")
+
+    assert not _said(_changed(toy_fmu, tmp_path, plain))["missing"]
+
+
 def test_code_that_does_not_run(toy_fmu, tmp_path):
     def spoil(name, data):
         return name, data.replace(b"GAIN = 1.0", b"import nothing_of_this_name") if name.endswith("law.py") else data

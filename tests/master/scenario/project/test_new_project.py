@@ -144,11 +144,20 @@ def test_a_name_before_the_port_says_whose_it_is(tmp_path, make_fmu):
         ("demo", "demo"),
         ("my-line 1", "my_line_1"),
         ("a" * 50, "a" * 30),
-        ("\N{LATIN SMALL LETTER U WITH DIAERESIS}b", "b"),
+        ("\N{LATIN SMALL LETTER U WITH DIAERESIS}b", "ub"),
+        ("u\N{COMBINING DIAERESIS}b", "ub"),
+        ("\N{CJK UNIFIED IDEOGRAPH-7DDA}b", "b"),
     ],
 )
 def test_a_project_is_named_after_its_folder(tmp_path, folder, name):
     assert project_name(tmp_path / folder) == name
+
+
+@pytest.mark.parametrize("target", ["nothing", "link"])
+def test_a_link_that_leads_nowhere_is_no_folder(tmp_path, target):
+    (tmp_path / "link").symlink_to(target)
+    with pytest.raises(RequestError, match="link is a link that leads nowhere: name a new folder"):
+        new_project(request(tmp_path / "link"))
 
 
 def test_a_folder_without_a_letter_gives_no_name(tmp_path):

@@ -75,6 +75,8 @@ ONLY_IN = {
     "fmpy": lambda name: name.startswith("master.fmu."),
     "lxml": lambda name: name.startswith("master.ssp."),
     "pythonfmu": lambda name: name.startswith("fmus."),
+    "dask": lambda name: name == "master.batch.sweep.dask_engine",
+    "distributed": lambda name: name == "master.batch.sweep.dask_engine",
     "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.")),
 }
 #: What runs inside an FMU: all of models but these, and fmus/slave.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 #: Longest value or text that is shown in full [characters], and most problems that are listed at once.
@@ -30,6 +31,22 @@ def one_line(text: str) -> str:
     return "".join(map(_shown, text))
 
 
+def hint(name: str, known: Iterable[str], most: int = 1) -> str:
+    """Return the question whether a known name was meant, empty if none is near: one that is very near, or the nearest.
+
+    Examples
+    --------
+    >>> hint("Sigmaa", ["mean", "sigma"])
+    "; did you mean 'sigma'?"
+    >>> hint("height", ["mean", "sigma"])
+    ''
+    """
+    folded = {k.casefold(): k for k in known}
+    matches = partial(difflib.get_close_matches, name.casefold(), folded)
+    near = matches(n=1, cutoff=0.85) or matches(n=most, cutoff=0.55)
+    return f"; did you mean {' or '.join(repr(folded[k]) for k in near)}?" if near else ""
+
+
 def printable(text: str) -> str:
     r"""Return text whose characters all print, lines kept: for what others have written, on its way to a terminal.
 
@@ -46,21 +63,6 @@ def printable(text: str) -> str:
 
 def _shown(c: str) -> str:
     return c if c.isprintable() else c.encode("unicode_escape").decode("ascii")
-
-
-def hint(name: str, known: Iterable[str]) -> str:
-    """Return the question whether one of the known names was meant, empty if none is near.
-
-    Examples
-    --------
-    >>> hint("ln_cx2", ["atr95_c270", "cx_ln2"])
-    "; did you mean 'cx_ln2'?"
-    >>> hint("film", ["run", "validate"])
-    ''
-    """
-    folded = {other.casefold(): other for other in known}
-    near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
-    return f"; did you mean '{folded[near[0]]}'?" if near else ""
 
 
 @dataclass(frozen=True)

@@ -229,11 +229,13 @@ def _matches(fingerprint: str, guid: str) -> bool:
 
 
 def _fmus(*arguments: str, seconds: float) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fmus", *arguments]
+    command = [sys.executable, "-P", "-m", "fmus", *arguments]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(_places())}
     return subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False, env=environment)
 
 
 def _places() -> list[str]:
-    """Return where modules come from, without the folders (each with a pythonfmu) that FMUs run here have left."""
-    return [place for place in sys.path if not (Path(place) / "slavemodule.txt").is_file()]
+    """Return where modules come from: not the working folder, nor those (each with a pythonfmu) that FMUs have left."""
+    own = str(Path(__file__).resolve().parents[2])
+    places = [place for place in sys.path if place and not (Path(place) / "slavemodule.txt").is_file()]
+    return places if own in places else [*places, own]

@@ -34,6 +34,7 @@ class LineStatics:
     droppers: rest_profile.Droppers
     arms: rest_profile.ArmLoads
     elasticity: statics.Elasticity
+    others: dict[int, tuple[int, statics.Elasticity]]  # number and elasticity of the middle span of other sections
     waves: wire_waves.Waves
 
     @property
@@ -59,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
     result = analyse(arguments)
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
-    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result.span_droppers))
+    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
     if arguments.out is not None:
         folder = new_folder(arguments.out)
         write(folder, result)
@@ -102,9 +103,19 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
         profiles=rest_profile.profiles(model, section),
         droppers=rest_profile.droppers(model, section=section),
         arms=rest_profile.arm_loads(model, section),
-        elasticity=statics.elasticity(model, statics.positions_in_span(span), arguments.force, section),
+        elasticity=_elasticity(model, section, number, arguments.force),
+        others={
+            other: (middle := (len(s.spans) + 1) // 2, _elasticity(model, other, middle, arguments.force))
+            for other, s in enumerate(definition.sections)
+            if other != section
+        },
         waves=wire_waves.waves(definition, arguments.speed / 3.6, span.length),
     )
+
+
+def _elasticity(model: CatenaryModel, section: int, number: int, force: float) -> statics.Elasticity:
+    span = model.definition.sections[section].spans[number - 1]
+    return statics.elasticity(model, statics.positions_in_span(span), force, section)
 
 
 def summary(result: LineStatics) -> list[tuple[str, str]]:
@@ -116,6 +127,7 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
         (f"elasticity at {e.force:g} N, minimum [mm/N]", f"{1e3 * e.minimum:.4f}"),
         (f"elasticity at {e.force:g} N, maximum [mm/N]", f"{1e3 * e.maximum:.4f}"),
         ("non-uniformity of elasticity u [%]", f"{100.0 * e.non_uniformity:.1f}"),
+        *_other_rows(result),
         *_arm_rows(result),
         ("law by which droppers slacken", result.model.definition.dropper.slack_law),
         ("wave speed C [km/h]", f"{3.6 * w.speed:.1f}"),
@@ -130,9 +142,12 @@ def write(folder: Path, result: LineStatics) -> None:
     """Write tables as CSV and plots as PNG."""
     _write_profiles(folder, result.profiles)
     d, e, a = result.droppers, result.elasticity, result.arms
-    columns = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
-    write_csv(folder / "droppers.csv", columns, (d.x, d.length, d.force, d.is_hanger.astype(float)))
-    write_csv(folder / "elasticity.csv", ("x [m]", "elasticity [m/N]"), (e.x, e.value))
+    heads = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
+    write_csv(folder / "droppers.csv", heads, (d.x, d.length, d.force, d.is_hanger.astype(float)))
+    found = {result.section: e} | {section: other for section, (_, other) in result.others.items()}
+    columns = [(np.full_like(one.x, section + 1), one.x, 1e3 * one.value) for section, one in sorted(found.items())]
+    names = ("section", "x [m]", "elasticity [mm/N]")
+    write_csv(folder / "elasticity.csv", names, [np.concatenate(column) for column in zip(*columns, strict=True)])
     write_csv(folder / "steady_arms.csv", ("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift))
     lines = [f'"{name}","{value}"' for name, value in summary(result)]
     write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
@@ -145,7 +160,7 @@ def write(folder: Path, result: LineStatics) -> None:
         write_figure(folder / f"{name}.png", figure, 150)
 
 
-_DROPPER_COLUMNS = ("from the support [m]", "length [m]", "tension [N]")
+_DROPPER_COLUMNS = ("x [m]", "from the support [m]", "unstrained length [m]", "tension [N]")
 
 
 def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
@@ -156,6 +171,17 @@ def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
     rows.append(("dropper lengths, longest and shortest [m]", f"{d.length.max():.4f}, {d.length.min():.4f}"))
     rows.append(("dropper tensions, largest and smallest [N]", f"{d.force.max():.1f}, {d.force.min():.1f}"))
     return rows
+
+
+def _other_rows(result: LineStatics) -> list[tuple[str, str]]:
+    """Return the elasticity of the other sections of a line with overlaps, each in its middle span."""
+    return [
+        (
+            f"section {section + 1}, span {number}: elasticity [mm/N], u [%]",
+            f"{1e3 * e.minimum:.4f} ... {1e3 * e.maximum:.4f}, {100.0 * e.non_uniformity:.1f}",
+        )
+        for section, (number, e) in result.others.items()
+    ]
 
 
 def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
@@ -170,9 +196,11 @@ def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
     ]
 
 
-def _dropper_rows(droppers: rest_profile.Droppers) -> Iterable[Sequence[str]]:
-    for x, length, force, hanger in zip(droppers.x, droppers.length, droppers.force, droppers.is_hanger, strict=True):
-        yield f"{x:.2f}{' (hanger)' if hanger else ''}", f"{length:.4f}", f"{force:.1f}"
+def _dropper_rows(result: LineStatics) -> Iterable[Sequence[str]]:
+    d = result.span_droppers
+    for x, length, force, hanger in zip(d.x, d.length, d.force, d.is_hanger, strict=True):
+        place = f"{x:.2f}{' (hanger)' if hanger else ''}", f"{x - result.span.start:.2f}"
+        yield *place, f"{length:.4f}", f"{force:.1f}"
 
 
 def _write_profiles(folder: Path, profiles: Sequence[rest_profile.Profile]) -> None:

@@ -11,18 +11,22 @@ A source that begins with ``choice`` marks a value that the data leave open.
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from models.definition_files.message_text import one_line, shown_value
+from models.definition_files.message_text import hint, one_line, shown_value
 from models.definition_files.si_units import shown, to_si
 
 #: Largest number of problems listed.
 _MOST: Final = 100
+#: A number in the text of a problem, or a list of them.
+_NUMBER: Final = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
 #: Deepest allowed nesting of tables and lists; a definition needs five levels.
 _DEEPEST: Final = 20
 #: Limits of magnitude in SI: no quantity of a line or pantograph lies beyond, and squares and quotients stay finite.
@@ -257,7 +261,7 @@ class Table:
             return default or ""
         allowed = list(choices) if choices is not None else None
         if allowed is not None and entry not in allowed:
-            self.problem(name, f"'{entry}' is none of {', '.join(allowed)}")
+            self.problem(name, f"'{entry}' is none of {', '.join(allowed)}{hint(entry, allowed)}")
         return entry
 
     def flag(self, name: str, *, default: bool | None = None) -> bool:
@@ -309,8 +313,7 @@ class Table:
         """
         self._report_unknown()
         if self._log.problems:
-            # A rule is read for every span, and reports its mistakes for every span.
-            raise DefinitionError(tuple(dict.fromkeys(self._log.problems)))
+            raise DefinitionError(_once(self._log.problems))
 
     def _child(self, data: dict[str, Any], path: str) -> Table:
         child = Table(data, self._log, path)
@@ -376,9 +379,20 @@ class Table:
         for name in self._data:
             if name not in self._known:
                 known = ", ".join(sorted(self._known)) or "none"
-                self.problem(name, f"unknown key (known here: {known})")
+                self.problem(name, f"unknown key (known here: {known}){hint(name, self._known - set(self._data))}")
         for child in self._children:
             child._report_unknown()
+
+
+def _once(problems: Iterable[Problem]) -> list[Problem]:
+    """Return every problem once: a rule is read for every span, and reports its mistakes for every span."""
+    alike: dict[tuple[str, str], list[Problem]] = {}
+    for problem in dict.fromkeys(problems):
+        alike.setdefault((problem.key, _NUMBER.sub("0", problem.text)), []).append(problem)
+    return [
+        first if not others else dataclasses.replace(first, text=f"{first.text} (and {len(others)} more like this)")
+        for first, *others in alike.values()
+    ]
 
 
 def _too_deep(file: str) -> DefinitionError:

@@ -99,7 +99,8 @@ class ParameterReader:
         """Return the values in a table's column, None where a cell is empty."""
         if not self._is_real:
             return self.parameter(""), tuple(text or None for text in texts)
-        written = [self._number(text) if text else None for text in texts]
+        read = [self._number(text) if text else None for text in texts]
+        written = [None if q is None else (q[0], q[1] or self._unit) for q in read]
         for text, quantity in zip(texts, written, strict=True):
             if quantity is not None:
                 self._common_unit([quantity], text)

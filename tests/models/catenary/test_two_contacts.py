@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter
@@ -44,7 +44,7 @@ def _assembled(line, pantograph, dt, steps):
     M, C, K = (
         sp.block_diag([getattr(catenary, name), getattr(lumped, name)], format="csr") for name in ("M", "C", "K")
     )
-    base = (K + newmark.a0 * M + newmark.a1 * C).tocsc()
+    base = splu((K + newmark.a0 * M + newmark.a1 * C).tocsc())
     B = sp.hstack([catenary.B, sp.csr_matrix((catenary.B.shape[0], m))], format="csr")
     d, v, a = (np.zeros(n + m) for _ in range(3))
     forces, elements = [], [-1] * len(model.wires)
@@ -52,7 +52,7 @@ def _assembled(line, pantograph, dt, steps):
         t = step * dt
         right = M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a) + C @ (newmark.a1 * d + newmark.a4 * v)
         right[n:] += lumped.load(t, np.zeros(2))
-        rows, gaps, elements = _contact_rows(catenary, pantograph, t, spsolve(base, right)[:n], elements, n + m)
+        rows, gaps, elements = _contact_rows(catenary, pantograph, t, base.solve(right)[:n], elements, n + m)
         new, penetration = _settled(line, model, base, B, right, rows, gaps)
         acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
         v = v + 0.5 * dt * (a + acceleration)
@@ -75,13 +75,22 @@ def _contact_rows(catenary, pantograph, t, free, elements, size):
     return np.array(rows), np.array(gaps), met
 
 
+def _solved(base, rows, springs, load):
+    """Solve (base + sum of s r r') d = load; the few springs through what they do to one another (Woodbury)."""
+    free = base.solve(load)
+    if not len(rows):
+        return free
+    response = base.solve(rows.T)
+    return free - response @ np.linalg.solve(np.diag(1.0 / springs) + rows @ response, rows @ free)
+
+
 def _settled(line, model, base, B, right, rows, gaps):
     k, closed, slack = line.contact.stiffness, np.zeros(len(rows), dtype=bool), np.zeros(B.shape[0], dtype=bool)
     for _ in range(50):
         R = sp.csr_matrix(rows[closed])
-        system = base + k * (R.T @ R) - B[slack].T @ sp.diags(model.dropper_law.stiffness[slack]) @ B[slack]
         load = right - k * (R.T @ gaps[closed]) + B[slack].T @ model.static.dropper_force[slack]
-        new = spsolve(system.tocsc(), load)
+        springs = np.concatenate([np.full(closed.sum(), k), -model.dropper_law.stiffness[slack]])
+        new = _solved(base, np.vstack([rows[closed], B[slack].toarray()]), springs, load)
         penetration = gaps + rows @ new
         elastic = model.static.dropper_force + model.dropper_law.stiffness * (B @ new)
         if np.array_equal(penetration > 0.0, closed) and np.array_equal(elastic < 0.0, slack):

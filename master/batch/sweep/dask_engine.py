@@ -7,12 +7,16 @@ worker that dies costs its run one retry; it is named when that happens, and whe
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
+import platform
+import re
 import time
 import uuid
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,8 +40,9 @@ _LOOK: Final = 0.5
 _PACKAGES: Final = ("openpanto", "numpy", "scipy", "numba", "fmpy", "pythonfmu", "distributed")
 #: How often a run is made whose worker dies.
 _ATTEMPTS: Final = 2
+_ADDRESS: Final = re.compile(r"(?:[a-z]+://)?(?:\[[0-9a-f:]+\]|[^\s/:\[\]]+):\d+")
 #: What cuts a connection.
-_GONE: Final = (OSError, TimeoutError, RuntimeError, AttributeError)
+_GONE: Final = (OSError, TimeoutError, RuntimeError, AttributeError, CancelledError)
 
 
 class ScenarioOnWorker(WorkerPlugin):  # type: ignore[misc]
@@ -65,8 +70,6 @@ def on_worker(wanted: SweepRun, scenario: str) -> MadeRun:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages that a result depends on."""
-    import platform
-
     found = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:
@@ -153,6 +156,8 @@ class DaskEngine:
 
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
+    if not _ADDRESS.fullmatch(address):
+        raise MasterError(f"'{address}' is not the address of a Dask scheduler, such as tcp://host:8786")
     try:
         client = Client(address, timeout=_PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:
@@ -168,9 +173,8 @@ def _connected(address: str) -> Iterator[Client]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Leave it to us to say what workers and connections do."""
-    import logging
-
-    loggers = [logging.getLogger(name) for name in ("distributed", "tornado.application", "asyncio")]
+    ours = ("distributed", "tornado", "asyncio")
+    loggers = [logging.getLogger(name) for name in (*ours, *logging.root.manager.loggerDict) if name.startswith(ours)]
     before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)

@@ -16,7 +16,7 @@ from master.evaluation.measured_force import MeasuredComparison, compare_measure
 from master.report import report_files, result_tables
 from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import MOST_INPUTS, columns, comparison_page, run_names
-from master.report.film_file import FilmOptions, write_film
+from master.report.film_file import FilmOptions, check_name, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
 from master.report.run_inputs import differing_inputs
 from master.report.terminal_summary import WIDTH, Terminal
@@ -50,6 +50,8 @@ def _report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is asked for."""
     if options.measured_offset is not None and not options.measured:
         raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
+    if options.film:
+        check_name(options.film)
     results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)

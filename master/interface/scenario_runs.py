@@ -82,7 +82,7 @@ def keep_apart(folder: Path, package: Package) -> None:
     """
     if folder.resolve().is_relative_to(package.root) or package.root.is_relative_to(folder.resolve()):
         raise RequestError(
-            f"the results folder {folder} and the scenario lie inside each other; choose another with --out"
+            f"the results folder {folder} and the scenario lie inside each other; choose another one (--out)"
         )
 
 

@@ -175,7 +175,7 @@ def plain_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     """Return a table in which all columns but the first hold numbers."""
     table = Table(width=78)
     for i, head in enumerate(heads):
-        table.add_column(escape(head), justify="right" if i else "left")
+        table.add_column(escape(head), justify="right" if i else "left", overflow="fold")
     for row in rows:
         table.add_row(*map(escape, row))
     return table

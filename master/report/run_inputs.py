@@ -117,7 +117,7 @@ def _settings(summary: Mapping[str, Any]) -> dict[str, str]:
     found |= {"scheme": str(coupling.get("scheme", "-")), "step [s]": number(settings.get("step"))}
     found |= {f"scheme, {name}": text for name, text in scheme_options(coupling)}
     for section in ("interval", "filter", "limits"):
-        found |= {f"{section}, {k}": str(v) for k, v in (settings.get(section) or {}).items() if v is not None}
+        found |= {f"{section}, {k}": number(v) for k, v in (settings.get(section) or {}).items() if v is not None}
     return found
 
 
@@ -205,6 +205,9 @@ def provenance_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows += [
         (f"FMU of {c['name']}", ", ".join([c.get("fmu", "-"), c.get("tool", ""), *_identity(c)]))
         for c in summary.get("components", [])
+    ]
+    rows += [
+        (f"definition of {c['name']}", c["definition"]) for c in summary.get("components", []) if c.get("definition")
     ]
     rows += [(f"version of {k}", str(v)) for k, v in summary.get("versions", {}).items()]
     return rows

@@ -82,7 +82,7 @@ def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool 
     summary, limits = done.summary, done.evaluation.limits
     key, names = "verdict" if is_coupling else "run", short_names(summary)
     parts = [f"<section id='{key}'>{_title(summary, is_coupling)}", status_note(summary)]
-    parts.append(_cautions(summary))
+    parts.append(_warnings(summary))
     parts += [html_markup.verdict(a, names[a.contact.pantograph], limits) for a in assessments]
     if reason := summary.get("not_judged", ""):
         parts.append(f"<p class='warning'><b>Not judged.</b> There are no figures: {html_markup.text(reason)}.</p>")
@@ -101,7 +101,7 @@ def _title(summary: dict[str, Any], is_coupling: bool) -> str:
     return f"<h1>{html_markup.text(head)}</h1>{note}"
 
 
-def _cautions(summary: dict[str, Any]) -> str:
+def _warnings(summary: dict[str, Any]) -> str:
     """Return the warnings of the FMUs, and those on the scenario."""
     said = ((html_markup.text(w["component"]), html_markup.text(w["text"])) for w in summary.get("warnings", []))
     found = [f"<p class='warning'>{component} warns: {text}</p>" for component, text in said]

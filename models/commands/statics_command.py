@@ -4,43 +4,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from models.catenary import line_advice
-from models.catenary.definition.line_definition import Span
-from models.catenary.line_model import CatenaryModel
-from models.catenary.line_part import CatenaryPart
-from models.catenary.statics import elasticity as statics
-from models.catenary.statics import rest_profile, wire_waves
+from models.catenary.statics import rest_profile
 from models.commands import statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
-from models.definition_files.parameter import ParameterError
+from models.interface.line_statics import LineStatics, at_rest
 from models.library.catalogue import load_line
-
-
-@dataclass(frozen=True)
-class LineStatics:
-    """What the command reports on a line: a section of it, and one span in detail."""
-
-    model: CatenaryModel
-    section: int
-    number: int
-    span: Span
-    profiles: tuple[rest_profile.Profile, ...]
-    droppers: rest_profile.Droppers
-    arms: rest_profile.ArmLoads
-    elasticity: statics.Elasticity
-    others: dict[int, tuple[int, statics.Elasticity]]  # number and elasticity of the middle span of other sections
-    waves: wire_waves.Waves
-
-    @property
-    def span_droppers(self) -> rest_profile.Droppers:
-        """Return the droppers (and hangers) of the span in detail."""
-        return rest_profile.droppers(self.model, self.span.start, self.span.end, self.section)
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -78,44 +51,9 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     """
     definition = load_line(arguments.line)
     definition = definition.with_values(settings(arguments.set, "line", definition))
-    section = arguments.section - 1
-    if not 0 <= section < len(definition.sections):
-        raise ParameterError(f"--section {arguments.section}: the line has sections 1 to {len(definition.sections)}")
-    spans = definition.sections[section].spans
-    number = arguments.span if arguments.span is not None else (len(spans) + 1) // 2
-    if not 1 <= number <= len(spans):
-        raise ParameterError(f"--span {number}: the line has spans 1 to {len(spans)}")
-    span = spans[number - 1]
-    part = CatenaryPart(definition)
-    model = part.model
-    warn(
-        [
-            line_advice.speed_warning(definition, arguments.speed / 3.6),
-            line_advice.slack_warning(part.droppers, model.static.dropper_force),
-            line_advice.slack_law_warning(definition),
-        ]
-    )
-    return LineStatics(
-        model=model,
-        section=section,
-        number=number,
-        span=span,
-        profiles=rest_profile.profiles(model, section),
-        droppers=rest_profile.droppers(model, section=section),
-        arms=rest_profile.arm_loads(model, section),
-        elasticity=_elasticity(model, section, number, arguments.force),
-        others={
-            other: (middle := (len(s.spans) + 1) // 2, _elasticity(model, other, middle, arguments.force))
-            for other, s in enumerate(definition.sections)
-            if other != section
-        },
-        waves=wire_waves.waves(definition, arguments.speed / 3.6, span.length),
-    )
-
-
-def _elasticity(model: CatenaryModel, section: int, number: int, force: float) -> statics.Elasticity:
-    span = model.definition.sections[section].spans[number - 1]
-    return statics.elasticity(model, statics.positions_in_span(span), force, section)
+    found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
+    warn(found.warnings)
+    return found
 
 
 def summary(result: LineStatics) -> list[tuple[str, str]]:
@@ -140,15 +78,8 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
 
 def write(folder: Path, result: LineStatics) -> None:
     """Write tables as CSV and plots as PNG."""
-    _write_profiles(folder, result.profiles)
-    d, e, a = result.droppers, result.elasticity, result.arms
-    heads = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
-    write_csv(folder / "droppers.csv", heads, (d.x, d.length, d.force, d.is_hanger.astype(float)))
-    found = {result.section: e} | {section: other for section, (_, other) in result.others.items()}
-    columns = [(np.full_like(one.x, section + 1), one.x, 1e3 * one.value) for section, one in sorted(found.items())]
-    names = ("section", "x [m]", "elasticity [mm/N]")
-    write_csv(folder / "elasticity.csv", names, [np.concatenate(column) for column in zip(*columns, strict=True)])
-    write_csv(folder / "steady_arms.csv", ("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift))
+    for name, (titles, columns) in result.tables.items():
+        write_csv(folder / f"{name}.csv", titles, [column.astype(float) for column in columns])
     lines = [f'"{name}","{value}"' for name, value in summary(result)]
     write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
     plots = {
@@ -201,11 +132,3 @@ def _dropper_rows(result: LineStatics) -> Iterable[Sequence[str]]:
     for x, length, force, hanger in zip(d.x, d.length, d.force, d.is_hanger, strict=True):
         place = f"{x:.2f}{' (hanger)' if hanger else ''}", f"{x - result.span.start:.2f}"
         yield *place, f"{length:.4f}", f"{force:.1f}"
-
-
-def _write_profiles(folder: Path, profiles: Sequence[rest_profile.Profile]) -> None:
-    """Write a file for every kind of wire, stitch wires one after the other."""
-    for component in dict.fromkeys(p.component for p in profiles):
-        same = [p for p in profiles if p.component == component]
-        columns = [np.concatenate(c) for c in zip(*((p.x, p.y, p.z) for p in same), strict=True)]
-        write_csv(folder / f"{component}.csv", ("x [m]", "y [m]", "z [m]"), columns)

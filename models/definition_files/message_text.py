@@ -39,10 +39,15 @@ def hint(name: str, known: Iterable[str], most: int = 1) -> str:
     >>> hint("height", ["CA160", "LN2"])
     ''
     """
+    found = nearest(name, known, most)
+    return f"; did you mean {' or '.join(map(repr, found))}?" if found else ""
+
+
+def nearest(name: str, known: Iterable[str], most: int = 1) -> list[str]:
+    """Return the known name that is very near to another, otherwise the nearest ones, which may be none."""
     folded = {k.casefold(): k for k in known}
     matches = partial(difflib.get_close_matches, name.casefold(), folded)
-    near = matches(n=1, cutoff=0.85) or matches(n=most, cutoff=0.55)
-    return f"; did you mean {' or '.join(repr(folded[k]) for k in near)}?" if near else ""
+    return [folded[k] for k in matches(n=1, cutoff=0.85) or matches(n=most, cutoff=0.55)]
 
 
 def one_line(text: str) -> str:

@@ -63,7 +63,8 @@ def to_si(value: float, unit: str, wanted: str) -> float:
     20000.0
     """
     if unit not in SI:
-        raise ValueError(f"unknown unit '{unit}' (known for '{wanted}': {units_of(wanted)}){hint(unit, SI)}")
+        known = units_of(wanted)
+        raise ValueError(f"unknown unit '{unit}' (known for '{wanted}': {known}){hint(unit, known.split(', '))}")
     si, factor = SI[unit]
     if si != wanted:
         raise ValueError(f"unit '{unit}' where a unit of '{wanted}' is needed ({units_of(wanted)})")

@@ -7,6 +7,8 @@ source::
     encumbrance = [1.2, "m", "choice: gives the printed first dropper"]
 
 A source that begins with ``choice`` marks a value that the data leave open.
+
+The file is longer than others because a table of the file and all that may be wrong with an entry stand together.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from models.definition_files.message_text import hint, one_line, shown_value
+from models.definition_files.message_text import hint, nearest, one_line, shown_value
 from models.definition_files.si_units import shown, to_si
 
 #: Largest number of problems listed.
@@ -127,6 +129,9 @@ class Table:
         name = str(path)
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError as error:
+            text = "there is no such file; a definition of the library is called by its name, without .toml"
+            raise DefinitionError([Problem(name, "", text)]) from error
         except OSError as error:
             raise DefinitionError([Problem(name, "", f"cannot be read ({error.strerror})")]) from error
         except UnicodeDecodeError as error:
@@ -134,7 +139,8 @@ class Table:
         except RecursionError as error:
             raise _too_deep(name) from error
         except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
-            raise DefinitionError([Problem(name, "", f"is not TOML: {error}")]) from error
+            comma = _comma_advice(path, str(error))
+            raise DefinitionError([Problem(name, "", f"is not TOML: {error}{comma}")]) from error
         if _is_deep(data):
             raise _too_deep(name)
         return cls(data, _Log(name))
@@ -378,10 +384,16 @@ class Table:
     def _report_unknown(self) -> None:
         for name in self._data:
             if name not in self._known:
-                known = ", ".join(sorted(self._known)) or "none"
-                self.problem(name, f"unknown key (known here: {known}){hint(name, self._known - set(self._data))}")
+                known, absent = ", ".join(sorted(self._known)) or "none", self._known - set(self._data)
+                self.problem(name, f"unknown key (known here: {known}){hint(name, absent)}")
+                self._forget_missing(nearest(name, absent))
         for child in self._children:
             child._report_unknown()
+
+    def _forget_missing(self, names: Iterable[str]) -> None:
+        """Take back that keys are missing, where a mistyped one has been reported for them."""
+        keys = {self.key(name) for name in names}
+        self._log.problems[:] = [p for p in self._log.problems if not (p.key in keys and p.text.endswith("is missing"))]
 
 
 def _once(problems: Iterable[Problem]) -> list[Problem]:
@@ -393,6 +405,13 @@ def _once(problems: Iterable[Problem]) -> list[Problem]:
         first if not others else dataclasses.replace(first, text=f"{first.text} (and {len(others)} more like this)")
         for first, *others in alike.values()
     ]
+
+
+def _comma_advice(path: Path, error: str) -> str:
+    """Return advice if the line that cannot be read has what looks like a decimal comma."""
+    number = re.search(r"at line (\d+)", error)
+    line = path.read_text(encoding="utf-8").splitlines()[int(number[1]) - 1] if number else ""
+    return f"; does '{line.strip()}' have a decimal comma? write a point" if re.search(r"\d,\d", line) else ""
 
 
 def _too_deep(file: str) -> DefinitionError:

@@ -32,6 +32,8 @@ class Builder:
         self.asked.append(arguments[0])
         self.orders.append(arguments)
         if arguments[0] == "fingerprint":
+            if "--built-from" in arguments and not Path(arguments[arguments.index("--built-from") + 1]).is_file():
+                return subprocess.CompletedProcess(arguments, 0, "", "")  # as for a name that it does not know
             return subprocess.CompletedProcess(arguments, self.code, self.fingerprint + "\n", self.said)
         if not self.said:
             name, folder = arguments[-1], arguments[2]
@@ -113,7 +115,7 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
     fmu_provision.provide_fmu(path, told.append)
     assert told == []
-    ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+    ports = ("--built-from", f"{tmp_path}/lines/Mine.toml", "--pantographs", "2", "--", "Mine")
     assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
     fmu_provision.provide_fmu(path, told.append)
@@ -122,7 +124,33 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     (tmp_path / "lines" / "Mine.toml").unlink()
     fmu_provision.provide_fmu(path, told.append)
     assert "which it was built from, is missing" in told[-1]
-    assert len(builder.asked) == 3
+    assert builder.asked == ["fingerprint", "fingerprint", "build", "fingerprint"]
+
+
+def test_definitions_are_looked_up_where_the_scenario_lies(builder, tmp_path):
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", print, library=tmp_path)
+    assert builder.orders[0] == ("fingerprint", "--if-known", "--library", str(tmp_path), "--", "X")
+    assert builder.orders[1][3:] == ("--library", str(tmp_path), "--", "X")
+
+
+def test_notes_of_the_builder_are_passed_on(monkeypatch, tmp_path):
+    said = "note: two definitions are named 'X': a is used, b is not\nanything else\n"
+    answer = subprocess.CompletedProcess((), 0, "", said)
+    monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: answer)
+    told = []
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append)
+    assert told == ["two definitions are named 'X': a is used, b is not"]
+
+
+def test_an_fmu_says_which_definition_it_was_built_from(tmp_path):
+    path = tmp_path / "demo.ssp" / "resources" / "X.fmu"
+    path.parent.mkdir(parents=True)
+    write_fmu(path, "ab-12", definition="../../lines/X.toml", pantographs="1")
+    assert fmu_provision.definition_of(path) == str(tmp_path / "lines" / "X.toml")
+    write_fmu(path, "ab-12", library="lines/X.toml")
+    assert fmu_provision.definition_of(path) == "library: lines/X.toml"
+    write_fmu(path, "ab-12")
+    assert fmu_provision.definition_of(path) == ""
 
 
 def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
@@ -132,13 +160,29 @@ def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
     assert not (tmp_path / "X.fmu").exists()
 
 
+def test_what_the_scratch_folder_holds_is_used_as_long_as_it_fits(builder, tmp_path):
+    scratch, told = tmp_path / "cache", []
+    scratch.mkdir()
+    for _ in range(2):
+        fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
+    assert builder.asked == ["fingerprint", "build", "fingerprint"]
+    builder.fingerprint = "CD-34"
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
+    assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
+
+
+def test_the_builder_takes_no_modules_from_the_working_folder(monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.path", ["", str(tmp_path)])
+    assert fmu_provision._places() == [str(tmp_path), str(Path(__file__).parents[3])]
+
+
 def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypatch):
     (tmp_path / "slavemodule.txt").write_text("x")
     (tmp_path / "pythonfmu").mkdir()
     (tmp_path / "pythonfmu" / "__init__.py").write_text("raise ImportError('of another FMU')")
-    before = fmu_provision.fingerprint("Pantograph_CX")
+    before = fmu_provision.fingerprint(fmu_provision.Lookup("Pantograph_CX"))
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert fmu_provision.fingerprint("Pantograph_CX") == before
+    assert fmu_provision.fingerprint(fmu_provision.Lookup("Pantograph_CX")) == before
 
 
 def test_the_builders_words_are_passed_on(builder, tmp_path):
@@ -158,7 +202,7 @@ def test_without_fmus_nothing_is_asked(monkeypatch, tmp_path):
 
 
 def test_a_name_that_looks_like_an_option_is_a_name():
-    assert fmu_provision.fingerprint("--help") is None
+    assert fmu_provision.fingerprint(fmu_provision.Lookup("--help")) is None
 
 
 @pytest.mark.parametrize("data", [b"", b"not a zip"])

@@ -17,6 +17,7 @@ from models.library.catalogue import load_pantograph
 from models.numerics.newmark import Newmark
 from models.pantograph.lumped.lumped_model import LumpedModel
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
+from tests.effort import IS_LONG
 from tests.models.nodal_line import NodalLine
 
 START = 70.0
@@ -224,6 +225,8 @@ def test_up_to_four_pantographs_of_any_kind_on_one_line(line_maker, kinds):
     ]
     together = CoupledModel(CatenaryModel(line), spaced).run(0.25, 1e-3)
     for i, pantograph in enumerate(spaced):
+        if i == 0 and not IS_LONG:
+            continue  # it is the trailing one that runs through the other's waves
         alone = CoupledModel(CatenaryModel(line), [pantograph]).run(0.25, 1e-3)
         assert alone.contact_force.max() > 50.0
         assert together.contact_force[:, i] == pytest.approx(alone.contact_force[:, 0], abs=0.5)
@@ -237,6 +240,8 @@ def test_a_kilometre_apart_each_runs_as_if_it_were_alone(line_maker, cx):
     spaced = [cx.with_values({"start_position": x, "static_force": 178.0}) for x in starts]
     together = CoupledModel(line, spaced).run(stop, 1e-3)
     for i, pantograph in enumerate(spaced):
+        if i == 0 and not IS_LONG:
+            continue  # it is the trailing one that runs through the other's waves
         alone = CoupledModel(line, [pantograph]).run(stop, 1e-3)
         interval = (starts[i] + 350.0, starts[i] + 600.0)
         figures = [

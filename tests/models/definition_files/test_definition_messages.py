@@ -36,8 +36,8 @@ def mistakes(tmp_path, *changes):
 
 
 def test_a_mistyped_key_names_the_one_that_may_be_meant(tmp_path):
-    missing, unknown = mistakes(tmp_path, ("tension =", "tenson ="))
-    assert (missing.key, missing.text) == ("contact_wire.tension", "is missing")
+    (unknown,) = mistakes(tmp_path, ("tension =", "tenson ="))  # not that tension is missing as well
+    assert unknown.key == "contact_wire.tenson"
     assert unknown.text.endswith("did you mean 'tension'?")
 
 

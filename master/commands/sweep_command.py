@@ -16,11 +16,12 @@ from rich.console import Console
 from rich.status import Status
 
 from master.batch.sweep.distributions import Method
-from master.batch.sweep.sweep_engines import HereEngine, SweepEngine
+from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sweep_plan import Keep, SweepRequest, stored_request
 from master.batch.sweep.sweep_session import CSV, JSON, PARQUET, PreparedSweep, SweepOutcome, SweepProgress, sweep
 from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say
-from master.errors import MasterError, UsageError
+from master.errors import UsageError
+from master.interface.scenario_runs import keep_apart
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
 from master.scenario.open_scenario import open_scenario
 from master.scenario.scenario_place import located
@@ -86,10 +87,6 @@ def _count(text: str) -> int:
 
 def _sweep(options: argparse.Namespace) -> int:
     """Make a sweep; return 0 if every run was made, 1 if one failed."""
-    if options.jobs and options.scheduler:
-        raise UsageError(
-            "--jobs starts processes of this computer, --scheduler uses those of a cluster: give one of them"
-        )
     console = Terminal(stderr=True)
     note: Callable[[str], None] = (lambda _: None) if options.quiet else partial(say, console=console)
     request = _request(options)
@@ -100,7 +97,8 @@ def _sweep(options: argparse.Namespace) -> int:
             Terminal(width=WIDTH).print(f"{len(prepared.outcome.runs)} runs, all can be made", markup=False)
             return 0
         folder = options.out or Path("results") / "sweep" / scenario.system.name
-        engine = _engine(options, note)
+        keep_apart(folder, scenario.package)
+        engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after)
         with _progress(console, options.quiet) as show:
             done = sweep(prepared, folder, engine, note, show, options.again)
     _print(options, folder, done)
@@ -135,16 +133,6 @@ def _distinct(option: str, pairs: list[tuple[str, str]]) -> dict[str, str]:
         if names.count(name) > 1:
             raise UsageError(f"{option} {name} is given twice")
     return dict(pairs)
-
-
-def _engine(options: argparse.Namespace, tell: Callable[[str], None]) -> SweepEngine:
-    if not (options.jobs or options.scheduler):
-        return HereEngine()
-    try:
-        from master.batch.sweep.dask_engine import DaskEngine
-    except ImportError as error:
-        raise MasterError("--jobs and --scheduler need Dask: pip install 'openpanto[scale]'") from error
-    return DaskEngine(options.jobs, options.scheduler, options.memory_limit, options.renew_after, tell)
 
 
 @contextmanager

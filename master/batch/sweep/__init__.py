@@ -5,6 +5,6 @@ values of all runs) -> ``swept_systems`` (the checked runs) -> ``sweep_run`` (on
 ``dask_engine`` (all of them) -> ``sweep_journal`` (what is finished) -> ``sweep_table`` -> ``sweep_session``. It may
 import what `batch` may: the rooms below it, and `batch_session`, `assessment_figures` and `calibration` beside it.
 
-It is longer than a room should be: the half up to ``swept_systems`` says which runs there are, the other makes them, and
-neither is of use without the other.
+It is longer than a room should be: the half up to ``swept_systems`` says which runs there are, the other makes them,
+and neither is of use without the other.
 """

@@ -24,7 +24,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import dask
+import dask.utils
 from distributed import Client, Future, LocalCluster, WorkerPlugin, get_worker, wait
 
 from master.batch.sweep.sweep_engines import MakeRuns
@@ -36,6 +36,8 @@ from master.system.components import System
 #: Seconds within which a scheduler has to answer, and between looks at its workers.
 _PATIENCE: Final = 5.0
 _LOOK: Final = 0.5
+#: Seconds within which a result that is there has to arrive.
+_FETCH: Final = 30.0
 #: Packages whose versions workers must share with the master: what computes a figure, and what carries it.
 _PACKAGES: Final = ("openpanto", "numpy", "scipy", "numba", "fmpy", "pythonfmu", "distributed")
 #: How often a run is made whose worker dies.
@@ -138,6 +140,11 @@ class DaskEngine:
             with _connected(self.scheduler) as client:
                 yield client
             return
+        if self.memory_limit != "auto":
+            try:
+                dask.utils.parse_bytes(self.memory_limit)
+            except ValueError as error:
+                raise MasterError(f"'{self.memory_limit}' is no size of memory, such as 2GB or 'auto'") from error
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         with (
             LocalCluster(
@@ -346,7 +353,12 @@ class _Crew:
                 yield from self._lost(errand, waiting)
                 return
             raise MasterError(f"worker {errand.worker} failed: {type(error).__name__}: {error}") from error
-        found: MadeRun = errand.future.result()
+        try:
+            found: MadeRun = errand.future.result(timeout=_FETCH)
+        except _GONE:  # the worker has died with it
+            self._look()
+            yield from self._lost(errand, waiting)
+            return
         del self._errands[errand.run.key]
         if self._engine.scheduler is None and found.made >= self._engine.renew_after:
             self._renew(errand.worker)

@@ -10,7 +10,7 @@ import tempfile
 import time
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -110,11 +110,13 @@ def carry_out(base: System, wanted: SweepRun, place: RunPlace) -> SweepResult:
             done = run(system, folder / "run")
             stepping = float(done.summary["performance"]["wall_time"])
             rows = tuple(_rows(done, system))
+            _kept(folder / "run", place, wanted.key)
         except InterruptedRunError:
             raise
         except Exception as error:  # one of a thousand runs must not end them all, whatever it is
-            reason = _reason(error)
-        _kept(folder / "run", place, wanted.key, bool(reason))
+            rows, reason = (), _reason(error)
+            with suppress(OSError):
+                _kept(folder / "run", place, wanted.key, failed=True)
     return SweepResult(wanted.key, rows, reason, time.perf_counter() - began, stepping, peak_memory())
 
 
@@ -135,7 +137,7 @@ def _working_folder(place: RunPlace) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _kept(made: Path, place: RunPlace, key: str, failed: bool) -> None:
+def _kept(made: Path, place: RunPlace, key: str, failed: bool = False) -> None:
     """Move what stays of a run to its place."""
     if not made.is_dir() or place.keep == "figures" or (place.keep == "failed" and not failed):
         return

@@ -205,7 +205,8 @@ def sweep(
         _remove_leftovers(place)
         with closing(SweepJournal(folder)) as journal:
             old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
-            state = replace(state, found={r.key: old[r.key] for r in state.runs if r.key in old})
+            found = {r.key: old[r.key] for r in state.runs if r.key in old}
+            state = replace(state, found=found)
             missing = list({r.key: r for r in state.runs if r.key not in state.found}.values())
             with chosen.opened(prepared.base, place) as make_runs_of:
                 tell(_announcement(prepared.base, missing, len(state.runs), chosen.width))
@@ -213,7 +214,8 @@ def sweep(
 
                 def finish(so_far: SweepOutcome, result: SweepResult) -> SweepOutcome:
                     journal.add(result)
-                    return replace(so_far, found={**so_far.found, result.key: result})
+                    found[result.key] = result  # a copy each time would be long for many runs
+                    return so_far
 
                 return run_tasks(state, results, finish, files, folder)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,9 +16,26 @@ from master.batch.sweep.sweep_plan import SweepRequest
 from master.batch.sweep.sweep_session import PreparedSweep, sweep
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
+from tests.master.conftest import SSV, ssd_text
 
 ROOT = Path(__file__).parents[4]
 GRID = ("--over", "speed=40,50,60", "--over", "catenary.stiffness=4000:6000:1000")
+
+
+GRID_REQUEST = {"over": {"speed": "40,50,60", "catenary.stiffness": "4000:6000:1000"}}
+
+
+@pytest.fixture(scope="session")
+def whole_table(toy_fmus, tmp_path_factory):
+    """The table of the sweep over GRID that nobody has disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    scenario = folder / "toy.ssp"
+    shutil.copytree(toy_fmus, scenario / "resources", ignore=shutil.ignore_patterns("*.py"))
+    (scenario / "SystemStructure.ssd").write_text(ssd_text())
+    (scenario / "parameters.ssv").write_text(SSV)
+    with open_scenario(scenario, Overrides(), build=False) as found:
+        sweep(PreparedSweep.of(found.system, SweepRequest.read(GRID_REQUEST)), folder / "out")
+    return (folder / "out" / "sweep.csv").read_bytes()
 
 
 @pytest.fixture

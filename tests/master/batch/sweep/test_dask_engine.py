@@ -129,13 +129,6 @@ def test_a_run_whose_worker_always_dies_is_a_row_and_the_others_go_on(exiting_to
     assert (data["status"], data["finished"]) == ("complete", 3)
 
 
-@pytest.fixture
-def whole_table(command, tmp_path):
-    """The table of a sweep that nobody has disturbed."""
-    assert ended(command(*GRID, out="whole")) == (0, "")
-    return (tmp_path / "whole" / "sweep.csv").read_bytes()
-
-
 def test_a_worker_that_is_killed_costs_its_run_one_retry(command, tmp_path, whole_table):
     with cluster_of(tmp_path / "cluster") as cluster:
         process = command(*GRID, "--scheduler", cluster.address, quiet=False)

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +18,7 @@ from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
 from master.batch.sweep.sweep_run import WORK, Row, RunPlace, SweepResult
 from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs
-from master.errors import MasterError
+from master.errors import InterruptedRunError, MasterError
 from master.results import results_folder
 from master.run_session import run as run_system
 from master.system.components import System
@@ -193,7 +193,7 @@ def sweep(
 
     Raises
     ------
-    InterruptedRunError, KeyboardInterrupt
+    InterruptedRunError
         If the user stops it; the table then has the finished runs.
     MasterError
         If the folder holds something else, or the engine ends.
@@ -201,23 +201,28 @@ def sweep(
     state, chosen = prepared.outcome, engine or HereEngine()
     place = RunPlace(folder / RUNS, state.request.keep)
     files = SweepFiles()
-    with results_folder.taken_over(folder, JSON, files.generator, files.kind):
-        _remove_leftovers(place)
-        with closing(SweepJournal(folder)) as journal:
-            old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
-            found = {r.key: old[r.key] for r in state.runs if r.key in old}
-            state = replace(state, found=found)
-            missing = list({r.key: r for r in state.runs if r.key not in state.found}.values())
-            with chosen.opened(prepared.base, place) as make_runs_of:
-                tell(_announcement(prepared.base, missing, len(state.runs), chosen.width))
-                results = _shown(make_runs_of, missing, state, chosen, show)
+    found: dict[str, SweepResult] = {}
+    try:
+        with results_folder.taken_over(folder, JSON, files.generator, files.kind):
+            _remove_leftovers(place)
+            with closing(SweepJournal(folder)) as journal:
+                old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
+                found |= {r.key: old[r.key] for r in state.runs if r.key in old}
+                missing = list({r.key: r for r in state.runs if r.key not in found}.values())
+                state = replace(state, found=found)
 
                 def finish(so_far: SweepOutcome, result: SweepResult) -> SweepOutcome:
                     journal.add(result)
                     found[result.key] = result  # a copy each time would be long for many runs
                     return so_far
 
-                return run_tasks(state, results, finish, files, folder)
+                with chosen.opened(prepared.base, place) as make_runs_of:
+                    tell(_announcement(prepared.base, missing, len(state.runs), chosen.width))
+                    results = _shown(make_runs_of, missing, state, chosen, show)
+                    return run_tasks(state, results, finish, files, folder)
+    except (InterruptedRunError, KeyboardInterrupt) as error:
+        done = f"{len([r for r in state.runs if r.key in found])} of {len(state.runs)} runs are finished"
+        raise InterruptedRunError(f"interrupted. {done} and in {folder}; the same command makes the others") from error
 
 
 def _remove_leftovers(place: RunPlace) -> None:
@@ -256,11 +261,14 @@ def _announcement(base: System, missing: Sequence[SweepRun], total: int, width: 
     begun = f"{total} runs" if len(missing) == total else f"{total} runs, {len(missing)} of them missing"
     if any(r.target is not None for r in missing):
         return f"{begun}; the static force of each is found in several trials"
-    with suppress(MasterError):  # the run itself will say so
+    try:
         each = _rehearsed(base, missing)
-        about = duration(each * -(-len(missing) // width))
-        return f"{begun}, {min(width, len(missing))} at a time, about {about}"
-    return begun
+    except InterruptedRunError:
+        raise
+    except MasterError:  # the run itself will say so
+        return begun
+    about = duration(each * -(-len(missing) // width))
+    return f"{begun}, {min(width, len(missing))} at a time, about {about}"
 
 
 def _rehearsed(base: System, missing: Sequence[SweepRun]) -> float:

@@ -149,7 +149,7 @@ def test_an_interruption_leaves_what_is_finished(swept, tmp_path):
 
             return ready()
 
-    with pytest.raises(InterruptedRunError):
+    with pytest.raises(InterruptedRunError, match="1 of 3 runs are finished"):
         swept("out", Impatient(), **STIFFNESSES)
     assert [row["run"] for row in table(tmp_path / "out")] == ["1"]
 

@@ -14,7 +14,8 @@ import pythonfmu
 from fmus.builder.source_bundle import BundleError, Module, collect
 from fmus.loader.loader_build import sources
 from fmus.loader.pythonfmu_repair import repaired
-from models.library.search_path import Kind, definition_files, doubles, near
+from models.definition_files.message_text import hint
+from models.library.search_path import Kind, definition_files, doubles
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARY = REPOSITORY / "models" / "library"
@@ -156,7 +157,7 @@ def recipe(
         return _pantograph_recipe(path, _head(path).get("title", ""), adapter)
     known = known_names()
     text = f"There is no FMU '{name}'; known are {', '.join(known) or 'none'} (and NAME_P2: a line for two pantographs)"
-    raise UnknownFmuError(text + (near(name, known) or "."))
+    raise UnknownFmuError(text + (hint(name, known) or "."))
 
 
 def doubts(name: str, folders: Iterable[Path]) -> str:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import load as load_line_file
+from models.definition_files.message_text import hint
 from models.definition_files.toml_reader import Table
-from models.library.search_path import LIBRARY, Kind, definition_files, definition_names, near, search_path
+from models.library.search_path import LIBRARY, Kind, definition_files, definition_names, search_path
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import read_mechanism
@@ -90,6 +91,6 @@ def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:
     found = definition_files(kind, name, searched)
     if not found:
         known = definition_names(kind, searched)
-        text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{near(name, known)}"
+        text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{hint(name, known)}"
         raise UnknownNameError(text)
     return found[0]

@@ -5,7 +5,6 @@ Each folder may hold ``lines/NAME.toml`` and ``pantographs/NAME.toml``.
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -66,19 +65,6 @@ def doubles(files: list[Path]) -> str:
     rest = " and ".join(map(str, files[1:]))
     number = "two" if len(files) == 2 else f"{len(files)}"
     return f"{number} definitions are named '{files[0].stem}': {files[0]} is used, {rest} {_verb(files[1:])} not"
-
-
-def near(name: str, known: Iterable[str]) -> str:
-    """Return the question whether one of the known names was meant, empty if none is near.
-
-    Examples
-    --------
-    >>> near("ln2", ["LN1", "LN2", "Re330"])
-    "; did you mean 'LN2'?"
-    """
-    folded = {other.casefold(): other for other in known}
-    found = difflib.get_close_matches(name.casefold(), folded, n=1)
-    return f"; did you mean '{folded[found[0]]}'?" if found else ""
 
 
 def _files(folder: Path) -> list[Path]:

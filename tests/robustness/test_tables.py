@@ -343,7 +343,7 @@ CELL = st.one_of(
 @settings(PROFILE, max_examples=count(120, 4000))
 @given(head=st.lists(CELL, max_size=3), rows=st.lists(st.lists(CELL, min_size=1, max_size=4), min_size=1, max_size=4))
 def test_study_tables_of_any_cells(tmp_path_factory, head, rows):
-    """Told in words with the file, or listed; whatever the cells hold, all that is printed can be read."""
+    """Reported in words with the file, or listed; whatever the cells hold, all that is printed can be read."""
     TRIED["study table, any cells"] += 1
     folder = tmp_path_factory.getbasetemp()
     text = io.StringIO()

@@ -50,15 +50,15 @@ def builder(monkeypatch):
 
 
 def test_missing_then_fresh_then_stale(builder, tmp_path):
-    path, told = tmp_path / "X.fmu", []
-    fmu_provision.provide_fmu(path, told.append)
+    path, reported = tmp_path / "X.fmu", []
+    fmu_provision.provide_fmu(path, reported.append)
     assert builder.asked == ["fingerprint", "build"]
-    fmu_provision.provide_fmu(path, told.append)
+    fmu_provision.provide_fmu(path, reported.append)
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
-    fmu_provision.provide_fmu(path, told.append)
+    fmu_provision.provide_fmu(path, reported.append)
     assert builder.asked[-2:] == ["fingerprint", "build"]
-    assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
+    assert reported == ["building X.fmu", "building X.fmu again: its sources have changed"]
     assert fmu_provision.stored_guid(path) == "{cd-34}"
 
 
@@ -80,8 +80,8 @@ def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
     ],
 )
 def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, change, why):
-    path, told = tmp_path / "X.fmu", []
-    fmu_provision.provide_fmu(path, told.append)
+    path, reported = tmp_path / "X.fmu", []
+    fmu_provision.provide_fmu(path, reported.append)
     with zipfile.ZipFile(path) as file:
         members = {name: file.read(name) for name in file.namelist()} | change
     with zipfile.ZipFile(path, "w") as file:
@@ -90,9 +90,9 @@ def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, 
                 file.writestr(name, data)
     before = path.read_bytes()
     builder.fingerprint = "CD-34"
-    assert fmu_provision.provide_fmu(path, told.append) == path
+    assert fmu_provision.provide_fmu(path, reported.append) == path
     assert path.read_bytes() == before
-    assert told[1:] == [f"X.fmu is used as it is: {why}; to have it rebuilt, remove it"]
+    assert reported[1:] == [f"X.fmu is used as it is: {why}; to have it rebuilt, remove it"]
 
 
 @pytest.mark.parametrize(("script", "is_ours"), [("X_ab1234567890", True), ("X_cd1234567890", False), ("own", False)])
@@ -110,20 +110,20 @@ def test_older_builds_are_known_by_the_name_of_their_script(builder, tmp_path, s
 def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     (tmp_path / "lines").mkdir()
     (tmp_path / "lines" / "Mine.toml").write_text("")
-    path, told = tmp_path / "Mine.fmu", []
+    path, reported = tmp_path / "Mine.fmu", []
     write_fmu(path, "ab-12", definition="lines/Mine.toml", pantographs="2")
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
-    fmu_provision.provide_fmu(path, told.append)
-    assert told == []
+    fmu_provision.provide_fmu(path, reported.append)
+    assert reported == []
     ports = ("--built-from", f"{tmp_path}/lines/Mine.toml", "--pantographs", "2", "--", "Mine")
     assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
-    fmu_provision.provide_fmu(path, told.append)
-    assert told == ["building Mine.fmu again: its sources have changed"]
+    fmu_provision.provide_fmu(path, reported.append)
+    assert reported == ["building Mine.fmu again: its sources have changed"]
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
-    fmu_provision.provide_fmu(path, told.append)
-    assert "which it was built from, is missing" in told[-1]
+    fmu_provision.provide_fmu(path, reported.append)
+    assert "which it was built from, is missing" in reported[-1]
     assert builder.asked == ["fingerprint", "fingerprint", "build", "fingerprint"]
 
 
@@ -137,9 +137,9 @@ def test_notes_of_the_builder_are_passed_on(monkeypatch, tmp_path):
     said = "note: two definitions are named 'X': a is used, b is not\nanything else\n"
     answer = subprocess.CompletedProcess((), 0, "", said)
     monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: answer)
-    told = []
-    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append)
-    assert told == ["two definitions are named 'X': a is used, b is not"]
+    reported = []
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append)
+    assert reported == ["two definitions are named 'X': a is used, b is not"]
 
 
 def test_an_fmu_says_which_definition_it_was_built_from(tmp_path):
@@ -161,14 +161,14 @@ def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
 
 
 def test_what_the_scratch_folder_holds_is_used_as_long_as_it_fits(builder, tmp_path):
-    scratch, told = tmp_path / "cache", []
+    scratch, reported = tmp_path / "cache", []
     scratch.mkdir()
     for _ in range(2):
-        fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
+        fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, scratch)
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
-    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
-    assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, scratch)
+    assert reported == ["building X.fmu", "building X.fmu again: its sources have changed"]
 
 
 def test_the_builder_takes_no_modules_from_the_working_folder(monkeypatch, tmp_path):

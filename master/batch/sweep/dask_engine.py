@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import os
 import platform
 import re
@@ -38,6 +39,10 @@ _PATIENCE: Final = 5.0
 _LOOK: Final = 0.5
 #: Seconds within which a result that is there has to arrive.
 _FETCH: Final = 30.0
+#: Seconds without a worker before the user is told.
+_ALONE: Final = 10.0
+#: How Dask is to work: a process that is slow to come back must not be given up.
+_SETTINGS: Final = {"distributed.worker.daemon": True, "distributed.deploy.lost-worker-timeout": "120s"}
 #: Packages whose versions workers must share with the master: what computes a figure, and what carries it.
 _PACKAGES: Final = ("openpanto", "numpy", "scipy", "numba", "fmpy", "pythonfmu", "distributed")
 #: How often a run is made whose worker dies.
@@ -129,16 +134,17 @@ class DaskEngine:
         MasterError
             If the scheduler does not answer, or a worker has other versions or lacks the scenario's files.
         """
-        with _quiet(), self._client() as client:
-            crew = _Crew(client, base, place, self)
+        with _quiet(), self._client() as (client, replenish):
+            crew = _Crew(client, base, place, self, replenish)
             with crew.ready() as results:
                 yield results
 
     @contextmanager
-    def _client(self) -> Iterator[Client]:
+    def _client(self) -> Iterator[tuple[Client, Callable[[], None]]]:
+        """Yield what talks to the scheduler, and what sees to it that there are as many workers as are wanted."""
         if self.scheduler is not None:
             with _connected(self.scheduler) as client:
-                yield client
+                yield client, lambda: None
             return
         if self.memory_limit != "auto":
             try:
@@ -158,7 +164,7 @@ class DaskEngine:
             ) as cluster,
             Client(cluster) as client,
         ):
-            yield client
+            yield client, lambda: cluster.scale(self.jobs)
 
 
 @contextmanager
@@ -186,7 +192,7 @@ def _quiet() -> Iterator[None]:
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     try:
-        with warnings.catch_warnings(), dask.config.set({"distributed.worker.daemon": True}):
+        with warnings.catch_warnings(), dask.config.set(_SETTINGS):
             warnings.simplefilter("ignore")
             yield
     finally:
@@ -204,10 +210,14 @@ class _Crew:
     place : RunPlace
     engine : DaskEngine
         How it is to be done.
+    replenish : callable
+        Starts workers if there are fewer than are wanted.
     """
 
-    def __init__(self, client: Client, base: System, place: RunPlace, engine: DaskEngine) -> None:
-        self._client, self._engine = client, engine
+    def __init__(
+        self, client: Client, base: System, place: RunPlace, engine: DaskEngine, replenish: Callable[[], None]
+    ) -> None:
+        self._client, self._engine, self._replenish = client, engine, replenish
         self._files = [str(c.fmu.path.resolve()) for c in base.components]
         self._folder = "" if place.keep == "figures" else str(place.folder.parent.resolve())
         self._ours = versions()
@@ -216,6 +226,7 @@ class _Crew:
         self._errands: dict[str, _Errand] = {}
         self._deaths: Counter[str] = Counter()
         self._looked = 0.0
+        self._seen = time.monotonic()
         self._scenario = ScenarioOnWorker(base, RunPlace(place.folder.resolve(), place.keep))
 
     @contextmanager
@@ -224,8 +235,6 @@ class _Crew:
         self._look()
         for address, text in self._problems(list(self._known)).items():
             raise MasterError(f"worker {self._known[address]} {text}")
-        if not self._known:
-            self._engine.tell("the scheduler has no workers yet; waiting for them")
         self._ask(lambda: self._client.register_plugin(self._scenario))
         try:
             yield self._results
@@ -263,7 +272,19 @@ class _Crew:
                 self._engine.tell(f"worker {names[address]} {text}; it is not used")
             self._refused |= set(problems)
         self._known = {address: name for address, name in names.items() if address not in self._refused}
-        self._engine.width = max(1, len(self._known))
+        if len(self._known) < self._engine.width:
+            self._replenish()
+        self._note_absence()
+        self._engine.width = max(1, self._engine.jobs or len(self._known))
+
+    def _note_absence(self) -> None:
+        """Tell the user once if there has been no worker for a while."""
+        now = time.monotonic()
+        if self._known:
+            self._seen = now
+        elif now - self._seen > _ALONE:
+            self._seen = math.inf
+            self._engine.tell("there is no worker at present; waiting for one")
 
     def _ask(self, question: Callable[[], Any]) -> Any:
         try:

@@ -94,7 +94,7 @@ def _sweep(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedSweep.of(scenario.system, request)
         if options.dry_run:
-            Terminal(width=WIDTH).print(f"{len(prepared.outcome.runs)} runs, all can be made", markup=False)
+            Terminal(width=WIDTH).print(f"{len(prepared.outcome.runs)} run(s), all can be made", markup=False)
             return 0
         folder = options.out or Path("results") / "sweep" / scenario.system.name
         keep_apart(folder, scenario.package)

@@ -200,7 +200,8 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
     try:
         rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise MasterError(f"{path} cannot be read: {error}") from error
+        why = error.strerror if isinstance(error, OSError) else error
+        raise MasterError(f"{path} cannot be read: {why}") from error
     if len(rows) < 2:
         raise RequestError(f"{path} has no row under its head")
     heads = rows[0]

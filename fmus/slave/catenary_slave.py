@@ -83,7 +83,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         along_track = strips[:, :, 1, 0]
         part.check_strips(strips)
         yield part.start_warning(strips)
-        yield slack_warning(part.droppers, part.model.static.dropper_force)
+        yield slack_warning(part.droppers, part.model.static.is_slack)
         yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 

@@ -102,7 +102,7 @@ def _limits(line: CatenaryModel, pantograph: LumpedDefinition, step: float) -> t
     return (
         limits.speed_warning(line.definition, pantograph.speed),
         limits.step_warning(line.definition, step, pantograph.stage[-1].mass),
-        limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.dropper_force),
+        limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.is_slack),
         limits.slack_law_warning(line.definition),
     )
 

@@ -90,7 +90,7 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     warn(
         [
             line_advice.speed_warning(definition, arguments.speed / 3.6),
-            line_advice.slack_warning(part.droppers, model.static.dropper_force),
+            line_advice.slack_warning(part.droppers, model.static.is_slack),
             line_advice.slack_law_warning(definition),
         ]
     )

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from models.arrays import FloatArray
+from models.arrays import BoolArray, FloatArray
 from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set
@@ -83,6 +83,11 @@ class StaticState:
         """Return the static positions of the nodes, shape (n, 3) [m]."""
         return _displaced(self.shape.points, self.displacement)
 
+    @property
+    def is_slack(self) -> BoolArray:
+        """Return which droppers hang slack, shape (n_droppers,); a broken one does not hang."""
+        return (self.dropper_force <= 0.0) & ~self.shape.mesh.broken
+
     def pendulum_stiffness(self) -> sp.csc_matrix:
         """Return the pendulum stiffness of droppers and steady arms under their tension, zero where they push."""
         mesh, tension = self.shape.mesh, np.concatenate([self.dropper_force, self.arm_force])
@@ -142,7 +147,7 @@ def _settled(
         # Moving a reference point redefines the length of the wire, so it does not stretch the wire.
         stretch = axial_stiffness(definition, mesh, points, arms=design is None) @ sp.diags(unstretched.ravel())
         # Likewise the guides act on moves of the reference only, and vanish from the result with them.
-        guides = _swing(shape, force) @ sp.diags(unstretched.ravel())
+        guides = _swing(shape, force, design) @ sp.diags(unstretched.ravel())
         conditions = _conditions(shape, slack)
         load = matrices.load if design is None else matrices.load + (guides - stretch) @ kept.ravel()
         displacement, force = _solve(shape, matrices.K - stretch + guides, conditions, load)
@@ -286,12 +291,16 @@ def _solve(
     return displacement, solution[len(free) :] * scale
 
 
-def _swing(shape: LineShape, force: FloatArray) -> sp.csc_matrix:
-    """Return the stiffness N/L of the droppers across their axes, as pendulums.
+def _swing(shape: LineShape, force: FloatArray, design: StaticState | None) -> sp.csc_matrix:
+    """Return the stiffness N/L of the droppers across their axes, as pendulums; of a design's arms as well.
 
-    This guides the iteration where only the droppers hold a wire laterally.
+    This guides the iteration where only the droppers hold a wire laterally, and where arms turn.
     """
-    return pendulum_stiffness(shape.mesh.droppers, np.maximum(force, 1.0), shape.points)
+    bars, tension = shape.mesh.droppers, np.maximum(force, 1.0)
+    if design is not None:
+        bars = np.vstack([bars, shape.mesh.arms])
+        tension = np.concatenate([tension, np.maximum(design.arm_force, 0.0)])
+    return pendulum_stiffness(bars, tension, shape.points)
 
 
 def _static_state(

@@ -163,8 +163,9 @@ def _settled(
             _carry_arms(mesh, points, move)
         if design is not None or iteration >= _TAUT_ITERATIONS:
             slack = now_slack
+    search = "form finding of" if design is None else "the search for the condition of"
     raise EquilibriumError(
-        f"form finding of line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
+        f"{search} line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
         f"a point still moves by {np.abs(move).max():.2g} m"
     )
 

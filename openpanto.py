@@ -2,20 +2,40 @@
 
 The only file that knows all three packages. A verb's options are declared by its package, which is imported when the
 verb is asked for and not before: so ``--version`` and ``--help`` are quick, and an interrupt during the imports ends in
-a sentence, like every other one (`master.safety.supervision`).
+a sentence, like every other one (`master.safety.supervision`). The table of verbs and ``new``, which takes from all
+packages, make it longer than other files.
 """
 
 from __future__ import annotations
 
-import argparse
-import difflib
-import importlib
 import os
-import re
+import signal
 import sys
+
+
+def _end(*_: object) -> None:
+    """End this process with a sentence."""
+    os.write(2, b"error: interrupted\n")
+    os._exit(1)
+
+
+if os.path.basename(sys.argv[0]).partition(".")[0] == "openpanto":  # the command, which supervision is yet to begin for
+    for _signal in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(_signal) != signal.SIG_IGN:  # as under nohup
+            signal.signal(_signal, _end)
+if __name__ == "__main__" and sys.path[0] != os.path.dirname(__file__) and not sys.flags.safe_path:
+    del sys.path[0]  # the working folder of ``python -m openpanto``
+
+import argparse
+import importlib
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn
+
+from master.errors import hint
+from master.safety.supervision import phase, supervised
 
 
 class Verb(NamedTuple):
@@ -32,7 +52,7 @@ _MODELS: Final = "models.commands.physics_main:carry_out"
 _FMUS: Final = "fmus.__main__:carry_out"
 
 #: Packages that nothing works without, as pyproject.toml has them.
-REQUIRED: Final = ("numpy", "scipy", "pythonfmu", "fmpy", "lxml", "pydantic", "filelock", "rich", "matplotlib")
+REQUIRED: Final = ("numpy", "scipy", "pythonfmu", "fmpy", "lxml", "pydantic", "filelock", "rich", "matplotlib", "shtab")
 
 #: In the order of the help.
 VERBS: Final[Mapping[str, Verb]] = {
@@ -64,7 +84,7 @@ VERBS: Final[Mapping[str, Verb]] = {
         "run a family of variants of a scenario and report them side by side",
         "master.commands.study_command:add_study",
         _MASTER,
-        ("study --list", "study cx_ln2_overlap", "study cx_generic_pair --only distance_100"),
+        ("study --list", "study cx_ln2_overlap", "study cx_ln2_overlap --only '200 m'"),
     ),
     "compare": Verb(
         "show two or more runs side by side",
@@ -123,42 +143,95 @@ VERBS: Final[Mapping[str, Verb]] = {
 }
 
 
+EPILOG: Final = """\
+openpanto VERB --help says more of a verb and has examples. To begin with:
+  openpanto run cx_ln2
+Completion with TAB, in bash (zsh, fish likewise):
+  openpanto --completion bash > ~/.local/share/bash-completion/completions/openpanto"""
+
+
 class Parser(argparse.ArgumentParser):
     """A parser that suggests what a mistyped option or choice may have been meant to be."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage and the mistake, and end with exit code 2."""
+        """Print the mistake in one sentence, and end with exit code 2."""
         if found := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message, re.DOTALL):
-            message += suggestion(found[1], re.findall(r"'(.*?)'", found[2]))
-        super().error(message)
+            message += hint(found[1], re.findall(r"'(.*?)'", found[2]))
+        if "required" in message:
+            message += f" ({self.prog} --help has examples)"
+        self.exit(2, f"{self.prog}: error: {message}\n")
 
     def unknown(self, given: Sequence[str]) -> NoReturn:
         """Refuse arguments that the verb does not have."""
         options = [option for action in self._actions for option in action.option_strings]
         text = f"unrecognized arguments: {' '.join(given)}"
-        self.error(text + (suggestion(given[0].partition("=")[0], options) if given[0].startswith("-") else ""))
+        self.error(text + (hint(given[0].partition("=")[0], options) if given[0].startswith("-") else ""))
 
 
-def suggestion(name: str, known: Collection[str]) -> str:
-    """Return the question whether one of the known names was meant, empty if none is near.
+class Completion(argparse.Action):
+    """Prints the script that completes verbs, options, names and files in a shell, and ends.
 
-    Examples
-    --------
-    >>> suggestion("vaildate", ["run", "validate"])
-    "; did you mean 'validate'?"
-    >>> suggestion("film", ["run", "validate"])
-    ''
+    It is made once and holds all it needs: pressing TAB starts no Python.
     """
-    folded = {other.casefold(): other for other in known}
-    near = difflib.get_close_matches(name.casefold(), folded, n=1)
-    return f"; did you mean '{folded[near[0]]}'?" if near else ""
+
+    def __call__(self, parser: argparse.ArgumentParser, _namespace: object, shell: Any, _option: object = None) -> None:
+        """Print the script."""
+        try:
+            print(completion(shell), flush=True)
+        except ModuleNotFoundError as error:
+            parser.exit(1, f"error: {error.name} is not installed: pip install {error.name}\n")
+        parser.exit()
+
+
+def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
+    """Return the script for a shell, with the names of the library as they are now."""
+    import shtab
+
+    from fmus.builder.recipe import known_names
+    from master.batch.study.family import family_names
+    from master.batch.verification.case import CASES
+    from master.scenario.scenario_place import scenario_names
+    from models.library.catalogue import line_names, pantograph_names
+
+    known = {
+        "scenario": scenario_names(),
+        "line": line_names(),
+        "pantograph": pantograph_names(),
+        "like": (*line_names(), *pantograph_names()),
+        "name": family_names(),
+        "cases": [case.stem for case in CASES.glob("*.toml")],
+        "names": known_names(),
+    }
+    parser, functions = command_line(), []
+    for verb in _verbs(parser).values():
+        for action in verb._actions:
+            if action.dest in known and action.choices is None:
+                name = f"_openpanto_{verb.prog.split()[-1].replace('-', '_')}_{action.dest}"
+                functions.append(_COMPLETING[shell].format(name=name, known=" ".join(sorted(known[action.dest]))))
+                action.complete = {"bash": name, "zsh": name, "fish": f"({name})"}  # type: ignore[attr-defined]
+            elif action.type is Path:
+                is_folder = action.metavar == "DIR"
+                action.complete = shtab.DIRECTORY if is_folder else shtab.FILE  # type: ignore[attr-defined]
+    preamble: Any = {shell: "\n".join(functions)}
+    return str(shtab.complete(parser, shell, preamble=preamble))
+
+
+#: Shell functions that offer known names, and files as well.
+_COMPLETING: Final = {
+    "bash": '{name}() {{ compgen -W "{known}" -- "$1"; compgen -f -- "$1"; }}',
+    "zsh": "{name}() {{ compadd {known}; _files; }}",
+    "fish": "function {name}; string split ' ' '{known}'; __fish_complete_path (commandline -ct); end",
+}
+
+
+def _verbs(parser: argparse.ArgumentParser) -> Mapping[str, argparse.ArgumentParser]:
+    """Return the parsers of the verbs."""
+    return next(a.choices for a in parser._actions if isinstance(a, argparse._SubParsersAction))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return the exit code: 0 done, 1 failed, 2 a command line that was not understood."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    from master.safety.supervision import supervised
-
     return supervised(lambda: _worked(given))
 
 
@@ -170,19 +243,22 @@ def _worked(given: Sequence[str]) -> int:
         parser.print_help()
         return 2
     if not verb.startswith("-") and verb not in VERBS:
-        parser.error(f"there is no verb '{verb}'{suggestion(verb, VERBS) or _wanted_run(verb)}")
+        parser.error(f"there is no verb '{verb}'{_wanted_run(verb) or hint(verb, VERBS)}")
     options, unknown = parser.parse_known_args(given)
     if unknown:
         options.parser.unknown(unknown)
-    from master.safety.supervision import phase
-
-    with phase("computing"):  # a factorisation may never come back to Python
-        return int(_named(VERBS[verb].execution)(options))
+    execution = VERBS[verb].execution
+    # The master says itself what it is at; of the physics, a factorisation may never come back to Python.
+    with nullcontext() if execution == _MASTER else phase("computing"):
+        return int(_named(execution)(options))
 
 
 def _wanted_run(name: str) -> str:
     """Return the hint that a scenario is run by a verb, if the name may be one."""
-    return f"; to run a scenario: openpanto run {name}" if os.path.lexists(name) or name.endswith(".ssp") else ""
+    from master.scenario.scenario_place import scenario_names
+
+    is_scenario = os.path.lexists(name) or name.endswith(".ssp") or name in scenario_names()
+    return f"; to run a scenario: openpanto run {name}" if is_scenario else ""
 
 
 def command_line(wanted: Collection[str] = tuple(VERBS)) -> Parser:
@@ -190,9 +266,13 @@ def command_line(wanted: Collection[str] = tuple(VERBS)) -> Parser:
     parser = Parser(
         prog="openpanto",
         description="Simulate pantographs under overhead contact lines and judge the contact quality.",
-        epilog="openpanto VERB --help says more of a verb. Start with: openpanto run cx_ln2",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"openpanto {_version() or '(not installed)'}")
+    parser.add_argument(
+        "--completion", action=Completion, choices=("bash", "zsh", "fish"), help="print a script for TAB"
+    )
     verbs = parser.add_subparsers(required=True, metavar="VERB", parser_class=Parser)
     for name, verb in VERBS.items():
         if name not in wanted:
@@ -244,7 +324,7 @@ def _examine(options: argparse.Namespace) -> int:
 def _packages() -> Iterator[tuple[Literal["ok", "note", "missing"], str]]:
     for name in REQUIRED:
         version = _version(name)
-        yield ("ok", f"{name} {version}") if version else ("missing", f"{name} lacks: pip install {name}")
+        yield ("ok", f"{name} {version}") if version else ("missing", f"{name} is not installed: pip install {name}")
 
 
 def _kernels() -> tuple[Literal["ok", "note", "missing"], str]:

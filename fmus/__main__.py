@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
+
+# No file in the working folder (rich.py) stands in for a package, unless that folder is where this one was found.
+if __name__ == "__main__" and not sys.flags.safe_path and sys.path[0] != __file__[: -len("/fmus/__main__.py")]:
+    del sys.path[0]
+
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

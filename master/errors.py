@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 #: Longest value or text that is shown in full [characters], and most problems that are listed at once.
@@ -27,6 +29,22 @@ def one_line(text: str) -> str:
         half = _LONGEST // 2
         text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
     return "".join(map(_shown, text))
+
+
+def hint(name: str, known: Iterable[str], most: int = 1) -> str:
+    """Return the question whether a known name was meant, empty if none is near: one that is very near, or the nearest.
+
+    Examples
+    --------
+    >>> hint("Sigmaa", ["mean", "sigma"])
+    "; did you mean 'sigma'?"
+    >>> hint("height", ["mean", "sigma"])
+    ''
+    """
+    folded = {k.casefold(): k for k in known}
+    matches = partial(difflib.get_close_matches, name.casefold(), folded)
+    near = matches(n=1, cutoff=0.85) or matches(n=most, cutoff=0.55)
+    return f"; did you mean {' or '.join(repr(folded[k]) for k in near)}?" if near else ""
 
 
 def printable(text: str) -> str:

@@ -1,25 +1,57 @@
-"""What holds for the whole suite: long checks on request, groups of tests that share one process."""
+"""What holds for the whole suite: long checks on request, groups of tests that share one process, the longest first."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 import pytest
 
 from tests.effort import IS_LONG
 
-ROBUSTNESS = Path(__file__).parent / "robustness"
+HERE: Final = Path(__file__).parent
+#: Files whose tests share a process of pytest-xdist; elsewhere those of a file do, so that fixtures are made once.
+TOGETHER: Final = {
+    "robustness/": "inputs that are added up",
+    "validation/test_cx_ln2.py": "whole runs",
+    "validation/test_multibody_ln2.py": "whole runs",
+}
+#: Groups that take longest: they begin first, so that no process is still at one when the other has finished.
+LONGEST: Final = (
+    "whole runs",
+    "inputs that are added up",
+    "interop/test_standalone.py",
+    "interop/test_tools.py",
+    "models/catenary/test_line_model.py",
+    "models/catenary/shape/test_pendulums.py",
+    "models/pantograph/multibody/test_generic.py",
+    "models/catenary/shape/test_nonlinear_truss.py",
+    "fmus/slave/test_library_fmus.py",
+)
+
+
+def group(item: pytest.Item) -> str:
+    """Return the name of the group whose tests run in one process."""
+    place = item.path.relative_to(HERE).as_posix()
+    return next((name for begin, name in TOGETHER.items() if place.startswith(begin)), place)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let pytest-xdist take the groups in our order; by itself it takes those of most tests first."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Keep the robustness tests, which add up their inputs, in one process of pytest-xdist."""
-    if item.path.is_relative_to(ROBUSTNESS):
-        item.add_marker(pytest.mark.xdist_group("robustness"))
+    """Keep the tests of a group in one process of pytest-xdist."""
+    item.add_marker(pytest.mark.xdist_group(group(item)))
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave the long checks out unless asked for."""
+    """Leave the long checks out unless asked for, and begin with the longest groups."""
     if not IS_LONG:
         left_out = [item for item in items if item.get_closest_marker("long")]
         items[:] = [item for item in items if not item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=left_out)
+    rank = {name: i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(group(item), len(LONGEST)))

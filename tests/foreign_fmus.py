@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from master.errors import ScenarioError
-from master.run import RunOptions, run
+from master.run_session import RunOptions, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 

@@ -1,12 +1,13 @@
 """Who may import whom, held for every import: those inside functions and those for types included.
 
-The table is that of docs/architecture.md. A room may import itself and the rooms of earlier tiers of its list; rooms of
-one tier do not know each other.
+A room may import itself and the rooms of earlier tiers of its list; rooms of one tier do not know each other.
+docs/architecture.md shows the same lists with every room's duty, and is compared with them and with the tree.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
@@ -25,6 +26,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"definition_files", "numerics", "contact_law"},
         {"catenary", "pantograph"},
         {"library", "coupled"},
+        {"interface"},
         {"commands"},
         {"__main__"},
     ],
@@ -58,8 +60,9 @@ TIERS: dict[str, list[set[str]]] = {
         {"scenario", "recording"},
         {"evaluation"},
         {"results"},
-        {"report", "run"},
+        {"report", "run_session"},
         {"batch"},
+        {"interface"},
         {"commands"},
         {"__main__"},
     ],
@@ -75,10 +78,11 @@ ONLY_IN = {
     "fmpy": lambda name: name.startswith("master.fmu."),
     "lxml": lambda name: name.startswith("master.ssp."),
     "pythonfmu": lambda name: name.startswith("fmus."),
-    "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.")),
+    "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.", "master.interface.")),
+    "pandas": lambda name: name.startswith(("models.interface.", "master.interface.")),
 }
 #: What runs inside an FMU: all of models but these, and fmus/slave.
-OUTSIDE_FMU = ("models.commands", "models.__main__")
+OUTSIDE_FMU = ("models.commands", "models.interface", "models.__main__")
 
 
 @cache
@@ -199,6 +203,15 @@ def test_file_names_are_unique():
     assert sorted(wrong) == []
 
 
+def test_the_command_knows_the_packages_and_nobody_knows_the_command():
+    tree = ast.parse((ROOT / "openpanto.py").read_text(encoding="utf-8"))
+    at_once = {node.module for node in tree.body if isinstance(node, ast.ImportFrom)} & set(modules())
+    assert at_once == {"master.errors", "master.safety.supervision"}
+    ours = {n for n in imported(ROOT / "openpanto.py") if n.split(".")[0] not in sys.stdlib_module_names}
+    assert {n for n in ours if module_of(n) is None} == {"shtab"}
+    assert not [name for name, path in modules().items() if "openpanto" in set(imported(path))]
+
+
 def test_rooms_say_their_duty_and_hand_nothing_on():
     """An ``__init__.py`` holds a docstring alone, but for the public faces of the packages."""
     wrong = set()
@@ -234,3 +247,46 @@ def test_what_the_physics_commands_share_needs_numpy_alone():
     wrong = {f"{n} -> {what}" for n, what in outside() if n in seen and what != "numpy"}
     assert wrong == set()
     assert seen <= SHARED | {"master.arrays", "master", "master.evaluation"}
+
+
+# The page
+
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+
+
+def page_tiers() -> dict[str, list[set[str]]]:
+    """Return the lists of the page: a folder, and below it its rooms, each with the number of its tier and its duty."""
+    found: dict[str, list[set[str]]] = {}
+    for line in PAGE.splitlines():
+        if heading := re.fullmatch(r"    ([a-z_/]+)/", line):
+            tiers = found[heading[1].replace("/", ".")] = []
+        elif row := re.fullmatch(r"    \s*(\d+) (\w+)\s+(\S.*)", line):
+            assert int(row[1]) in (len(tiers), len(tiers) + 1), f"out of order: {line}"
+            tiers += [set()] * (int(row[1]) - len(tiers))
+            tiers[-1] = tiers[-1] | {row[2]}
+    return found
+
+
+def test_the_page_shows_the_lists_that_are_held():
+    assert page_tiers() == TIERS
+
+
+def test_the_page_covers_every_module():
+    """A module is a row or lies in a room that is one; a room within a room is a row or named ``room/`` in its text."""
+    rows = {f"{folder}.{room}" for folder, tiers in page_tiers().items() for rooms in tiers for room in rooms}
+    for name, path in modules().items():
+        if name in PACKAGES:
+            continue
+        parts = name.split(".")
+        assert any(".".join(parts[:k]) in rows for k in range(2, len(parts) + 1)), name
+        assert path.name != "__init__.py" or name in rows or f"{parts[-1]}/" in PAGE, name
+
+
+def test_the_page_names_no_file_that_is_not_there():
+    """What stands in backticks with a folder, or as several words, is a file of ours or ends the path of one."""
+    paths = [p for package in (*PACKAGES, "tests") for p in (ROOT / package).rglob("*")]
+    files = {f"/{p.relative_to(ROOT).as_posix()}" for p in (*ROOT.glob("*"), *paths)}
+    files |= {f.removesuffix(".py") for f in files}
+    named = {n for n in re.findall(r"`([\w/.]+)`", PAGE) if "/" in n or re.fullmatch(r"[a-z]+_[a-z0-9_]+", n)}
+    assert len(named) > 40
+    assert {n for n in named if not any(f.endswith(f"/{n}") for f in files)} == {"with_values"}

@@ -126,7 +126,7 @@ def test_every_key_has_a_meaning_and_none_is_described_in_vain(references, defin
 
 def test_units_ranges_and_defaults_are_the_readers_own(references, definition_keys):
     page = definition_keys.page("Keys", "", [("", "line", references["line"])])
-    tension = "| `tension` | value | `N` (`kN`) | from 500 to 100000 | **required** | tension |"
+    tension = "| `tension` | value | `N` (`daN`, `kN`) | from 500 to 100000 | **required** | tension |"
     assert page.count(tension) == 4  # contact, messenger, stitch and auxiliary wire
     assert "| `exponent` | value | `1` (`%`) | from 1 to 3 | 1 | exponent n of the penetration |" in page
     assert all(f"| `{key.name}` |" in page for key in references["line"].keys.values())

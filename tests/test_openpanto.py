@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shlex
+import shutil
+import signal
 import subprocess
 import sys
+import time
 import tomllib
 from pathlib import Path
 
@@ -24,6 +28,17 @@ def script(tmp_path_factory):
     path = tmp_path_factory.mktemp("bin") / "openpanto"
     path.write_text(SCRIPT)
     return path
+
+
+@pytest.fixture
+def foreign(tmp_path):
+    """A working folder with files and packages of the same names as those that are imported."""
+    for name in ("rich", "numpy", "lxml", "pydantic", "fmpy", "pythonfmu", "filelock", "openpanto", "argparse"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('FOREIGN')")
+    for name in ("models", "master", "fmus"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("raise SystemExit('FOREIGN')")
+    return tmp_path
 
 
 @pytest.fixture
@@ -77,6 +92,7 @@ def test_version_and_help_import_nothing_that_takes_time(asked):
     [
         (["rnu", "x"], "there is no verb 'rnu'; did you mean 'run'?"),
         (["quux"], "there is no verb 'quux'"),
+        (["cx_ln2"], "there is no verb 'cx_ln2'; to run a scenario: openpanto run cx_ln2"),
         (["cx_ln2.ssp"], "there is no verb 'cx_ln2.ssp'; to run a scenario: openpanto run cx_ln2.ssp"),
         (["run", "x", "--sheme", "jacobi"], "unrecognized arguments: --sheme jacobi; did you mean '--scheme'?"),
         (["run", "x", "--scheme", "jacoby"], "'gauss-seidel', 'iterative'); did you mean 'jacobi'?"),
@@ -97,7 +113,139 @@ def test_the_packages_that_nothing_works_without_are_those_of_pyproject():
 
 def test_doctor_names_versions_and_what_is_there(call):
     done = call("doctor")
-    assert done.returncode == 0, done.stdout
+    assert done.returncode == ("missing " in done.stdout)
     assert "ok       numpy " in done.stdout
     assert "lines are stepped by " in done.stdout
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ["build", "Pantograph_CX", "--out", "fmus_here"],
+        ["doctor"],
+        ["run", "cx_ln2", "--stop", "0.01", "--quiet", "--no-report", "--isolate"],
+    ],
+    ids=lambda line: line[0],
+)
+def test_foreign_files_and_packages_in_the_working_folder_change_nothing(line, foreign, call):
+    done = call(*line)
+    assert (done.returncode, "FOREIGN" in done.stdout + done.stderr) == (0, False), done.stderr
+
+
+@pytest.mark.parametrize("package", ["master", "models", "fmus"])
+def test_the_packages_as_commands_heed_no_foreign_file_either(package, foreign):
+    for name in ("models", "master", "fmus"):
+        (foreign / name).rename(foreign / f"{name}_away")
+    (foreign / ("models" if package == "fmus" else "fmus")).mkdir()
+    command = [sys.executable, "-m", package, "--help"]
+    done = subprocess.run(command, cwd=foreign, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_foreign_package_in_place_of_a_command_is_one_sentence(tmp_path):
+    (tmp_path / "master").mkdir()
+    (tmp_path / "master" / "__init__.py").touch()
+    command = [sys.executable, "-m", "master", "--help"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "No module named master.__main__" in done.stderr
+
+
+@pytest.mark.parametrize("line", [["study", "--list"], ["statics", "LN2"], ["--completion", "bash"]], ids=" ".join)
+def test_a_reader_that_has_gone_away_ends_the_command_quietly(line, script):
+    if "--completion" in line:
+        pytest.importorskip("shtab")
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run([sys.executable, script, *line], stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (1, b"")
+
+
+#: Sends a signal to the command, as a terminal would, when a module is about to be imported.
+AT_IMPORT = """
+import os, signal, sys
+first, wanted, number = os.getpid(), sys.argv.pop(1), getattr(signal, sys.argv.pop(1))
+class Sender:
+    def find_spec(self, name, *_):
+        if name == wanted:
+            os.kill(first, number)
+sys.meta_path.insert(0, Sender())
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
+@pytest.mark.parametrize(
+    ("module", "number"),
+    [("argparse", "SIGINT"), ("master.errors", "SIGHUP"), ("numpy", "SIGINT"), ("matplotlib", "SIGHUP")],
+)
+def test_an_interrupt_during_the_imports_is_one_sentence(module, number, tmp_path):
+    path = tmp_path / "openpanto"
+    path.write_text(AT_IMPORT + SCRIPT)
+    command = [sys.executable, "-P", path, module, number, "couple", "LN2", "CX", "--quiet"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "error: interrupted\n")
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
+def test_an_interrupt_of_the_physics_is_one_sentence(script, tmp_path):
+    line = ["couple", "LN2", "CX", "--speed", "5", "--quiet"]  # takes minutes
+    process = subprocess.Popen(
+        [sys.executable, script, *line], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    time.sleep(2.0)
+    process.send_signal(signal.SIGINT)
+    out, said = process.communicate(timeout=60)
+    assert (process.returncode, out, said) == (1, b"", b"error: interrupted\n")
+
+
+#: The last word of a command line as bash completes it.
+BASH_TAB = """
+source {script}
+COMP_WORDS=({line}); COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 )); COMP_LINE="{line}"; COMP_POINT=${{#COMP_LINE}}
+$(complete -p openpanto | sed 's/.*-F \\([^ ]*\\).*/\\1/')
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+TAB = {"bash": BASH_TAB, "fish": "source {script}; complete -C '{line}'"}
+
+
+@pytest.fixture(scope="module", params=["bash", "zsh", "fish"])
+def completion(request, tmp_path_factory):
+    """A shell, and the script for it."""
+    pytest.importorskip("shtab")
+    if shutil.which(request.param) is None:
+        pytest.skip(f"no {request.param} here")
+    path = tmp_path_factory.mktemp("completion") / "openpanto"
+    path.write_text(openpanto.completion(request.param))
+    return request.param, path
+
+
+def test_every_shell_reads_its_script(completion):
+    shell, path = completion
+    done = subprocess.run([shell, "-n", path], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("line", "word"),
+    [
+        ("openpanto va", "validate"),
+        ("openpanto run --sch", "--scheme"),
+        ("openpanto run cx_ln", "cx_ln2"),
+        ("openpanto run own", "own.ssp"),
+        ("openpanto couple LN2 C", "CX"),
+        ("openpanto build Cat", "Catenary_LN2"),
+        ("openpanto study cx_", "cx_ln2_overlap"),
+    ],
+)
+def test_verbs_options_names_and_files_are_completed(completion, line, word, tmp_path):
+    shell, path = completion
+    if shell not in TAB:
+        pytest.skip(f"{shell} completes at its own terminal only")
+    (tmp_path / "own.ssp").touch()
+    command = [shell, "-c", TAB[shell].format(script=path, line=line)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert word in [offered.partition("\t")[0] for offered in done.stdout.splitlines()], done.stderr

@@ -25,7 +25,8 @@ ROOTS: Mapping[str, Path] = {
     "fmus": REPOSITORY / "fmus",
     "pythonfmu": PYTHONFMU,
 }
-_EMPTIED = frozenset({"pythonfmu"})
+#: Packages of which an FMU takes single modules: their __init__ hand out more than it needs.
+EMPTIED = frozenset({"pythonfmu", "models"})
 #: Kind of pantograph, as its definition says -> module and class of the adapter.
 _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
     "lumped": ("fmus.slave.lumped_slave", "LumpedPantographSlave"),
@@ -219,7 +220,7 @@ def gather(wanted: Recipe) -> FmuSources:
         If a source is missing, or cannot be carried inside an FMU.
     """
     try:
-        modules = collect(wanted.module, wanted.roots, _EMPTIED)
+        modules = collect(wanted.module, wanted.roots, EMPTIED)
         definition = wanted.definition.read_bytes()
     except (BundleError, SyntaxError) as error:
         raise BuildError(f"{wanted.name}: {error}") from error

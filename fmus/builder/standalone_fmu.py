@@ -31,13 +31,13 @@ def runtime_of(folder: Path | None = None) -> Runtime:
     try:
         source = own() if folder is None else installed_at(folder)
         with tempfile.TemporaryDirectory(prefix="openpanto_") as name:
-            resources = [_unpacked(kind, Path(name)) for kind in _KINDS]
+            resources = [_extracted(kind, Path(name)) for kind in _KINDS]
             return make_runtime(source, resources)
     except (InstallationError, RuntimeBuildError) as error:
         raise BuildError(f"no runtime for standalone FMUs: {error}") from error
 
 
-def _unpacked(kind: str, folder: Path) -> Path:
+def _extracted(kind: str, folder: Path) -> Path:
     with zipfile.ZipFile(io.BytesIO(archive(recipe(kind), loader=False))) as file:
         file.extractall(folder / kind)
     return folder / kind / "resources"

@@ -39,6 +39,8 @@ _UNREADABLE: Final = (
     zlib.error,
     ElementTree.ParseError,
 )
+#: Ahead of what another Python is given: no file in the working folder stands in for a package (-P is for 3.11).
+_NOT_HERE: Final = "import sys\nsys.path[:] = [place for place in sys.path if place]\n"
 #: What a run does with an FMU: unpacked into a temporary folder, loaded from there, initialised, stepped.
 _RUN: Final = """
 import ctypes, os, sys
@@ -173,7 +175,7 @@ def read_package(path: Path) -> Package:
 def ask(name: str | None = None) -> Interpreter | None:
     """Ask an interpreter (by default the one that tools use) what it has; return None if it cannot be run."""
     name = name or interpreter_name()
-    command = [name, "-c", PROBE.read_text(encoding="utf-8")]
+    command = [name, "-c", _NOT_HERE + PROBE.read_text(encoding="utf-8")]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
     except (OSError, subprocess.TimeoutExpired):
@@ -248,7 +250,7 @@ def _run(package: Package) -> Iterator[Finding]:
         with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
             with zipfile.ZipFile(package.path) as file:
                 file.extractall(folder)
-            command = [sys.executable, "-c", _RUN, folder, package.identifier, package.guid]
+            command = [sys.executable, "-P", "-c", _RUN, folder, package.identifier, package.guid]
             done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
     except OSError as error:
         yield Finding(
@@ -297,7 +299,7 @@ def _trial(package: Package, python: Interpreter) -> Iterator[Finding]:
         with zipfile.ZipFile(package.path) as file:
             file.extractall(folder, [n for n in package.names if n.startswith("resources/")])
         resources = str(Path(folder) / "resources")
-        command = [python.executable, "-c", _TRIAL, resources, package.script, package.identifier]
+        command = [python.executable, "-c", _NOT_HERE + _TRIAL, resources, package.script, package.identifier]
         done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
     if done.returncode == 0:
         yield Finding("ok", "the FMU's code was initialised there and made a step")

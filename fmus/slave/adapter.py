@@ -8,6 +8,8 @@ cannot take them for results, and the next ``do_step`` is refused with the text.
 
 An adapter owns three parts, none of which knows it: the values of its variables, its failures, and the states that it
 hands out.
+
+The class is large because every function of FMI that pythonfmu passes on is a method of it.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from master.coupling.macro_steps import Observer
 from master.errors import InterruptedRunError
 from master.results import results_folder, run_summary
 from master.results.run_results import Results
-from master.run import run
+from master.run_session import run
 from master.safety.supervision import unfinished
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides

@@ -10,9 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from master.errors import MasterError
+from master.errors import MasterError, RequestError
+from master.results.run_results import Results
 from master.safety import folder_lock
 from master.safety.safe_files import write_atomically
+from master.scenario.overrides import find_parameter
+from master.ssp.run_settings import Calibration
+from master.system.components import System
 
 MAX_RUNS: Final = 12
 #: Suffixes of the files of a scenario that hold values.
@@ -36,6 +40,55 @@ class CalibrationResult:
     value: float
     result: float
     trials: tuple[CalibrationTrial, ...]
+
+
+def task(system: System, parameter: str | None, mean: float | None, tolerance: float | None) -> Calibration:
+    """Return what to calibrate to which mean force: as asked for, else as the scenario says.
+
+    Raises
+    ------
+    RequestError
+        If neither says it.
+    """
+    known = system.settings.calibration
+    parameter = parameter or (known.parameter if known else None)
+    mean = mean or (known.mean_force if known else None)
+    if parameter is None or mean is None:
+        raise RequestError(
+            "the scenario does not say what to calibrate to which mean force; give --parameter and --mean"
+        )
+    tolerance = tolerance or (known.tolerance if known else 0.1)
+    return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
+
+
+def start_value(system: System, parameter: str) -> float:
+    """Return the value that a Real parameter has in the scenario.
+
+    Raises
+    ------
+    RequestError
+        If there is no such parameter.
+    """
+    index, variable = find_parameter(system.components, parameter)
+    if variable.type != "Real":
+        raise RequestError(f"parameter '{parameter}' is not Real and cannot be calibrated")
+    return float(system.components[index].parameters.get(variable.name, variable.start or 0.0))
+
+
+def mean_force(done: Results, wanted: Calibration) -> float:
+    """Return the mean force of the calibrated contact in the interval of interest [N].
+
+    Raises
+    ------
+    MasterError
+        If it has no figures there.
+    """
+    for assessment in done.assessments():
+        if assessment.quality.contact == wanted.contact:
+            return assessment.quality.mean
+    raise MasterError(
+        f"contact {wanted.contact} has no figures in the interval of interest; so there is nothing to calibrate"
+    )
 
 
 def find_value(

@@ -13,10 +13,11 @@ from typing import Any
 from master.batch import calibration
 from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say, say_warnings
 from master.commands.run_command import run_shown
-from master.errors import MasterError, Problem, RequestError, ScenarioError
+from master.errors import Problem, RequestError, ScenarioError
 from master.results import run_results
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import find_parameter
+from master.scenario.scenario_place import located, refuse_installed
 from master.ssp.archive import SSD_NAME, Package, Sources
 from master.ssp.run_settings import Calibration
 from master.ssp.ssd import read_structure
@@ -41,8 +42,11 @@ def add_calibrate(verbs: Any) -> None:
 
 def _calibrate(options: argparse.Namespace) -> int:
     is_stored = not (options.dry_run or options.set)
-    is_folder = options.scenario.is_dir()
-    with calibration.unchanged(options.scenario) if is_stored and is_folder else nullcontext(lambda: None) as check:
+    folder = located(options.scenario)
+    if is_stored:
+        refuse_installed(folder)
+    is_folder = folder.is_dir()
+    with calibration.unchanged(folder) if is_stored and is_folder else nullcontext(lambda: None) as check:
         return _calibrated(options, is_stored, check)
 
 
@@ -50,7 +54,7 @@ def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[]
     with open_scenario(options.scenario, overrides_of(options), say, not options.no_build) as scenario:
         system = scenario.system
         say_warnings(system)
-        task = _task(options, system)
+        task = calibration.task(system, options.parameter, options.mean, options.tolerance)
         place = _place(scenario.package, task.parameter) if is_stored else None
         found = _found(system, task)
         print(
@@ -74,28 +78,8 @@ def _filter_of(system: System) -> str:
 
 
 def _found(system: System, task: Calibration) -> calibration.CalibrationResult:
-    start = _start_value(system, task.parameter)
+    start = calibration.start_value(system, task.parameter)
     return calibration.find_value(lambda value: _trial(system, task, value), task.mean_force, start, task.tolerance)
-
-
-def _task(options: argparse.Namespace, system: System) -> Calibration:
-    known = system.settings.calibration
-    parameter = options.parameter or (known.parameter if known else None)
-    mean = options.mean or (known.mean_force if known else None)
-    if parameter is None or mean is None:
-        raise RequestError(
-            "the scenario does not say what to calibrate to which mean force; give --parameter and --mean"
-        )
-    tolerance = options.tolerance or (known.tolerance if known else 0.1)
-    return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
-
-
-def _start_value(system: System, parameter: str) -> float:
-    index, variable = find_parameter(system.components, parameter)
-    component = system.components[index]
-    if variable.type != "Real":
-        raise RequestError(f"parameter '{parameter}' is not Real and cannot be calibrated")
-    return float(component.parameters.get(variable.name, variable.start or 0.0))
 
 
 def _trial(system: System, task: Calibration, value: float) -> float:
@@ -105,13 +89,9 @@ def _trial(system: System, task: Calibration, value: float) -> float:
     components = (*system.components[:index], changed, *system.components[index + 1 :])
     with tempfile.TemporaryDirectory(prefix="calibrate-") as folder:
         done = run_shown(replace(system, components=components), Path(folder), quiet=False)
-        for assessment in done.assessments():
-            if assessment.quality.contact == task.contact:
-                say(f"{task.parameter} = {value:.6g}: mean force {assessment.quality.mean:.3f} N")
-                return assessment.quality.mean
-    raise MasterError(
-        f"contact {task.contact} has no figures in the interval of interest; so there is nothing to calibrate"
-    )
+        mean = calibration.mean_force(done, task)
+    say(f"{task.parameter} = {value:.6g}: mean force {mean:.3f} N")
+    return mean
 
 
 def _place(package: Package, parameter: str) -> tuple[Path, str]:

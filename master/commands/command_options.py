@@ -17,6 +17,7 @@ from master.report.progress import progress_shown
 from master.report.terminal_summary import Terminal
 from master.scenario.overrides import Overrides
 from master.ssp.run_settings import SCHEMES
+from master.ssp.ssp_units import split_quantity
 from master.system.components import System
 
 
@@ -57,7 +58,8 @@ def finite_number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or "_" in text or not text.isascii():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+        advice = "; write it without its unit" if split_quantity(text)[1] else ""
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number{advice}")
     return value
 
 
@@ -101,7 +103,8 @@ def add_verb(
     parser: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text)
     parser.set_defaults(verb=verb)
     if scenario:
-        parser.add_argument("scenario", type=Path, metavar="SCENARIO", help="folder NAME.ssp/ or archive NAME.ssp")
+        text = "folder NAME.ssp/, archive NAME.ssp, folder of a project, or name of a scenario in the library"
+        parser.add_argument("scenario", type=Path, metavar="SCENARIO", help=text)
         parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
     return parser
 

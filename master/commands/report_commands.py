@@ -10,14 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from master.commands.command_options import add_verb
-from master.errors import MasterError
+from master.commands.command_options import add_verb, finite_number
+from master.errors import MasterError, UsageError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
 from master.report.charts.measured_charts import comparison_rows
-from master.report.comparison_page import columns, comparison_page
-from master.report.film_file import FilmOptions, write_film
+from master.report.comparison_page import MOST_INPUTS, columns, comparison_page, run_names
+from master.report.film_file import FilmOptions, check_name, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
+from master.report.run_inputs import differing_inputs
 from master.report.terminal_summary import WIDTH, Terminal
 from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
 from master.results.run_results import Results
@@ -31,6 +32,12 @@ def add_report(verbs: Any) -> None:
     parser = add_verb(verbs, "report", text, _report)
     parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
     parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to compare with")
+    parser.add_argument(
+        "--measured-offset",
+        type=finite_number,
+        metavar="D",
+        help="added to the measured positions [m] or times [s]; where they fall, the track position is D less them",
+    )
     parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
     parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
     parser.add_argument(
@@ -41,13 +48,17 @@ def add_report(verbs: Any) -> None:
 
 def _report(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is asked for."""
+    if options.measured_offset is not None and not options.measured:
+        raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
+    if options.film:
+        check_name(options.film)
     results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
         summary = {**done.summary, **run_summary.figures(done), "format": results_folder.FORMAT}
         summary["settings"] = {**summary.get("settings", {}), "filter": run_summary.filter_data(done.evaluation.filter)}
         done = replace(done, summary=summary)
-        measured = _measured(done, options.measured, options.contact) if options.measured else None
+        measured = _measured(done, options) if options.measured else None
         results_folder.write_forces(done.folder, done.signals)
         results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
         print(report_files.write(done, measured))
@@ -90,13 +101,13 @@ def report_what_there_is(folder: Path) -> None:
         return  # it stopped before anything was recorded; the caller reports the error itself
 
 
-def _measured(done: Results, path: Path, contact: int) -> MeasuredComparison:
-    signals = [s for s in done.signals if s.contact.index == contact]
+def _measured(done: Results, options: argparse.Namespace) -> MeasuredComparison:
+    signals = [s for s in done.signals if s.contact.index == options.contact]
     if not signals:
         raise MasterError(
-            f"{done.folder} has no contact {contact} with a recorded force; choose another with --contact"
+            f"{done.folder} has no contact {options.contact} with a recorded force; choose another with --contact"
         )
-    return compare_measured(signals[0], read_measured(path))
+    return compare_measured(signals[0], read_measured(options.measured), options.measured_offset)
 
 
 def _say_measured(measured: MeasuredComparison) -> None:
@@ -146,7 +157,8 @@ def _show(
 ) -> None:
     console = Terminal(width=WIDTH, highlight=False)
     found = columns(runs)
-    heads = ["first", "second"] if len(found) == 2 else [c.name for c in found]
+    heads = [c.name for c in found]
+    _show_inputs(console, runs)
     console.print(
         result_tables.figures_table([c.assessment for c in found], heads, [r.evaluation.filter for r in runs])
     )
@@ -160,6 +172,18 @@ def _show(
         console.print(f"report in {options.report}", markup=False, soft_wrap=True)
 
 
+def _show_inputs(console: Terminal, runs: Sequence[Results]) -> None:
+    """Print what differs in the inputs of runs."""
+    rows = differing_inputs([run.summary for run in runs])
+    if not rows:
+        console.print("the inputs are the same")
+        return
+    heads = ["input that differs", *run_names([run.folder for run in runs])]
+    console.print(result_tables.plain_table(heads, rows[:MOST_INPUTS]))
+    if len(rows) > MOST_INPUTS:
+        console.print(f"and {len(rows) - MOST_INPUTS} more inputs; --report FILE lists them all", markup=False)
+
+
 def _as_json(c: run_difference.RunDifference, first: Results, other: Results) -> Mapping[str, Any]:
     names = ("mean", "sigma", "minimum", "maximum")
     one, two = c.first.quality, c.second.quality
@@ -169,4 +193,5 @@ def _as_json(c: run_difference.RunDifference, first: Results, other: Results) ->
     notes = list(run_difference.setting_notes([first, other]))
     forces = {"rms": c.rms, "largest": c.largest, "apart": c.apart}
     known = {"notes": notes, "contact": one.contact, "difference": difference, **forces}
-    return {**known, "filters": filters, "same_filter": same}
+    inputs = {name: values for name, *values in differing_inputs([first.summary, other.summary])}
+    return {**known, "filters": filters, "same_filter": same, "inputs": inputs}

@@ -22,6 +22,7 @@ from master.commands.command_options import (
 from master.coupling.fmu_warnings import FmuWarningObserver
 from master.errors import RequestError, RunError, UsageError
 from master.fmu.isolation.isolated_instance import INIT_TIMEOUT, Isolation
+from master.interface.scenario_runs import keep_apart
 from master.recording import checkpoint
 from master.recording.continuation import Continuation
 from master.report import report_files
@@ -29,10 +30,9 @@ from master.report.progress import ProgressObserver
 from master.report.terminal_summary import Terminal, printable_json, show_run
 from master.results import parquet_export, results_folder
 from master.results.run_results import Results
-from master.run import RunOptions, run
+from master.run_session import RunOptions, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
-from master.ssp.archive import Package
 from master.system.components import System
 from master.system.step_rounding import adjustments
 
@@ -96,7 +96,7 @@ def _run(options: argparse.Namespace) -> int:
     run_options = _run_options(options)
     with open_scenario(options.scenario, _run_overrides(options), note, not options.no_build) as scenario:
         folder = _folder(options, scenario.system)
-        _protect(folder, scenario.package)
+        keep_apart(folder, scenario.package)
         say_warnings(scenario.system, note)
         with results_folder.claimed(folder):  # until the report is written too
             try:
@@ -138,13 +138,6 @@ def _folder(options: argparse.Namespace, system: System) -> Path:
             f"{resumed / checkpoint.NAME} to begin a new run from it"
         )
     return resumed
-
-
-def _protect(folder: Path, package: Package) -> None:
-    if folder.resolve().is_relative_to(package.root) or package.root.is_relative_to(folder.resolve()):
-        raise RequestError(
-            f"the results folder {folder} and the scenario lie inside each other; choose another with --out"
-        )
 
 
 def _run_options(options: argparse.Namespace) -> RunOptions:

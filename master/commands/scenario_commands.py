@@ -13,12 +13,14 @@ from master.fmu.fmu_provision import write_runtime
 from master.report.terminal_summary import tolerance_words
 from master.scenario import scenario_advice
 from master.scenario.open_scenario import open_scenario
+from master.scenario.scenario_place import fmu_cache
 from master.ssp.archive import SSD_NAME
 from master.ssp.pack import left_out, pack
 from master.system.step_rounding import adjustments
 
-#: Where an archive holds one Python for all its FMUs.
-_RUNTIME: Final = "resources/runtime"
+#: Where an archive holds its FMUs, and one Python for them all.
+_RESOURCES: Final = "resources"
+_RUNTIME: Final = f"{_RESOURCES}/runtime"
 
 
 def add_validate(verbs: Any) -> None:
@@ -63,6 +65,8 @@ def _pack(options: argparse.Namespace) -> int:
         root = scenario.package.root
         with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
             added = {_RUNTIME: _runtime(Path(folder))} if options.standalone else {}
+            if (built := fmu_cache(root)) is not None:
+                added[_RESOURCES] = built
             print(pack(root, archive, added))
         if names := left_out(root):
             say(f"left out, because {SSD_NAME} does not name it: {', '.join(names)}")

@@ -19,6 +19,7 @@ from master.batch.study.variants import calibrate_variant
 from master.commands.command_options import add_verb, batch_runner
 from master.errors import UsageError
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
+from master.scenario.scenario_place import refuse_installed
 
 
 def add_study(verbs: Any) -> None:
@@ -77,6 +78,7 @@ def _calibrated(
     family: Family, chosen: Sequence[Variant], options: argparse.Namespace, runner: Runner
 ) -> tuple[Family, tuple[Variant, ...]]:
     """Find and store the forces of variants, one after the other; return the family as it is then."""
+    refuse_installed(family.folder)
     for variant in chosen:
         with unchanged(family.folder) as check:
             found = calibrate_variant(family, variant, runner)

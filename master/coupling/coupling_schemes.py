@@ -1,12 +1,12 @@
 """Coupling schemes: which slave receives what, and when, within a macro step.
 
-To add one, write a class with ``name`` and ``step`` and put it into `ALGORITHMS`, its name into
+To add one, write a class with ``name`` and ``step`` and put it into `_SCHEMES`, its name into
 ``master.ssp.run_settings.Scheme`` and its options into ``OPTIONS`` there: `tests/test_registries.py` walks all three.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, Protocol
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from master.arrays import FloatArray
 from master.coupling.network import Network
 from master.errors import RunError
-from master.ssp.run_settings import Coupling, Scheme
+from master.ssp.run_settings import Coupling
 
 #: Exchanges at the start before the values must be consistent, and their relative tolerance.
 MAX_INITIAL_EXCHANGES: Final = 50
@@ -174,12 +174,9 @@ class Iterative:
         return change
 
 
+_SCHEMES: Final[tuple[type[Algorithm], ...]] = (Jacobi, GaussSeidel, Iterative)
 #: What makes the schemes, out of their options.
-ALGORITHMS: Final[dict[Scheme, Callable[..., Algorithm]]] = {
-    "jacobi": Jacobi,
-    "gauss-seidel": GaussSeidel,
-    "iterative": Iterative,
-}
+ALGORITHMS: Final = {scheme.name: scheme for scheme in _SCHEMES}
 
 
 def make_algorithm(coupling: Coupling) -> Algorithm:

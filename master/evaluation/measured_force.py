@@ -24,12 +24,14 @@ _FORCES: Final = ("f", "fc", "force", "contact force")
 #: Units of each kind of column and their factors.
 _LENGTHS: Final = {"m": 1.0, "km": 1e3, "": 1.0}
 _DURATIONS: Final = {"s": 1.0, "ms": 1e-3, "": 1.0}
-_NEWTONS: Final = {"n": 1.0, "kn": 1e3, "": 1.0}
+_NEWTONS: Final = {"n": 1.0, "dan": 10.0, "kn": 1e3, "": 1.0}
+#: What begins a line that is a comment.
+_COMMENTS: Final = ("#", "%", "//")
 #: Magnitude beyond which no time, position or force lies; sums and squares stay finite.
 _LARGEST: Final = 1e12
 #: Share of the interval of interest that counts as all of it: rows of a measurement seldom lie on its ends.
 _WHOLE: Final = 0.99
-_SPELLED: Final = {"m": "m", "km": "km", "s": "s", "ms": "ms", "n": "N", "kn": "kN"}
+_SPELLED: Final = {"m": "m", "km": "km", "s": "s", "ms": "ms", "n": "N", "dan": "daN", "kn": "kN"}
 
 
 @dataclass(frozen=True)
@@ -43,13 +45,18 @@ class Measurement:
     over_time : bool
         Whether the abscissa is time [s] rather than track position [m].
     abscissa, force : ndarray, shape (n,)
-        Increasing abscissa, and force [N].
+        Increasing abscissa, or falling position, and force [N].
     """
 
     source: str
     over_time: bool
     abscissa: FloatArray
     force: FloatArray
+
+    @property
+    def falls(self) -> bool:
+        """Whether positions fall from row to row, as where a train runs against the kilometrage."""
+        return bool(self.abscissa[-1] < self.abscissa[0])
 
 
 @dataclass(frozen=True)
@@ -59,7 +66,7 @@ class MeasuredComparison:
     Attributes
     ----------
     source : str
-        File name of the measurement.
+        File name of the measurement, and how its abscissa was moved.
     pantograph : str
         The simulated one.
     position, simulated, measured : ndarray, shape (n,)
@@ -109,14 +116,15 @@ class MeasuredComparison:
 def read_measured(path: Path) -> Measurement:
     """Read a CSV file with a header: one column of position or time, one of force; units in brackets.
 
-    Positions may be in m or km, times in s or ms, forces in N or kN. Columns are separated by commas or
-    semicolons; further columns are ignored.
+    Positions may be in m or km, times in s or ms, forces in N, daN or kN. Columns are separated by commas, semicolons
+    or tabs; further columns, and lines that begin with ``#``, ``%`` or ``//``, are ignored. Numbers may have a decimal
+    comma. Positions may fall.
 
     Raises
     ------
     MasterError
         If it cannot be read, a column is missing, present twice or in another unit, a cell is not a finite number,
-        or the abscissa does not increase.
+        or the abscissa does not increase (positions: neither increase nor fall).
     """
     rows = _rows(path)
     titles = [_title(t) for t in rows[0].cells] if rows else []
@@ -126,9 +134,12 @@ def read_measured(path: Path) -> Measurement:
         raise MasterError(f"{path} has no column named force (e.g. 'force [N]')")
     for row in rows[1:]:
         if len(row.cells) != len(titles):
-            raise MasterError(f"{path}:{row.line}: has {len(row.cells)} cells, the head has {len(titles)}")
+            text = f"{path}:{row.line}: has {len(row.cells)} cells, the head has {len(titles)}"
+            comma = "; numbers with a decimal comma need columns separated by semicolons or tabs"
+            raise MasterError(text + (comma if len(row.cells) == 2 * len(titles) else ""))
     known = _DURATIONS if over_time else _LENGTHS
     factors = (_factor(path, titles[place], known), _factor(path, titles[force], _NEWTONS))
+    _check_marks(path, rows[1:], (place, force))
     values = [_column(path, rows[1:], i, f) for i, f in zip((place, force), factors, strict=True)]
     return _checked(path, over_time, rows[1:], *values)
 
@@ -143,8 +154,9 @@ class _Row:
 
 def _rows(path: Path) -> list[_Row]:
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-        reader = csv.reader(lines, delimiter=";" if lines and ";" in lines[0] else ",")
+        lines = [_without_comment(line) for line in path.read_text(encoding="utf-8-sig").splitlines()]
+        head = next(filter(None, lines), "")
+        reader = csv.reader(lines, delimiter=next((mark for mark in ";\t" if mark in head), ","))
         return [_Row(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
     except OSError as error:
         raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
@@ -152,6 +164,21 @@ def _rows(path: Path) -> list[_Row]:
         raise MasterError(f"{path} is not UTF-8 text (byte {error.start})") from error
     except csv.Error as error:
         raise MasterError(f"{path} is not a table of separated values ({error})") from error
+
+
+def _without_comment(line: str) -> str:
+    """Return a line, empty if it is a comment or blank: so that the next ones keep their numbers."""
+    return "" if not line.strip() or line.lstrip().startswith(_COMMENTS) else line
+
+
+def _check_marks(path: Path, rows: Sequence[_Row], columns: Sequence[int]) -> None:
+    """Refuse a table with decimal commas in some numbers and points in others: one of them groups thousands."""
+    marks = {mark: row.line for row in rows for i in columns for mark in ",." if mark in row.cells[i]}
+    if len(marks) > 1:
+        where = f"a comma in line {marks[',']} and a point in line {marks['.']}"
+        raise MasterError(
+            f"{path}: numbers have {where}; write all with one decimal mark and nothing between thousands"
+        )
 
 
 def _title(title: str) -> tuple[str, str]:
@@ -192,7 +219,7 @@ def _column(path: Path, rows: Sequence[_Row], index: int, factor: float) -> Floa
 def _number(path: Path, row: _Row, index: int) -> float:
     text = row.cells[index].strip()
     try:
-        value = float(text)
+        value = float(text.replace(",", "."))
     except ValueError:
         value = math.nan
     # Python accepts 1_000, and the digits of every script; in a table they are typing errors.
@@ -204,25 +231,66 @@ def _number(path: Path, row: _Row, index: int) -> float:
 def _checked(path: Path, over_time: bool, rows: Sequence[_Row], abscissa: FloatArray, force: FloatArray) -> Measurement:
     if len(abscissa) < 3:
         raise MasterError(f"{path} must hold at least three rows of numbers; it holds {len(abscissa)}")
-    back = np.flatnonzero(np.diff(abscissa) <= 0.0)
+    falls = not over_time and abscissa[-1] < abscissa[0]
+    back = np.flatnonzero(np.diff(-abscissa if falls else abscissa) <= 0.0)
     if back.size:
         line, what = rows[int(back[0]) + 1].line, "time" if over_time else "position"
         value = rows[int(back[0]) + 1].cells
-        text = f"the {what} does not increase from the row before ({one_line(', '.join(value))})"
+        text = (
+            f"the {what} does not {'fall' if falls else 'increase'} from the row before ({one_line(', '.join(value))})"
+        )
         raise MasterError(f"{path}:{line}: {text}")
     return Measurement(path.name, over_time, abscissa, force)
 
 
-def compare_measured(s: Signals, measurement: Measurement) -> MeasuredComparison:
-    """Compare a measurement with a simulated contact; both are low-passed with the filter of the run.
+def placed(s: Signals, measurement: Measurement, offset: float | None) -> Measurement:
+    """Return a measurement over the simulation's time or track position, increasing.
 
-    The measured force is interpolated to the instants of the simulation, then filtered as the simulated one is.
+    Where one of the two runs to rising positions and the other to falling ones, a position of the simulation is
+    ``offset`` less the measured one; otherwise the two are added.
 
     Raises
     ------
     MasterError
-        If it does not overlap the interval of interest.
+        If they run in opposite directions and no offset is given.
     """
+    unit, what = ("s", "times") if measurement.over_time else ("m", "positions")
+    is_opposite = not measurement.over_time and measurement.falls != bool(s.position[-1] < s.position[0])
+    if is_opposite and offset is None:
+        ends = sorted(float(measurement.abscissa[i] + s.position[s.inside][j]) for i in (0, -1) for j in (0, -1))
+        raise MasterError(
+            f"{measurement.source}: the position {'falls' if measurement.falls else 'rises'}, that of the simulated "
+            "pantograph does not; give --measured-offset D, and the track position is D less the measured one "
+            f"(D between {ends[0]:g} m and {ends[-1]:g} m)"
+        )
+    if offset is None:
+        moved, source = measurement.abscissa, measurement.source
+    elif is_opposite:
+        moved, source = offset - measurement.abscissa, f"{measurement.source}, at {offset:g} m less its positions"
+    else:
+        moved, source = measurement.abscissa + offset, f"{measurement.source}, its {what} {offset:+g} {unit}"
+    order = slice(None, None, -1 if moved[-1] < moved[0] else 1)
+    return Measurement(source, measurement.over_time, moved[order], measurement.force[order])
+
+
+def compare_measured(s: Signals, measurement: Measurement, offset: float | None = None) -> MeasuredComparison:
+    """Compare a measurement with a simulated contact; both are low-passed with the filter of the run.
+
+    The measured force is interpolated to the instants of the simulation, then filtered as the simulated one is.
+
+    Parameters
+    ----------
+    s : Signals
+    measurement : Measurement
+    offset : float, optional
+        What is added to the measured times [s] or positions [m]; see `placed`.
+
+    Raises
+    ------
+    MasterError
+        If it does not overlap the interval of interest, or the directions differ without an offset.
+    """
+    measurement = placed(s, measurement, offset)
     there = s.time if measurement.over_time else s.position
     known = (there >= measurement.abscissa[0]) & (there <= measurement.abscissa[-1])
     both = known & s.inside & np.isfinite(s.shown)
@@ -230,13 +298,18 @@ def compare_measured(s: Signals, measurement: Measurement) -> MeasuredComparison
         first, last = measurement.abscissa[0], measurement.abscissa[-1]
         unit = "s" if measurement.over_time else "m"
         raise MasterError(
-            f"{measurement.source} ({first:g} {unit} to {last:g} {unit}) lies outside the interval of interest"
+            f"{measurement.source} ({first:g} {unit} to {last:g} {unit}) lies outside the interval of interest "
+            f"({_span(there[s.inside], unit)}); --measured-offset D moves it"
         )
     filtered = _filtered(s, measurement, there, known)
     texts = _part(s, both), _coarse(s, measurement, there, both)
     return MeasuredComparison(
         measurement.source, s.contact.pantograph, s.position[both], s.filtered[both], filtered[both], *texts
     )
+
+
+def _span(places: FloatArray, unit: str) -> str:
+    return f"{places.min():g} {unit} to {places.max():g} {unit}" if places.size else "which the run does not reach"
 
 
 def _part(s: Signals, both: BoolArray) -> str:
@@ -249,7 +322,7 @@ def _part(s: Signals, both: BoolArray) -> str:
 def _coarse(s: Signals, measurement: Measurement, there: FloatArray, both: BoolArray) -> str:
     """Return a warning if neighbouring rows are too far apart to resolve the force up to the cut-off."""
     rows = np.interp(measurement.abscissa, *_increasing(there[both], s.time[both]), left=np.nan, right=np.nan)
-    times = np.concatenate(([s.time[both][0]], rows[np.isfinite(rows)], [s.time[both][-1]]))
+    times = np.concatenate(([s.time[both][0]], np.sort(rows[np.isfinite(rows)]), [s.time[both][-1]]))
     longest, needed = float(np.diff(times).max()), 0.5 / s.filter.cutoff
     if longest <= needed * (1.0 + 1e-6):
         return ""

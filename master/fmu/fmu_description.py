@@ -63,6 +63,7 @@ def read_fmu(path: Path) -> Fmu:
         units=_units(description.unitDefinitions, f"{path.name} ({_DESCRIPTION})"),
         tolerance=_tolerance(description.defaultExperiment),
         is_single=bool(description.coSimulation.canBeInstantiatedOnlyOncePerProcess),
+        description=description.description or "",
     )
 
 

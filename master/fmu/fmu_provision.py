@@ -50,7 +50,7 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
     tell : callable
         Called with what takes time, and what is kept.
     scratch : Path, optional
-        Folder to build into instead, where nothing may be written next to ``path``.
+        Folder to build into instead, where nothing may be written next to ``path``; what it holds is used if it fits.
 
     Returns
     -------
@@ -75,7 +75,9 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
         tell(f"{path.name} is used as it is: {why}; to have it rebuilt, remove it")
         return path
     place = scratch / path.name if scratch else path
-    tell(f"building {path.name}" + (" again: its sources have changed" if path.is_file() else ""))
+    if place.is_file() and _matches(wanted, stored_guid(place)):
+        return place
+    tell(f"building {path.name}" + (" again: its sources have changed" if place.is_file() else ""))
     build(place, origin)
     return place
 
@@ -227,11 +229,13 @@ def _matches(fingerprint: str, guid: str) -> bool:
 
 
 def _fmus(*arguments: str, seconds: float) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fmus", *arguments]
+    command = [sys.executable, "-P", "-m", "fmus", *arguments]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(_places())}
     return subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False, env=environment)
 
 
 def _places() -> list[str]:
-    """Return where modules come from, without the folders (each with a pythonfmu) that FMUs run here have left."""
-    return [place for place in sys.path if not (Path(place) / "slavemodule.txt").is_file()]
+    """Return where modules come from: not the working folder, nor those (each with a pythonfmu) that FMUs have left."""
+    own = str(Path(__file__).resolve().parents[2])
+    places = [place for place in sys.path if place and not (Path(place) / "slavemodule.txt").is_file()]
+    return places if own in places else [*places, own]

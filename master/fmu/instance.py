@@ -241,8 +241,8 @@ class Instance:
         if not self._dead:
             self._dead = True
             self._fmu.freeInstance()
-            self._unpacked.release()
-        self._unpacked.remove()
+            self._extracted.release()
+        self._extracted.remove()
         return said
 
     def error(self, doing: str, status: int, why: str = "") -> SlaveError:
@@ -287,7 +287,7 @@ class Instance:
     def _load(self) -> Any:
         fmu = self.component.fmu
         try:
-            self._unpacked = unpacked = ExtractedFmu(fmu)
+            self._extracted = extracted = ExtractedFmu(fmu)
         except Exception as error:
             raise self._unloadable(error) from error
         try:
@@ -295,11 +295,11 @@ class Instance:
                 instanceName=self.name,
                 guid=fmu.guid,
                 modelIdentifier=fmu.identifier,
-                unzipDirectory=unpacked.folder,
+                unzipDirectory=extracted.folder,
             )
             slave.instantiate(callbacks=fmi_log.CALLBACKS, loggingOn=True)
         except Exception as error:  # FMPy raises bare exceptions
-            unpacked.remove()
+            extracted.remove()
             raise self._unloadable(error) from error
         return slave
 

@@ -10,7 +10,7 @@ from master.arrays import FloatArray
 from master.coupling.coupling_schemes import Algorithm, initialise
 from master.coupling.macro_steps import TimeGrid
 from master.coupling.network import Network
-from master.errors import RequestError, RunError
+from master.errors import RequestError, RunError, hint
 from master.recording.checkpoint import Checkpoint, scheme_options, storable
 from master.system.components import Component, System
 from master.system.step_rounding import ROUNDING
@@ -53,7 +53,8 @@ class Continuation:
             Naming every difference.
         """
         unknown = [name for name in self.renewed if name not in {c.name for c in system.components}]
-        found = [f"there is no component '{name}' to renew" for name in unknown]
+        names = [c.name for c in system.components]
+        found = [f"there is no component '{name}' to renew{hint(name, names)}" for name in unknown]
         for component in system.components:
             if component.name not in self.renewed:
                 found += _differences(component, self.checkpoint.components.get(component.name))

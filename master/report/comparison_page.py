@@ -20,10 +20,13 @@ from master.report.charts.line_charts import line_marks
 from master.report.charts.uplift_charts import support_bars
 from master.report.result_tables import figure_rows
 from master.report.run_inputs import differing_inputs, quality_rows
+from master.report.run_names import short_names
 from master.report.run_page import status_note
 from master.results.run_difference import setting_notes
 from master.results.run_results import Results
 
+#: Inputs that differ which are shown at once.
+MOST_INPUTS: Final = 15
 _BANDS: Final = ("0-2", "0-5", "5-20")
 
 
@@ -67,9 +70,9 @@ def columns(runs: Sequence[Results]) -> tuple[Column, ...]:
 def _columns(name: str, run: Results) -> list[Column]:
     by_contact = {s.contact: s for s in run.signals}
     assessments = [a for a in run.assessments() if a.contact in by_contact]
-    several = len(assessments) > 1
+    several, short = len(assessments) > 1, short_names(run.summary)
     return [
-        Column(f"{name}, {a.contact.pantograph}" if several else name, run, a, by_contact[a.contact])
+        Column(f"{name}, {short[a.contact.pantograph]}" if several else name, run, a, by_contact[a.contact])
         for a in assessments
     ]
 
@@ -105,11 +108,9 @@ def comparison_page(runs: Sequence[Results]) -> str:
     names = [c.name for c in found]
     body = [
         f"<h1>{html_markup.text(' | '.join(dict.fromkeys(names)))}</h1>",
-        *(
-            f"<p class='note'>{html_markup.text(r.folder.name)}</p>{note}"
-            for r in runs
-            if (note := status_note(r.summary))
-        ),
+        *map(_note, run_names([r.folder for r in runs]), runs),
+        *_input_section(runs),
+        "<h2>Verdict</h2>",
         *map(_verdict, found),
         *(f"<p class='warning'>Warning: {html_markup.text(note)}.</p>" for note in setting_notes(runs)),
         "<h2>Figures</h2>",
@@ -117,10 +118,16 @@ def comparison_page(runs: Sequence[Results]) -> str:
         f"<p class='note'>In brackets: difference from {html_markup.text(names[0])}. {_filters(runs)}</p>",
         "<h2>Curves</h2>",
         *map(html_markup.chart, charts),
-        *_input_section(runs),
         *_quality_section(runs),
     ]
     return html_markup.document(f"comparison: {', '.join(names)}", body, charts)
+
+
+def _note(name: str, run: Results) -> str:
+    """Return what a run is, and a warning if it is not complete."""
+    scenario, title = run.summary.get("scenario", ""), run.summary.get("title", "")
+    what = f"{name}: {title}, scenario {scenario}" if title else f"{name}: scenario {scenario}"
+    return f"<p class='note'>{html_markup.text(what)}</p>{status_note(run.summary)}"
 
 
 def _verdict(c: Column) -> str:
@@ -217,7 +224,10 @@ def _input_section(runs: Sequence[Results]) -> list[str]:
         return []
     rows = differing_inputs([run.summary for run in runs])
     heads = ["input", *run_names([run.folder for run in runs])]
-    shown = html_markup.table(heads, rows) if rows else "<p>The inputs are the same.</p>"
+    shown = html_markup.table(heads, rows[:MOST_INPUTS], numbers=False) if rows else "<p>The inputs are the same.</p>"
+    if rest := rows[MOST_INPUTS:]:
+        more = f"<summary>{len(rest)} more</summary>"
+        shown += f"<details>{more}{html_markup.table(heads, rest, numbers=False)}</details>"
     return ["<h2>Inputs that differ</h2>", shown]
 
 

@@ -69,11 +69,16 @@ def write_film(movie: Movie, path: Path, options: FilmOptions) -> Path:
     return path
 
 
+def check_name(path: Path) -> None:
+    """Refuse a name that does not say of which of the two kinds a film is."""
+    if path.suffix not in (".gif", ".mp4"):
+        raise MasterError(f"{path}: a film must be named .gif or .mp4")
+
+
 def _writer(path: Path) -> AbstractMovieWriter:
+    check_name(path)
     if path.suffix == ".gif":
         return PillowWriter(fps=_RATE)
-    if path.suffix != ".mp4":
-        raise MasterError(f"{path}: a film must be named .gif or .mp4")
     if not FFMpegWriter.isAvailable():
         raise MasterError("an MP4 film needs ffmpeg, which is not installed; write a .gif instead")
     return FFMpegWriter(fps=_RATE, codec="libx264", extra_args=["-pix_fmt", "yuv420p", "-crf", "26"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -74,13 +75,23 @@ class Headline:
     is_at_limit: bool = False
 
 
+def figure_values(assessment: Assessment) -> dict[str, float]:
+    """Return the figures of a contact by title with unit; NaN where there is none."""
+    found = ((_titled(title, unit), get(assessment)) for title, unit, get, _ in _FIGURES)
+    return {title: math.nan if value is None else float(value) for title, value in found}
+
+
+def _titled(title: str, unit: str) -> str:
+    return f"{title} [{unit}]" if unit else title
+
+
 def figure_rows(assessments: Sequence[Assessment]) -> list[tuple[str, ...]]:
     """Return the rows of the table of figures: title with unit, then one value per contact."""
     rows = []
     for title, unit, get, decimals in _FIGURES:
         values = [get(a) for a in assessments]
         shown = ["-" if v is None else f"{v:.{decimals}f}" for v in values]
-        rows.append((f"{title} [{unit}]" if unit else title, *shown))
+        rows.append((_titled(title, unit), *shown))
     return rows
 
 
@@ -164,7 +175,7 @@ def plain_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     """Return a table in which all columns but the first hold numbers."""
     table = Table(width=78)
     for i, head in enumerate(heads):
-        table.add_column(escape(head), justify="right" if i else "left")
+        table.add_column(escape(head), justify="right" if i else "left", overflow="fold")
     for row in rows:
         table.add_row(*map(escape, row))
     return table

@@ -82,24 +82,42 @@ def number(value: Any) -> str:
 
 
 def differing_inputs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Return the parameters that are not the same in all runs: name with unit, then one value per run."""
-    tables = [_table(summary) for summary in runs]
-    names = list(dict.fromkeys(name for table in tables for name in table))
-    rows = [(name, *(table.get(name, "-") for table in tables)) for name in names]
-    return [row for row in rows if len(set(row[1:])) > 1]
+    """Return what is not the same in all runs: name with unit, then one value per run.
+
+    First what the scenario is and how it is coupled, then the parameters that a scenario or a command line set.
+    """
+    parameters = [_parameters(summary) for summary in runs]
+    are_set = {name for table in parameters for name, i in table.items() if i.changed}
+    values = [{name: i.value for name, i in table.items()} for table in parameters]
+    first = [{name: value for name, value in table.items() if name in are_set} for table in values]
+    rows = [row for tables in (list(map(_settings, runs)), first, values) for row in _rows(tables)]
+    return list(dict.fromkeys(row for row in rows if len(set(row[1:])) > 1))
 
 
-def _table(summary: Mapping[str, Any]) -> dict[str, str]:
+def _rows(tables: Sequence[Mapping[str, str]]) -> list[tuple[str, ...]]:
+    names = dict.fromkeys(name for table in tables for name in table)
+    return [(name, *(table.get(name, "-") for table in tables)) for name in names]
+
+
+def _parameters(summary: Mapping[str, Any]) -> dict[str, Input]:
+    return {
+        f"{component['name']}.{i.name}" + (f" [{i.unit}]" if i.unit else ""): i
+        for component in summary.get("components", [])
+        for i in inputs_of(component)
+    }
+
+
+def _settings(summary: Mapping[str, Any]) -> dict[str, str]:
     settings = summary.get("settings", {})
     coupling = settings.get("coupling", {})
-    found = {"scheme": str(coupling.get("scheme", "-")), "step [s]": number(settings.get("step"))}
+    found = {"scenario": str(summary.get("scenario") or "-")}
+    for component in summary.get("components", []):
+        found[component["name"]] = component.get("description") or "-"
+        found[f"FMU of {component['name']}"] = f"{component.get('fmu', '-')} ({component.get('sha256', '-')[:8]})"
+    found |= {"scheme": str(coupling.get("scheme", "-")), "step [s]": number(settings.get("step"))}
     found |= {f"scheme, {name}": text for name, text in scheme_options(coupling)}
     for section in ("interval", "filter", "limits"):
-        found |= {f"{section}, {k}": str(v) for k, v in (settings.get(section) or {}).items() if v is not None}
-    for component in summary.get("components", []):
-        found[f"FMU of {component['name']}"] = f"{component.get('fmu', '-')} ({component.get('sha256', '-')[:8]})"
-        for i in inputs_of(component):
-            found[f"{component['name']}.{i.name}" + (f" [{i.unit}]" if i.unit else "")] = i.value
+        found |= {f"{section}, {k}": number(v) for k, v in (settings.get(section) or {}).items() if v is not None}
     return found
 
 
@@ -131,15 +149,28 @@ def quality_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows += [(f"tolerance passed to the FMU of {name}", f"{value:g}") for name, value in tolerances.items()]
     rows += [(f"{name} of the scheme", text) for name, text in scheme_options(coupling)]
     rows += [("adjusted", text) for text in summary.get("adjustments", [])]
+    rows += residual_rows(summary)
+    rows += [(f"energy drift, {b['what']}", b["text"]) for b in summary.get("energy", [])]
+    if performance:
+        rows += _performance_rows(performance)
+    return rows
+
+
+def residual_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return for every contact the energy that the coupling added, positive, or took away.
+
+    Examples
+    --------
+    >>> residual_rows({"interface_power": [{"contact": 1, "energy": 0.5, "transferred": 20.0, "rms": 1.0}]})
+    [('interface residual, contact 1', '0.5 J of 20 J exchanged (2.50 %), rms 1 W')]
+    """
+    rows = []
     for p in summary.get("interface_power", []):
         text = "not finite: the values exchanged were too large"
         if None not in (p["energy"], p["transferred"], p["rms"]):
             share = 100.0 * p["energy"] / p["transferred"] if p["transferred"] else 0.0
             text = f"{p['energy']:.3g} J of {p['transferred']:.4g} J exchanged ({share:.2f} %), rms {p['rms']:.3g} W"
         rows.append((f"interface residual, contact {p['contact']}", text))
-    rows += [(f"energy, {b['what']}", b["text"]) for b in summary.get("energy", [])]
-    if performance:
-        rows += _performance_rows(performance)
     return rows
 
 

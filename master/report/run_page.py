@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +19,7 @@ from master.report.charts.run_charts import run_charts
 from master.report.moving_picture import Movie, make_movie
 from master.report.result_tables import FILTER_HEADS, calibration_line, figure_rows, filter_rows, uplift_line
 from master.report.run_inputs import Input, inputs_of, provenance_rows, quality_rows
+from master.report.run_names import coupled_models, short_names
 from master.results.run_results import Results
 
 _CONTENTS: Final = (
@@ -45,15 +47,15 @@ def page(done: Results, measured: MeasuredComparison | None = None) -> str:
         A measured contact force to show beside it.
     """
     summary, signals, assessments = done.summary, done.signals, done.assessments()
-    is_coupling = has_contacts(done)
+    is_coupling, names = has_contacts(done), short_names(summary)
     charts = run_charts(done, signals) if is_coupling else output_charts(done)
     extra = [comparison_chart(measured)] if measured is not None else []
     movie = make_movie(done, signals)
     body = [
         _head(done, assessments, is_coupling),
         *([] if is_coupling else _outputs(done, charts)),
-        _figures(done, assessments),
-        _spans(assessments),
+        _figures(done, assessments, names),
+        _spans(assessments, names),
         *(_measured(measured, extra[0]) if measured is not None else ()),
         *_section("force", "Contact force", [c for c in charts if is_coupling and not c.key.startswith(_LINE_CHARTS)]),
         *(_movie(movie, signals) if movie is not None else ()),
@@ -62,7 +64,7 @@ def page(done: Results, measured: MeasuredComparison | None = None) -> str:
         _computed(summary),
     ]
     contents = "".join(f"<a href='#{k}'>{t}</a>" for k, t in _CONTENTS if any(f"id='{k}'" in part for part in body))
-    title = f"{summary.get('scenario', '')}: {_subject(is_coupling)}"
+    title = f"{summary.get('scenario', '')}: {summary.get('title') or _subject(is_coupling)}"
     return html_markup.document(title, [f"<nav>{contents}</nav>", *body], [*charts, *extra], movie)
 
 
@@ -78,11 +80,10 @@ def _outputs(done: Results, charts: list[Chart]) -> list[str]:
 
 def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool = True) -> str:
     summary, limits = done.summary, done.evaluation.limits
-    name = html_markup.text(summary.get("scenario", ""))
-    key = "verdict" if is_coupling else "run"
-    parts = [f"<section id='{key}'><h1>{name}: {_subject(is_coupling)}</h1>", status_note(summary)]
-    parts.append(_cautions(summary))
-    parts += [html_markup.verdict(a, a.contact.pantograph, limits) for a in assessments]
+    key, names = "verdict" if is_coupling else "run", short_names(summary)
+    parts = [f"<section id='{key}'>{_title(summary, is_coupling)}", status_note(summary)]
+    parts.append(_warnings(summary))
+    parts += [html_markup.verdict(a, names[a.contact.pantograph], limits) for a in assessments]
     if reason := summary.get("not_judged", ""):
         parts.append(f"<p class='warning'><b>Not judged.</b> There are no figures: {html_markup.text(reason)}.</p>")
     elif not assessments and is_coupling:
@@ -90,7 +91,17 @@ def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool 
     return "".join([*parts, "</section>"])
 
 
-def _cautions(summary: dict[str, Any]) -> str:
+def _title(summary: dict[str, Any], is_coupling: bool) -> str:
+    """Return what the scenario says that it is, with the names of line and pantographs."""
+    name = str(summary.get("scenario", ""))
+    head = summary.get("title") or f"{name}: {_subject(is_coupling)}"
+    parts = [f"scenario {name}"] if summary.get("title") else []
+    parts += [f"{component}: {model}" for component, model in coupled_models(summary)]
+    note = f"<p class='note'>{html_markup.text('; '.join(parts))}</p>" if parts else ""
+    return f"<h1>{html_markup.text(head)}</h1>{note}"
+
+
+def _warnings(summary: dict[str, Any]) -> str:
     """Return the warnings of the FMUs, and those on the scenario."""
     said = ((html_markup.text(w["component"]), html_markup.text(w["text"])) for w in summary.get("warnings", []))
     found = [f"<p class='warning'>{component} warns: {text}</p>" for component, text in said]
@@ -113,13 +124,14 @@ def status_note(summary: dict[str, Any]) -> str:
     return f"<p class='warning'>{note}</p>"
 
 
-def _figures(done: Results, assessments: tuple[Assessment, ...]) -> str:
+def _figures(done: Results, assessments: tuple[Assessment, ...], names: Mapping[str, str]) -> str:
     if not assessments:
         return ""
     chosen, title = done.evaluation.filter, html_markup.text(done.evaluation.limits.title)
-    heads = [f"figure, {chosen.band}", *(a.contact.pantograph for a in assessments)]
+    heads = [f"figure, {chosen.band}", *(names[a.contact.pantograph] for a in assessments)]
     verdicts = "".join(
-        f"<h3>{title}, {html_markup.text(a.contact.pantograph)}</h3>{html_markup.criteria(a)}" for a in assessments
+        f"<h3>{title}, {html_markup.text(names[a.contact.pantograph])}</h3>{html_markup.criteria(a)}"
+        for a in assessments
     )
     rows = html_markup.table(heads, figure_rows(assessments))
     said = [f"{f.sentence}." for f in done.follower_effects] + [
@@ -127,7 +139,7 @@ def _figures(done: Results, assessments: tuple[Assessment, ...]) -> str:
     ]
     notes = f"<p class='note'>{INTERVAL_NOTE} Filter: {html_markup.text(chosen.sentence)}.</p>"
     notes += "".join(f"<p>{html_markup.text(line)}</p>" for line in said)
-    notes += "".join(_filters(a, chosen) for a in assessments)
+    notes += "".join(_filters(a, chosen, names[a.contact.pantograph]) for a in assessments)
     statistics = f"<div><h3>Statistics in the interval of interest</h3>{rows}{notes}</div>"
     return (
         f"<section id='figures'><h2>Figures</h2><div class='columns'><div>{verdicts}</div>{statistics}</div></section>"
@@ -143,15 +155,14 @@ INTERVAL_NOTE: Final = (
 )
 
 
-def _filters(a: Assessment, chosen: ForceFilter) -> str:
+def _filters(a: Assessment, chosen: ForceFilter, name: str) -> str:
     """Return the figures with every filter, if they depend on it."""
     rows = filter_rows(a.quality, chosen)
-    name = html_markup.text(a.contact.pantograph)
-    head = f"<h3>The extremes of {name} depend on the filter</h3>"
+    head = f"<h3>The extremes of {html_markup.text(name)} depend on the filter</h3>"
     return f"{head}{html_markup.table(FILTER_HEADS, rows)}" if rows else ""
 
 
-def _spans(assessments: tuple[Assessment, ...]) -> str:
+def _spans(assessments: tuple[Assessment, ...], names: Mapping[str, str]) -> str:
     """Return the figures span by span, which show whether the run has settled."""
     heads = ("span", "mean [N]", "sigma [N]", "maximum [N]", "minimum [N]")
     parts = []
@@ -162,7 +173,7 @@ def _spans(assessments: tuple[Assessment, ...]) -> str:
             for s in a.spans
         ]  # fmt: skip
         if rows:
-            parts.append(f"<h3>{html_markup.text(a.contact.pantograph)}</h3>{html_markup.table(heads, rows)}")
+            parts.append(f"<h3>{html_markup.text(names[a.contact.pantograph])}</h3>{html_markup.table(heads, rows)}")
     if not parts:
         return ""
     note = "<p class='note'>Low-passed force in every whole span after the contact has settled.</p>"
@@ -204,9 +215,8 @@ def _inputs(summary: dict[str, Any]) -> str:
     for component in summary.get("components", []):
         rows = "".join(_input_row(i) for i in inputs_of(component))
         heads = "<tr><th>parameter</th><th class='n'>value</th><th>unit</th><th>description</th><th>source</th></tr>"
-        head = (
-            f"<summary>{html_markup.text(component['name'])}: {html_markup.text(component.get('fmu', '-'))}</summary>"
-        )
+        model = ", ".join(filter(None, (component.get("description"), component.get("fmu", "-"))))
+        head = f"<summary>{html_markup.text(component['name'])}: {html_markup.text(model)}</summary>"
         parts.append(f"<details>{head}<div class='scroll'><table>{heads}{rows}</table></div></details>")
     return "".join([*parts, "</section>"])
 

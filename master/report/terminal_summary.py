@@ -27,6 +27,7 @@ from master.report.result_tables import (
     uplift_line,
     verdict_table,
 )
+from master.report.run_inputs import residual_rows
 from master.results.run_results import Results
 
 WIDTH: Final = 80
@@ -99,10 +100,7 @@ def _closing_lines(done: Results) -> list[str]:
         f"initialisation {performance['initialisation_time']:.2f} s, "
         f"real-time factor {performance['real_time_factor']:.2f}, {performance['peak_memory']:.0f} MB",
     ]
-    lines += [
-        f"contact {p['contact']}: coupling added {p['energy']:.3g} J of {p['transferred']:.4g} J exchanged"
-        for p in done.summary["interface_power"]
-    ]
+    lines += [f"{name}: {text}" for name, text in residual_rows(done.summary)]
     lines += _energy_lines(done.summary["energy"])
     if tolerance := tolerance_words({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
         lines.append(tolerance.removeprefix(", "))

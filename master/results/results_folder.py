@@ -265,7 +265,8 @@ def summary_of(folder: Path) -> dict[str, Any]:
         If it is not a results folder of this tool, or of a newer version.
     """
     if not is_ours(folder):
-        raise MasterError(f"{folder} is not a results folder: it has no {SUMMARY} written by this tool")
+        text = f"is not a results folder: it has no {SUMMARY} written by this tool; give the folder that a run printed"
+        raise MasterError(f"{folder} {text}")
     found = summary_schema.read_summary(folder / SUMMARY)
     if found.get("format", 1) > FORMAT:
         raise MasterError(

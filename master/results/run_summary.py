@@ -29,6 +29,7 @@ def describe(system: System, run: str) -> dict[str, Any]:
         "format": FORMAT,
         "run": run,
         "scenario": system.name,
+        "title": system.title,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": versions(),
         "settings": {
@@ -47,6 +48,7 @@ def _component(component: Component) -> dict[str, Any]:
     return {
         "name": component.name,
         "fmu": fmu.path.name,
+        "description": fmu.description,
         "guid": fmu.guid,
         "sha256": fmu.sha256,
         "tool": fmu.tool,

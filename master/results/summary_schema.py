@@ -83,6 +83,7 @@ class _Input(_Loose):
 class _Component(_Loose):
     name: str
     fmu: str = ""
+    description: str = ""
     sha256: str = ""
     guid: str = ""
     tool: str = ""
@@ -143,6 +144,7 @@ class _Summary(_Loose):
     performance: _Performance = _Performance()
     versions: dict[str, str] = {}
     scenario: str = ""
+    title: str = ""
     status: str = ""
     reason: str = ""
     date: str = ""

@@ -121,7 +121,7 @@ class AppendOnlyFile:
         self._size = keep
         self._sum = 0
         try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
             os.ftruncate(self._file, keep)
             if keep:
                 self._sum = _check_sum(path)

@@ -116,6 +116,8 @@ def _worked(work: Callable[[], int]) -> int:
         print("error: interrupted", file=sys.stderr)
     except MemoryError:
         print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
+    except BrokenPipeError:  # the reader of the output has closed it, and knows
+        pass
     except BaseException:
         traceback.print_exc()
     with suppress(OSError, ValueError):

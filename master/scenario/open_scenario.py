@@ -15,6 +15,7 @@ from master.fmu.fmu_description import lacking_binary, read_fmu
 from master.scenario import value_checks
 from master.scenario.overrides import Overrides, effective_settings, with_energy, with_values
 from master.scenario.scenario_checks import ScenarioChecks
+from master.scenario.scenario_place import fmu_cache, located
 from master.ssp.archive import SSD_NAME, Package, Sources, open_package
 from master.ssp.run_settings import RunSettings
 from master.ssp.ssd import EMPTY, Structure, read_structure
@@ -51,7 +52,7 @@ def open_scenario(
     Parameters
     ----------
     path : Path
-        Folder or ``.ssp`` archive.
+        Folder or ``.ssp`` archive, project folder, or name in the library (`scenario_place.located`).
     overrides : Overrides, optional
         Changes from the command line.
     tell : callable
@@ -66,14 +67,15 @@ def open_scenario(
     ScenarioError
         With every problem found.
     """
-    with open_package(path) as package, _scratch(is_check) as scratch:
+    with open_package(located(path)) as package, _scratch(package, is_check) as scratch:
         yield Scenario(package, load_system(package, overrides or Overrides(), tell, build, scratch))
 
 
 @contextmanager
-def _scratch(is_wanted: bool) -> Iterator[Path | None]:
-    if not is_wanted:
-        yield None
+def _scratch(package: Package, is_check: bool) -> Iterator[Path | None]:
+    """Yield the folder that FMUs are built into, None for their place in the scenario."""
+    if not is_check:
+        yield fmu_cache(package.root)
         return
     with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
         yield Path(folder)
@@ -105,7 +107,8 @@ def load_system(
     if overrides.energy:
         components, settings = with_energy(components, settings)
     warnings = tuple(str(w) for w in _sorted(reader.warnings))
-    system = System(package.name, components, connections, *times, settings, warnings, overrides.may_stop_early)
+    may_stop, title = overrides.may_stop_early, structure.title
+    system = System(package.name, components, connections, *times, settings, warnings, may_stop, title)
     text = value_checks.empty_cells(system, overrides.empty)
     if text := text or value_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from master.errors import Problem, RequestError
+from master.errors import Problem, RequestError, hint
 from master.scenario.start_values import out_of_range, settable
 from master.ssp.archive import SSD_NAME
 from master.ssp.run_settings import DEFAULT_RECORDS, Record, RunSettings, Scheme
@@ -95,10 +94,12 @@ def _unknown(settings: RunSettings, components: tuple[Component, ...]) -> Iterat
     for record in settings.records:
         for pattern in record.variables if record not in DEFAULT_RECORDS else ():
             if not any(map(matcher(pattern), recordable)):
-                yield f"Record variables: '{pattern}' fits no output or local variable of the components"
+                near = hint(pattern, recordable)
+                yield f"Record variables: '{pattern}' fits no output or local variable of the components{near}"
     wanted = settings.calibration
     if wanted is not None and (wanted.parameter not in variables or settable(variables[wanted.parameter], "Real")):
-        yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components"
+        near = hint(wanted.parameter, variables)
+        yield f"Calibration parameter: '{wanted.parameter}' is no Real parameter of the components{near}"
 
 
 def with_values(components: tuple[Component, ...], values: Mapping[str, str]) -> tuple[Component, ...]:
@@ -151,9 +152,7 @@ def find_parameter(components: tuple[Component, ...], full: str) -> tuple[int, V
     settables = [
         f"{c.name}.{v.name}" for c in components for v in c.fmu.variables.values() if v.causality == "parameter"
     ]
-    near = difflib.get_close_matches(full, settables, n=3, cutoff=0.5)
-    hint = f"; did you mean {' or '.join(near)}?" if near else ""
-    raise RequestError(f"there is no parameter '{full}' in the scenario{hint}")
+    raise RequestError(f"there is no parameter '{full}' in the scenario{hint(full, settables, most=3)}")
 
 
 def _typed(fmu: Fmu, variable: Variable, full: str, text: str) -> float | int | bool | str:
@@ -195,7 +194,8 @@ def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
         return number
     known = {**fmu.units, **COMMON}
     if unit not in known:
-        raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known (known: {', '.join(known)})")
+        listed = f"(known: {', '.join(known)}){hint(unit, known)}"
+        raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known {listed}")
     found = conversion(known[unit], known[variable.unit]) if variable.unit in known else None
     if found is None:
         wanted = f"a unit of {variable.unit}" if variable.unit else "no unit: the FMU declares none"

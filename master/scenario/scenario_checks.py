@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from master.errors import Problem
+from master.errors import Problem, hint
 from master.scenario.start_values import StartValues, listed
 from master.scenario.unit_checks import UnitChecks, unit_problems
 from master.ssp.archive import SSD_NAME
@@ -147,7 +147,8 @@ class ScenarioChecks:
         where = f"connector '{component.name}.{connector.name}'"
         before = len(self._problems)
         if variable is None:
-            self._report(connector.line, "connector", f"{where}: the FMU {component.source} has no such variable")
+            near = hint(connector.name, self._fmus[component.name].variables)
+            self._report(connector.line, "connector", f"{where}: the FMU {component.source} has no such variable{near}")
         else:
             self._compare(connector, variable, where)
         if len(self._problems) > before:
@@ -234,12 +235,14 @@ class ScenarioChecks:
     def _endpoint(self, element: str, name: str, line: int) -> _Endpoint | None:
         component = self._named.get(element)
         if component is None:
-            what = f"'{element}' is not a component" if element else f"connector '{name}' belongs to no component"
+            near = hint(element, self._named)
+            what = f"'{element}' is not a component{near}" if element else f"connector '{name}' belongs to no component"
             self._report(line, "connection", what)
             return None
         connector = self._connectors.get((element, name))
         if connector is None:
-            self._report(line, "connection", f"component '{element}' declares no connector '{name}'")
+            near = hint(name, (x for owner, x in self._connectors if owner == element))
+            self._report(line, "connection", f"component '{element}' declares no connector '{name}'{near}")
             return None
         return _Endpoint(component, connector)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
-from master.errors import Problem
+from master.errors import Problem, hint
 from master.scenario.unit_checks import UnitChecks
 from master.ssp.ssd import Structure, parameter_names
 from master.ssp.ssd_elements import Binding, Component, Feed, Stop
@@ -78,7 +78,9 @@ class StartValues:
                 connector = self._structure.connectors.get(name)
                 if connector is None:
                     if not name.startswith(components):
-                        self._report_name(p, f"'{name}' belongs to no component and no connector of a system")
+                        known = (f"{c}.{v}" for c, fmu in self._fmus.items() for v in fmu.variables)
+                        near = hint(name, (*known, *self._structure.connectors))
+                        self._report_name(p, f"'{name}' belongs to no component and no connector of a system{near}")
                     continue
                 found[name] = Given(p, binding.parameters)
                 if connector.kind not in _TAKING:
@@ -121,7 +123,8 @@ class StartValues:
         variable = self._fmus[component.name].variables.get(name)
         where = f"parameter '{component.name}.{name}'"
         if variable is None:
-            self._report_name(p, f"{where}: the FMU {component.source} has no such variable")
+            near = hint(name, self._fmus[component.name].variables)
+            self._report_name(p, f"{where}: the FMU {component.source} has no such variable{near}")
             return None
         if text := settable(variable, p.type):
             self._report_name(p, f"{where} {text}")

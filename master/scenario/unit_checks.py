@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from master.errors import Problem
+from master.errors import Problem, hint
 from master.ssp.archive import SSD_NAME
 from master.ssp.ssd import Structure, parameter_names
 from master.ssp.ssd_elements import Binding, Component, Leg
@@ -64,7 +64,8 @@ class UnitChecks:
         if unknown:
             if not self._unknown.issuperset(unknown):
                 declare = "ssd:Units" if file == SSD_NAME else "the ssv:Units of this file"
-                self._report(line, f"{where}: unit '{unknown[0]}' is not declared in {declare}", file)
+                text = f"unit '{unknown[0]}' is not declared in {declare} (known without it: {', '.join(COMMON)})"
+                self._report(line, f"{where}: {text}{hint(unknown[0], known)}", file)
             self._unknown.update(unknown)
             return Conversion()
         found = conversion(known[source], known[target])

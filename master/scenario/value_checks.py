@@ -53,12 +53,12 @@ def half_empty_rows(system: System, empty: Sequence[str], absent: Sequence[str])
     A pantograph without values takes no part; one with some would run with the scenario's values for the others, and
     without any pantograph a run has nothing to show.
     """
-    trains = [p.name for p in pantographs(system)]
-    half = [name for name in empty if name.partition(".")[0] in trains and name.partition(".")[0] not in absent]
+    named = [p.name for p in pantographs(system)]
+    half = [name for name in empty if name.partition(".")[0] in named and name.partition(".")[0] not in absent]
     if half:
         return f"the table has no value for {', '.join(half)}: write one, or leave all cells of that pantograph empty"
-    if trains and all(name in absent for name in trains):
-        return f"the table leaves out every pantograph ({', '.join(trains)}): write the values of one of them"
+    if named and all(name in absent for name in named):
+        return f"the table leaves out every pantograph ({', '.join(named)}): write the values of one of them"
     return ""
 
 

@@ -234,7 +234,7 @@ def _is_tame(path: PurePosixPath) -> bool:
 
 def _checked(package: Package) -> Package:
     if not (package.root / SSD_NAME).is_file():
-        raise _refusal(package.origin, "scenario", f"contains no {SSD_NAME}")
+        raise _refusal(package.origin, "scenario", f"contains no {SSD_NAME}; give the folder NAME.ssp that has one")
     return package
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from master.errors import hint
 from master.ssp.ssd_elements import Binding, Component, Connection, Connector, Feed, Joint, Leg, Stop, SystemNode
 from master.ssp.ssp_xml import Reader
 
@@ -128,7 +129,8 @@ def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Read
         connector = _connector(path, element, name, systems)
         if connector is None:
             what = f"'{element}' has no connector '{name}'" if element else f"the system has no connector '{name}'"
-            reader.report(c.line, "connection", what)
+            near = hint(name, (x.name for x in _connectors(path, element, systems)))
+            reader.report(c.line, "connection", what + near)
             return None
         if connector.kind not in (*_SIGNALS, *_PARAMETERS):
             text = f"connects '{name}' of kind '{connector.kind}', which is not supported"
@@ -149,12 +151,14 @@ def _edge(path: str, c: Connection, systems: dict[str, SystemNode], reader: Read
 
 
 def _connector(path: str, element: str, name: str, systems: dict[str, SystemNode]) -> Connector | None:
+    return next((x for x in _connectors(path, element, systems) if x.name == name), None)
+
+
+def _connectors(path: str, element: str, systems: dict[str, SystemNode]) -> tuple[Connector, ...]:
     system = _system_at(path, element, systems)
     if system is not None:
-        connectors = systems[system].connectors
-    else:
-        connectors = next((c.connectors for c in systems[path].components if c.name == element), ())
-    return next((x for x in connectors if x.name == name), None)
+        return systems[system].connectors
+    return next((c.connectors for c in systems[path].components if c.name == element), ())
 
 
 def _followed(edges: list[_Edge], systems: dict[str, SystemNode]) -> tuple[list[Connection], tuple[Feed, ...]]:

@@ -24,6 +24,7 @@ from typing import Any, Final, Literal, get_args
 from lxml import etree
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from master.errors import hint
 from master.ssp.ssm import NOTE, several
 from master.ssp.ssp_xml import SSC, Reader, children, elements, namespace, tag
 
@@ -296,7 +297,8 @@ def parse_section(node: Any, reader: Reader) -> _Settings | None:
     """Parse one element of ``panto:Run`` by its own model."""
     model = _SECTIONS.get(tag(node)) if namespace(node) == NAMESPACE else None
     if model is None:
-        reader.problem(node, "annotation", f"unknown element '{tag(node)}' (known: {', '.join(_SECTIONS)})")
+        near = hint(tag(node), _SECTIONS)
+        reader.problem(node, "annotation", f"unknown element '{tag(node)}' (known: {', '.join(_SECTIONS)}){near}")
         return None
     if next(elements(node), None) is not None:
         reader.problem(node, "annotation", f"{tag(node)} has an element inside, which nothing reads; remove it")
@@ -310,5 +312,10 @@ def parse_section(node: Any, reader: Reader) -> _Settings | None:
         for item in error.errors():
             where = ".".join(str(part) for part in item["loc"][:1])
             named = f"{tag(node)} {where}".rstrip()
-            reader.problem(node, "annotation", f"{named}: {item['msg'].removeprefix('Value error, ')}")
+            if item["type"] == "extra_forbidden":
+                known = [field.alias or name for name, field in model.model_fields.items()]
+                text = f"{tag(node)} has no attribute '{where}' (known: {', '.join(known)}){hint(where, known)}"
+            else:
+                text = f"{named}: {item['msg'].removeprefix('Value error, ')}"
+            reader.problem(node, "annotation", text)
         return None

@@ -45,6 +45,7 @@ class Structure:
     feeds: tuple[Feed, ...] = ()
     connectors: dict[str, Connector] = field(default_factory=dict)
     joints: tuple[Joint, ...] = ()
+    title: str = ""
 
 
 EMPTY: Final = Structure("", (), (), (), {}, 0.0, None, Annotations(RunSettings(), None))
@@ -83,6 +84,7 @@ def parse_structure(node: Any, sources: Sources, reader: Reader) -> Structure:
         flat.feeds,
         flat.connectors,
         flat.joints,
+        reader.text(node, "description") or ("" if system is None else reader.text(system, "description")),
     )
 
 

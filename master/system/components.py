@@ -69,6 +69,8 @@ class Fmu:
         Of its default experiment.
     is_single : bool
         Whether a process can hold only one instance of it.
+    description : str
+        What it says that it is.
     """
 
     path: Path
@@ -82,6 +84,7 @@ class Fmu:
     units: dict[str, Unit] = field(default_factory=dict)
     tolerance: float | None = None
     is_single: bool = False
+    description: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ class System:
         What in the scenario can be run but may not be intended.
     may_stop_early : bool
         Whether the stop time may lie before the end of the interval of interest: nothing is judged then.
+    title : str
+        What the scenario says that it is.
     """
 
     name: str
@@ -135,6 +140,7 @@ class System:
     settings: RunSettings
     warnings: tuple[str, ...] = ()
     may_stop_early: bool = False
+    title: str = ""
 
     @cached_property
     def contacts(self) -> tuple[Contact, ...]:

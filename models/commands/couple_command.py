@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,11 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from master.evaluation.contact_quality import Quality, Sampled, early_warning, figures_of
 from master.evaluation.filters import SETTLING, ForceFilter, evaluated, low_pass, stands_in
 from models.arrays import FloatArray
-from models.catenary import line_advice as limits
-from models.catenary.definition.line_definition import SHORTEST_STEP
 from models.catenary.line_model import CatenaryModel
-from models.catenary.line_part import CatenaryPart, wires_at_rest
-from models.catenary.strip_checks import check_strips, start_warning
 from models.commands.physics_files import write_csv
 from models.commands.physics_options import (
     add_filter,
@@ -34,16 +29,16 @@ from models.commands.physics_options import (
 )
 from models.coupled.monolithic import CoupledModel, CoupledRecord
 from models.definition_files.parameter import ParameterError
+from models.interface.coupled_run import (
+    advice,
+    advice_at_start,
+    check_length,
+    check_step,
+    check_touched,
+    contact_point,
+    travelled,
+)
 from models.library.catalogue import load_line, load_lumped
-from models.pantograph.lumped.lumped_advice import working_height_warning
-from models.pantograph.lumped.lumped_definition import LumpedDefinition
-
-#: Longest step of the monolithic run [s]: a contact lasts longer than it.
-LONGEST_STEP = 0.1
-#: Time after the uplift acts fully in which a strip that can reach the wire has reached it [s].
-LONGEST_RISE = 1.0
-#: Steps of a run: enough for the filter, and not more than fit into memory.
-FEWEST_STEPS, MOST_STEPS = 100, 10**7
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -68,67 +63,33 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Run and print the contact-force figures."""
-    _check_step(arguments)
+    check_step(arguments.step)
     chosen = chosen_filter(arguments)
     definition = load_line(arguments.line)
     definition = definition.with_values(settings(arguments.set, "line", definition))
     line = CatenaryModel(definition)
-    span = _span_of(arguments, line)
-    _check_length(arguments, span)
-    speed = arguments.speed / 3.6
+    way, speed = travelled(line, arguments.start, arguments.end), arguments.speed / 3.6
+    _check_interval(arguments.interval, way)
+    check_length(way, speed, arguments.step)
     pantograph = load_lumped(arguments.pantograph)
     given = settings(arguments.set, "pantograph", pantograph)
     _check_given(given)
-    pantograph = pantograph.with_values({"speed": speed, "start_position": span[0]} | given)
+    pantograph = pantograph.with_values({"speed": speed, "start_position": way[0]} | given)
     coupled = CoupledModel(line, [pantograph])
-    warn([*_limits(line, pantograph, arguments.step), *_at_start(coupled)])
-    stop = (span[1] - span[0]) / speed
+    warn([*advice(line, pantograph, arguments.step), *advice_at_start(coupled)])
+    stop = (way[1] - way[0]) / speed
     begin = time.perf_counter()
     with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), disable=arguments.quiet) as bar:
         task = bar.add_task(f"{arguments.line} + {arguments.pantograph}, monolithic", total=stop)
         record = coupled.run(stop, arguments.step, lambda t: bar.update(task, completed=t))
     wall = time.perf_counter() - begin
-    _check_touched(record, pantograph)
+    check_touched(record, pantograph)
     run_of = Evaluated.of(record, line, pantograph.strip_offset, tuple(arguments.interval or (None, None)), chosen)
     if arguments.out is not None:
         write_timeseries(new_folder(arguments.out) / "timeseries.csv", run_of)
     warn([early_warning(run_of.sampled)])
     _print(run_of, stop / wall)
     return 0
-
-
-def _limits(line: CatenaryModel, pantograph: LumpedDefinition, step: float) -> tuple[str, ...]:
-    """Return what deserves a second look, empty texts where nothing does."""
-    return (
-        limits.speed_warning(line.definition, pantograph.speed),
-        limits.step_warning(line.definition, step, pantograph.stage[-1].mass),
-        limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.is_slack),
-        limits.slack_law_warning(line.definition),
-    )
-
-
-def _at_start(coupled: CoupledModel) -> tuple[str, ...]:
-    """Refuse a strip that the line cannot be meant for; return what deserves a second look in how it starts."""
-    wires, strips = wires_at_rest(coupled.line), coupled.strips
-    force, point = coupled.contact_at_rest()
-    forces = force.sum(axis=1)
-    check_strips(wires, strips, forces)
-    heights = (
-        working_height_warning(p.definition, float(x), float(z))
-        for p, (x, _, z) in zip(coupled.pantographs, point, strict=True)
-    )
-    return (start_warning(wires, strips, forces), *heights)
-
-
-def _check_touched(record: CoupledRecord, pantograph: LumpedDefinition) -> None:
-    """Refuse a run in which the strip had time to reach the wire, and never did."""
-    latest = pantograph.raise_start + pantograph.raise_duration + LONGEST_RISE
-    if record.contact_force.any() or record.time[-1] <= latest:
-        return
-    raise ParameterError(
-        f"'{pantograph.name}' never touches the wire (its strip ends at z = {record.strip_height[-1, 0]:.3f} m): "
-        "check static_force, reference_height, strip_length and strip_offset against the wire's height and stagger"
-    )
 
 
 def _check_given(values: Mapping[str, float]) -> None:
@@ -175,11 +136,9 @@ class Evaluated:
         chosen: ForceFilter,
     ) -> Evaluated:
         """Return a record of a line with its first pantograph as it is evaluated."""
-        force, point = record.contact_force[:, 0], record.contact_point[:, 0]
-        touches, step = force > 0.0, float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
-        position = np.where(touches, point[:, 0], record.position[:, 0])
+        force, step = record.contact_force[:, 0], float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
+        position, height, lateral = contact_point(record, strip_offset)
         inside = evaluated(force, position, step, interval)
-        height, lateral = (np.where(touches, values, np.nan) for values in (point[:, 2], point[:, 1] - strip_offset))
         sampled = Sampled(force, position, step, inside, height, lateral)
         supports = line.static.positions[line.mesh.support_nodes, 0]
         return cls(record, sampled, chosen, supports, line.wires[0].period, interval)
@@ -214,35 +173,11 @@ def write_timeseries(path: Path, run_of: Evaluated) -> None:
     write_csv(path, names, columns, 17)
 
 
-def _span_of(arguments: argparse.Namespace, line: CatenaryModel) -> tuple[float, float]:
-    """Return where the run begins and ends: as given, or well inside the line."""
-    first, last = line.wires[0].ends
-    length = last - first
-    start = arguments.start if arguments.start is not None else first + 0.2 * length
-    end = arguments.end if arguments.end is not None else last - 0.2 * length
-    furthest = math.inf if line.wires[0].period else last  # one that closes on itself is travelled on and on
-    if not first <= start < end <= furthest:
-        text = f"the run from {start:g} m to {end:g} m does not lie on the line, {first:g} m to {last:g} m"
-        raise ParameterError(f"--start, --end: {text}")
-    return start, end
-
-
-def _check_length(arguments: argparse.Namespace, span: tuple[float, float]) -> None:
-    """Refuse a run of too few or too many steps, or with nothing in the interval of interest."""
-    start, end = span
-    if arguments.interval is not None and not start <= arguments.interval[0] < arguments.interval[1] <= end:
-        low, high = arguments.interval
-        raise ParameterError(f"--interval {low:g} {high:g}: must lie within the run, {start:g} m to {end:g} m")
-    steps = (end - start) / (arguments.speed / 3.6 * arguments.step)
-    if not FEWEST_STEPS <= steps <= MOST_STEPS:
-        text = f"from {start:g} m to {end:g} m at {arguments.speed:g} km/h takes {steps:.3g} steps"
-        raise ParameterError(f"--step {arguments.step:g}: {text}, not {FEWEST_STEPS} to {MOST_STEPS:g}")
-
-
-def _check_step(arguments: argparse.Namespace) -> None:
-    """Refuse steps that no run can be made of, before the line is built."""
-    if arguments.step > LONGEST_STEP or arguments.step < SHORTEST_STEP:
-        raise ParameterError(f"--step {arguments.step:g}: must lie between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s")
+def _check_interval(interval: Sequence[float] | None, way: tuple[float, float]) -> None:
+    """Refuse an interval of interest that the run does not cover."""
+    if interval is not None and not way[0] <= interval[0] < interval[1] <= way[1]:
+        text = f"must lie within the run, {way[0]:g} m to {way[1]:g} m"
+        raise ParameterError(f"--interval {interval[0]:g} {interval[1]:g}: {text}")
 
 
 def _print(run_of: Evaluated, factor: float) -> None:

@@ -55,6 +55,6 @@ def carry_out(options: argparse.Namespace) -> int:
         print("error: there is not enough memory; end other programs, or raise the limit (ulimit -v)", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        print("error: interrupted", file=sys.stderr)
         return 1
     return code

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -14,14 +13,12 @@ from rich.console import Console
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
+from models.definition_files.given_value import WITH_UNIT, in_si
 from models.definition_files.message_text import printable
 from models.definition_files.parameter import Definition, ParameterError
-from models.definition_files.si_units import to_si
 from models.definition_files.toml_reader import LARGEST, SMALLEST
 
 _PARTS = ("line", "pantograph")
-#: A number, as Python writes it, and a unit or none.
-_WITH_UNIT = re.compile(r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf))\s*(\S*)\s*", re.ASCII | re.IGNORECASE)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
@@ -96,17 +93,10 @@ def _setting(text: str) -> Setting:
 
 
 def _value(setting: Setting, wanted: str | None) -> float:
-    what = f"--set {setting.part}.{setting.parameter}"
-    match = _WITH_UNIT.fullmatch(setting.value)
-    if match is None:
-        raise ParameterError(f"{what}: '{setting.value}' is not a number, or a number with its unit ('12 kN')")
-    number, unit = float(match[1]), match[2]
-    if not unit or wanted is None:  # the definition reports an unknown parameter
-        return number
     try:
-        return to_si(number, unit, wanted)
+        return in_si(setting.value, wanted)  # the definition reports an unknown parameter
     except ValueError as error:
-        raise ParameterError(f"{what}={setting.value}: {error}; give it in {wanted}") from error
+        raise ParameterError(f"--set {setting.part}.{setting.parameter}={setting.value}: {error}") from error
 
 
 def finite(text: str) -> float:
@@ -116,7 +106,8 @@ def finite(text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST or "_" in text or not text.isascii():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g})")
+        advice = "; write it without its unit" if (match := WITH_UNIT.fullmatch(text)) and match[2] else ""
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g}){advice}")
     return value
 
 

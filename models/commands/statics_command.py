@@ -4,42 +4,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from models.catenary import line_advice
-from models.catenary.definition.line_definition import Span
-from models.catenary.line_model import CatenaryModel
-from models.catenary.line_part import CatenaryPart
-from models.catenary.statics import elasticity as statics
-from models.catenary.statics import rest_profile, wire_waves
+from models.catenary.statics import rest_profile
 from models.commands import statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
-from models.definition_files.parameter import ParameterError
+from models.interface.line_statics import LineStatics, at_rest
 from models.library.catalogue import load_line
-
-
-@dataclass(frozen=True)
-class LineStatics:
-    """What the command reports on a line: a section of it, and one span in detail."""
-
-    model: CatenaryModel
-    section: int
-    number: int
-    span: Span
-    profiles: tuple[rest_profile.Profile, ...]
-    droppers: rest_profile.Droppers
-    arms: rest_profile.ArmLoads
-    elasticity: statics.Elasticity
-    waves: wire_waves.Waves
-
-    @property
-    def span_droppers(self) -> rest_profile.Droppers:
-        """Return the droppers (and hangers) of the span in detail."""
-        return rest_profile.droppers(self.model, self.span.start, self.span.end, self.section)
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -59,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
     result = analyse(arguments)
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
-    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result.span_droppers))
+    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
     if arguments.out is not None:
         folder = new_folder(arguments.out)
         write(folder, result)
@@ -77,34 +51,9 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     """
     definition = load_line(arguments.line)
     definition = definition.with_values(settings(arguments.set, "line", definition))
-    section = arguments.section - 1
-    if not 0 <= section < len(definition.sections):
-        raise ParameterError(f"--section {arguments.section}: the line has sections 1 to {len(definition.sections)}")
-    spans = definition.sections[section].spans
-    number = arguments.span if arguments.span is not None else (len(spans) + 1) // 2
-    if not 1 <= number <= len(spans):
-        raise ParameterError(f"--span {number}: the line has spans 1 to {len(spans)}")
-    span = spans[number - 1]
-    part = CatenaryPart(definition)
-    model = part.model
-    warn(
-        [
-            line_advice.speed_warning(definition, arguments.speed / 3.6),
-            line_advice.slack_warning(part.droppers, model.static.is_slack),
-            line_advice.slack_law_warning(definition),
-        ]
-    )
-    return LineStatics(
-        model=model,
-        section=section,
-        number=number,
-        span=span,
-        profiles=rest_profile.profiles(model, section),
-        droppers=rest_profile.droppers(model, section=section),
-        arms=rest_profile.arm_loads(model, section),
-        elasticity=statics.elasticity(model, statics.positions_in_span(span), arguments.force, section),
-        waves=wire_waves.waves(definition, arguments.speed / 3.6, span.length),
-    )
+    found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
+    warn(found.warnings)
+    return found
 
 
 def summary(result: LineStatics) -> list[tuple[str, str]]:
@@ -116,6 +65,7 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
         (f"elasticity at {e.force:g} N, minimum [mm/N]", f"{1e3 * e.minimum:.4f}"),
         (f"elasticity at {e.force:g} N, maximum [mm/N]", f"{1e3 * e.maximum:.4f}"),
         ("non-uniformity of elasticity u [%]", f"{100.0 * e.non_uniformity:.1f}"),
+        *_other_rows(result),
         *_arm_rows(result),
         ("law by which droppers slacken", result.model.definition.dropper.slack_law),
         ("wave speed C [km/h]", f"{3.6 * w.speed:.1f}"),
@@ -128,12 +78,8 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
 
 def write(folder: Path, result: LineStatics) -> None:
     """Write tables as CSV and plots as PNG."""
-    _write_profiles(folder, result.profiles)
-    d, e, a = result.droppers, result.elasticity, result.arms
-    columns = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
-    write_csv(folder / "droppers.csv", columns, (d.x, d.length, d.force, d.is_hanger.astype(float)))
-    write_csv(folder / "elasticity.csv", ("x [m]", "elasticity [m/N]"), (e.x, e.value))
-    write_csv(folder / "steady_arms.csv", ("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift))
+    for name, (titles, columns) in result.tables.items():
+        write_csv(folder / f"{name}.csv", titles, [column.astype(float) for column in columns])
     lines = [f'"{name}","{value}"' for name, value in summary(result)]
     write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
     plots = {
@@ -145,7 +91,7 @@ def write(folder: Path, result: LineStatics) -> None:
         write_figure(folder / f"{name}.png", figure, 150)
 
 
-_DROPPER_COLUMNS = ("from the support [m]", "length [m]", "tension [N]")
+_DROPPER_COLUMNS = ("x [m]", "from the support [m]", "unstrained length [m]", "tension [N]")
 
 
 def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
@@ -156,6 +102,17 @@ def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
     rows.append(("dropper lengths, longest and shortest [m]", f"{d.length.max():.4f}, {d.length.min():.4f}"))
     rows.append(("dropper tensions, largest and smallest [N]", f"{d.force.max():.1f}, {d.force.min():.1f}"))
     return rows
+
+
+def _other_rows(result: LineStatics) -> list[tuple[str, str]]:
+    """Return the elasticity of the other sections of a line with overlaps, each in its middle span."""
+    return [
+        (
+            f"section {section + 1}, span {number}: elasticity [mm/N], u [%]",
+            f"{1e3 * e.minimum:.4f} ... {1e3 * e.maximum:.4f}, {100.0 * e.non_uniformity:.1f}",
+        )
+        for section, (number, e) in result.others.items()
+    ]
 
 
 def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
@@ -170,14 +127,8 @@ def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
     ]
 
 
-def _dropper_rows(droppers: rest_profile.Droppers) -> Iterable[Sequence[str]]:
-    for x, length, force, hanger in zip(droppers.x, droppers.length, droppers.force, droppers.is_hanger, strict=True):
-        yield f"{x:.2f}{' (hanger)' if hanger else ''}", f"{length:.4f}", f"{force:.1f}"
-
-
-def _write_profiles(folder: Path, profiles: Sequence[rest_profile.Profile]) -> None:
-    """Write a file for every kind of wire, stitch wires one after the other."""
-    for component in dict.fromkeys(p.component for p in profiles):
-        same = [p for p in profiles if p.component == component]
-        columns = [np.concatenate(c) for c in zip(*((p.x, p.y, p.z) for p in same), strict=True)]
-        write_csv(folder / f"{component}.csv", ("x [m]", "y [m]", "z [m]"), columns)
+def _dropper_rows(result: LineStatics) -> Iterable[Sequence[str]]:
+    d = result.span_droppers
+    for x, length, force, hanger in zip(d.x, d.length, d.force, d.is_hanger, strict=True):
+        place = f"{x:.2f}{' (hanger)' if hanger else ''}", f"{x - result.span.start:.2f}"
+        yield *place, f"{length:.4f}", f"{force:.1f}"

@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeVar, runtime_checkable
 
+from models.definition_files.message_text import hint
 from models.definition_files.parameter import Parameter, ParameterError
 from models.definition_files.si_units import shown
 from models.definition_files.toml_reader import SMALLEST, Quantity, Table, beyond_all, in_its_unit
@@ -279,7 +280,11 @@ def with_values(obj: T, values: Mapping[str, float]) -> T:
         not fit together.
     """
     for name, value in values.items():
-        obj = _replaced(obj, name, name, value)
+        changed = _replaced(obj, name, name, value)
+        if changed is None:
+            near = hint(name, (p.name for p in parameters(obj, {})), most=3)
+            raise ParameterError(f"parameter '{name}': there is none of this name{near}")
+        obj = changed
     if found := [": ".join(filter(None, problem)) for problem in _problems(obj) if values]:
         raise ParameterError("\n".join(found))
     return obj
@@ -329,7 +334,7 @@ def _listed(
 
 
 def _replaced(obj: Any, path: str, name: str, value: float) -> Any:
-    """Return a dataclass with the number at a dotted path replaced; ``name`` is the whole of it."""
+    """Return a dataclass with the number at a dotted path replaced, None if there is none; ``name`` is all of it."""
     for field in dataclasses.fields(obj):
         spec, old = field.metadata.get(_META), getattr(obj, field.name)
         if isinstance(spec, _Number):
@@ -340,12 +345,14 @@ def _replaced(obj: Any, path: str, name: str, value: float) -> Any:
         for index, (inner, item) in enumerate(_inside(field, old)):
             if path.startswith(f"{inner}."):
                 new = _replaced(item, path[len(inner) + 1 :], name, value)
+                if new is None:
+                    return None
                 if isinstance(old, tuple):
                     new = (*old[:index], new, *old[index + 1 :])
                 return dataclasses.replace(obj, **{field.name: new})
     if any(path == field.name for field in dataclasses.fields(obj)):
         raise ParameterError(f"parameter '{name}': is not a number that can be set")
-    raise ParameterError(f"parameter '{name}': there is none of this name")
+    return None
 
 
 def _check(name: str, value: float, spec: _Number) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import reprlib
+from collections.abc import Iterable
+from functools import partial
 from typing import Final
 
 #: Longest message shown in full [characters], as a value may be megabytes of nested lists.
@@ -24,6 +27,27 @@ class _Shown(reprlib.Repr):
 
 #: Return a value as shown in messages.
 shown_value = _Shown().repr
+
+
+def hint(name: str, known: Iterable[str], most: int = 1) -> str:
+    """Return the question whether a known name was meant, empty if none is near: one that is very near, or the nearest.
+
+    Examples
+    --------
+    >>> hint("ln2", ["CA160", "LN2"])
+    "; did you mean 'LN2'?"
+    >>> hint("height", ["CA160", "LN2"])
+    ''
+    """
+    found = nearest(name, known, most)
+    return f"; did you mean {' or '.join(map(repr, found))}?" if found else ""
+
+
+def nearest(name: str, known: Iterable[str], most: int = 1) -> list[str]:
+    """Return the known name that is very near to another, otherwise the nearest ones, which may be none."""
+    folded = {k.casefold(): k for k in known}
+    matches = partial(difflib.get_close_matches, name.casefold(), folded)
+    return [folded[k] for k in matches(n=1, cutoff=0.85) or matches(n=most, cutoff=0.55)]
 
 
 def one_line(text: str) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from models.definition_files.message_text import hint
+
 #: Unit -> (SI unit, factor).  A quantity in a file is multiplied by the factor.
 SI: Final[dict[str, tuple[str, float]]] = {
     "1": ("1", 1.0),
@@ -27,10 +29,12 @@ SI: Final[dict[str, tuple[str, float]]] = {
     "kg/m": ("kg/m", 1.0),
     "kg.m2": ("kg.m2", 1.0),
     "N": ("N", 1.0),
+    "daN": ("N", 10.0),
     "kN": ("N", 1e3),
     "N.m": ("N.m", 1.0),
     "kN.m": ("N.m", 1e3),
     "N/m": ("N/m", 1.0),
+    "daN/m": ("N/m", 10.0),
     "kN/m": ("N/m", 1e3),
     "N.s/m": ("N.s/m", 1.0),
     "N.m.s/rad": ("N.m.s/rad", 1.0),
@@ -59,11 +63,23 @@ def to_si(value: float, unit: str, wanted: str) -> float:
     20000.0
     """
     if unit not in SI:
-        raise ValueError(f"unknown unit '{unit}'")
+        known = units_of(wanted)
+        raise ValueError(f"unknown unit '{unit}' (known for '{wanted}': {known}){hint(unit, known.split(', '))}")
     si, factor = SI[unit]
     if si != wanted:
-        raise ValueError(f"unit '{unit}' where a unit of '{wanted}' is needed")
+        raise ValueError(f"unit '{unit}' where a unit of '{wanted}' is needed ({units_of(wanted)})")
     return value * factor
+
+
+def units_of(wanted: str) -> str:
+    """Return the known units of the quantity that an SI unit measures, for messages.
+
+    Examples
+    --------
+    >>> units_of("N")
+    'N, daN, kN'
+    """
+    return ", ".join(unit for unit, (si, _) in SI.items() if si == wanted)
 
 
 def shown(value: float, unit: str) -> str:

@@ -7,22 +7,28 @@ source::
     encumbrance = [1.2, "m", "choice: gives the printed first dropper"]
 
 A source that begins with ``choice`` marks a value that the data leave open.
+
+The file is longer than others because a table of the file and all that may be wrong with an entry stand together.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from models.definition_files.message_text import one_line, shown_value
+from models.definition_files.message_text import hint, nearest, one_line, shown_value
 from models.definition_files.si_units import shown, to_si
 
 #: Largest number of problems listed.
 _MOST: Final = 100
+#: A number in the text of a problem, or a list of them.
+_NUMBER: Final = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
 #: Deepest allowed nesting of tables and lists; a definition needs five levels.
 _DEEPEST: Final = 20
 #: Limits of magnitude in SI: no quantity of a line or pantograph lies beyond, and squares and quotients stay finite.
@@ -123,6 +129,9 @@ class Table:
         name = str(path)
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError as error:
+            text = "there is no such file; a definition of the library is called by its name, without .toml"
+            raise DefinitionError([Problem(name, "", text)]) from error
         except OSError as error:
             raise DefinitionError([Problem(name, "", f"cannot be read ({error.strerror})")]) from error
         except UnicodeDecodeError as error:
@@ -130,7 +139,8 @@ class Table:
         except RecursionError as error:
             raise _too_deep(name) from error
         except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
-            raise DefinitionError([Problem(name, "", f"is not TOML: {error}")]) from error
+            comma = _comma_advice(path, str(error))
+            raise DefinitionError([Problem(name, "", f"is not TOML: {error}{comma}")]) from error
         if _is_deep(data):
             raise _too_deep(name)
         return cls(data, _Log(name))
@@ -257,7 +267,7 @@ class Table:
             return default or ""
         allowed = list(choices) if choices is not None else None
         if allowed is not None and entry not in allowed:
-            self.problem(name, f"'{entry}' is none of {', '.join(allowed)}")
+            self.problem(name, f"'{entry}' is none of {', '.join(allowed)}{hint(entry, allowed)}")
         return entry
 
     def flag(self, name: str, *, default: bool | None = None) -> bool:
@@ -309,8 +319,7 @@ class Table:
         """
         self._report_unknown()
         if self._log.problems:
-            # A rule is read for every span, and reports its mistakes for every span.
-            raise DefinitionError(tuple(dict.fromkeys(self._log.problems)))
+            raise DefinitionError(_once(self._log.problems))
 
     def _child(self, data: dict[str, Any], path: str) -> Table:
         child = Table(data, self._log, path)
@@ -375,10 +384,34 @@ class Table:
     def _report_unknown(self) -> None:
         for name in self._data:
             if name not in self._known:
-                known = ", ".join(sorted(self._known)) or "none"
-                self.problem(name, f"unknown key (known here: {known})")
+                known, absent = ", ".join(sorted(self._known)) or "none", self._known - set(self._data)
+                self.problem(name, f"unknown key (known here: {known}){hint(name, absent)}")
+                self._forget_missing(nearest(name, absent))
         for child in self._children:
             child._report_unknown()
+
+    def _forget_missing(self, names: Iterable[str]) -> None:
+        """Take back that keys are missing, where a mistyped one has been reported for them."""
+        keys = {self.key(name) for name in names}
+        self._log.problems[:] = [p for p in self._log.problems if not (p.key in keys and p.text.endswith("is missing"))]
+
+
+def _once(problems: Iterable[Problem]) -> list[Problem]:
+    """Return every problem once: a rule is read for every span, and reports its mistakes for every span."""
+    alike: dict[tuple[str, str], list[Problem]] = {}
+    for problem in dict.fromkeys(problems):
+        alike.setdefault((problem.key, _NUMBER.sub("0", problem.text)), []).append(problem)
+    return [
+        first if not others else dataclasses.replace(first, text=f"{first.text} (and {len(others)} more like this)")
+        for first, *others in alike.values()
+    ]
+
+
+def _comma_advice(path: Path, error: str) -> str:
+    """Return advice if the line that cannot be read has what looks like a decimal comma."""
+    number = re.search(r"at line (\d+)", error)
+    line = path.read_text(encoding="utf-8").splitlines()[int(number[1]) - 1] if number else ""
+    return f"; does '{line.strip()}' have a decimal comma? write a point" if re.search(r"\d,\d", line) else ""
 
 
 def _too_deep(file: str) -> DefinitionError:

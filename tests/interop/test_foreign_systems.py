@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from master.run import run
+from master.run_session import run
 from master.scenario.open_scenario import open_scenario
 from master.ssp.pack import pack
 from tests.foreign_fmus import (

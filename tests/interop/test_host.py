@@ -17,7 +17,7 @@ import pytest
 from fmus.builder.fmu_build import build
 from fmus.builder.recipe import recipe
 from fmus.loader.loader_build import INNER_SUFFIX
-from master.run import connected_fmus
+from master.run_session import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 from tests.interop.support import STEP

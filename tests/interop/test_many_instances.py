@@ -19,6 +19,7 @@ from master.fmu.extraction import ExtractedFmu
 from master.fmu.fmu_description import read_fmu
 from master.fmu.instance import Instance
 from master.system.components import Component
+from tests.effort import count
 from tests.fmus.support import short_line_recipe
 from tests.interop.support import ROOT
 
@@ -26,9 +27,9 @@ SCRIPT = Path(__file__).with_name("many_instances.py")
 only_linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
-def many(fmu, count, warm_up, folder):
+def many(fmu, number, warm_up, folder):
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "TMPDIR": str(folder)}
-    command = [sys.executable, str(SCRIPT), str(fmu), str(count), str(warm_up)]
+    command = [sys.executable, str(SCRIPT), str(fmu), str(number), str(warm_up)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stderr == ""
@@ -49,9 +50,9 @@ def test_a_thousand_pantographs(tmp_path):
 
 @only_linux
 @pytest.mark.slow
-def test_sixty_lines(tmp_path):
+def test_many_lines(tmp_path):
     """Each holds some 5 MB while it is there."""
-    found = many(build(short_line_recipe(tmp_path), tmp_path), 60, 15, tmp_path)
+    found = many(build(short_line_recipe(tmp_path), tmp_path), count(30, 60), 15, tmp_path)
     assert found["after"] == found["before"]
     assert found["left"] < 200.0
 
@@ -62,7 +63,7 @@ def pantograph(tmp_path_factory):
 
 
 def folder_of(instance):
-    return Path(instance._unpacked.folder)
+    return Path(instance._extracted.folder)
 
 
 def test_an_unpacked_fmu_serves_one_instance_at_a_time(pantograph):

@@ -26,14 +26,15 @@ _WHEEL = "import sys; from setuptools.build_meta import build_wheel; print(build
 def wheel(tmp_path_factory):
     """The wheel, built of what a checkout holds."""
     source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    ignore = shutil.ignore_patterns("__pycache__", "*.so")
-    for name in ("models", "fmus", "master"):
+    ignore = shutil.ignore_patterns("__pycache__", "*.so", "resources")
+    for name in ("models", "fmus", "master", "ssp_scenarios"):
         shutil.copytree(ROOT / name, source / name, ignore=ignore)
-    for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, source / name)
+    for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE", "openpanto.py"):
+        if (ROOT / name).is_file():
+            shutil.copy(ROOT / name, source / name)
     _python(sys.executable, "-m", "venv", out / "env", cwd=out)
     python = out / "env" / "bin" / "python"
-    _python(python, "-m", "pip", "install", "-q", "setuptools>=70.1", cwd=out)
+    _python(python, "-m", "pip", "install", "-q", "setuptools>=77.0.3", cwd=out)
     done = _python(python, "-c", _WHEEL, out, cwd=source)
     return out / done.stdout.split()[-1]
 

@@ -12,7 +12,7 @@ from master.evaluation.energy_balance import DRIFT
 from master.recording import checkpoint
 from master.recording.continuation import Continuation
 from master.recording.recording import load
-from master.run import RunOptions, run
+from master.run_session import RunOptions, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.ssp.archive import extract

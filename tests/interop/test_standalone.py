@@ -20,9 +20,8 @@ from tests.effort import IS_LONG, count
 from tests.interop.support import ROOT, STEP
 from tests.interop.test_host import linux, numbers, plan, run_host, unpack
 
-# One group: a runtime is made once in a process.
-pytestmark = [linux, pytest.mark.xdist_group("standalone")]
-STEPS = count(60, 300)
+pytestmark = linux
+STEPS = count(30, 300)
 #: What every Linux with glibc has; libdl and libpthread are names that older programs ask for.
 LIBC = ("libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "librt.so.1", "libutil.so.1")
 LOADER = Path("/lib64/ld-linux-x86-64.so.2")

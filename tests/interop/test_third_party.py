@@ -53,7 +53,7 @@ def test_it_presses_against_the_wire_as_its_uplift_says(scenario, tmp_path, caps
     assert force[recording.time > 1.5].mean() == pytest.approx(150.0, abs=15.0)
     assert np.isfinite(force).all()
     said = capsys.readouterr().out
-    assert "contact 1: coupling added" in said
+    assert "interface residual, contact 1: " in said
 
 
 def test_its_force_is_judged_though_its_names_are_its_own(scenario):

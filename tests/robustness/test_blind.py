@@ -10,6 +10,7 @@ from hypothesis import given, settings
 
 from master.commands.main import main
 from master.scenario.open_scenario import open_scenario
+from tests.effort import count
 from tests.master.conftest import SSV, ssd_text
 from tests.master.ssp.test_nested import BINDING
 from tests.master.ssp.test_nested import MAPPED as MAPPED_BINDING
@@ -72,7 +73,7 @@ def read(scenario):
         }
 
 
-@settings(PROFILE, max_examples=600)
+@settings(PROFILE, max_examples=count(200, 600))
 @given(change=changes())
 def test_descriptions(scenario, change):
     TRIED["description, blindly"] += 1
@@ -82,7 +83,7 @@ def test_descriptions(scenario, change):
         assert read(scenario) == told(data)
 
 
-@settings(PROFILE, max_examples=500)
+@settings(PROFILE, max_examples=count(170, 500))
 @given(change=changes())
 def test_parameter_sets(scenario, change):
     TRIED["parameter set, blindly"] += 1
@@ -95,7 +96,7 @@ def test_parameter_sets(scenario, change):
             assert opened.system.component("pantograph").parameters == values
 
 
-@settings(PROFILE, max_examples=400)
+@settings(PROFILE, max_examples=count(140, 400))
 @given(change=changes())
 def test_mappings(scenario, change):
     TRIED["mapping, blindly"] += 1
@@ -129,7 +130,7 @@ def packed(scenario, path):
     return path.read_bytes()
 
 
-@settings(PROFILE, max_examples=400)
+@settings(PROFILE, max_examples=count(140, 400))
 @given(change=changes())
 def test_archives(scenario, tmp_path_factory, change):
     TRIED["archive, blindly"] += 1
@@ -141,7 +142,7 @@ def test_archives(scenario, tmp_path_factory, change):
         assert read(path) == read(scenario)  # checksums: what is accepted is what was packed
 
 
-@settings(PROFILE, max_examples=400)
+@settings(PROFILE, max_examples=count(140, 400))
 @given(change=changes())
 def test_fmus(scenario, change):
     TRIED["FMU, blindly"] += 1
@@ -154,7 +155,7 @@ def test_fmus(scenario, change):
         verdict(scenario, "ToyPantograph.fmu")
 
 
-@settings(PROFILE, max_examples=400)
+@settings(PROFILE, max_examples=count(140, 400))
 @given(change=changes())
 def test_descriptions_of_fmus(scenario, change):
     """Inside the archive, where no checksum protects them."""

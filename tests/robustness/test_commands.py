@@ -120,7 +120,7 @@ def test_settings_that_cannot_be(setting):
 MASTER_SETTINGS = [
     ("pantograph.static_force=nan", "is not finite"), ("pantograph.static_force=inf", "is not finite"),
     ("pantograph.static_force=x", "'x' is not a number"), ("pantograph.static_force=1e999", "is not finite"),
-    ("pantograph.static_farce=1", "did you mean pantograph.static_force"), ("x=1", "there is no parameter 'x'"),
+    ("pantograph.static_farce=1", "did you mean 'pantograph.static_force'"), ("x=1", "there is no parameter 'x'"),
     ("pantograph.A.x=1", "causality 'output'"), (".static_force=1", "there is no parameter"),
     ("pantograph.=1", "there is no parameter"), ("a" * 500 + "=1", "there is no parameter"),
 ]  # fmt: skip

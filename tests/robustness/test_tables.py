@@ -58,7 +58,7 @@ def refused(error):
     return str(error.value)
 
 
-@settings(PROFILE, max_examples=150)
+@settings(PROFILE, max_examples=count(80, 150))
 @given(table=tables, unit=st.sampled_from(["m", "km", "s", "ms"]), force=st.sampled_from(["N", "kN"]),
        separator=st.sampled_from(",;"))  # fmt: skip
 def test_sound_measurements_are_read_as_written(tmp_path_factory, table, unit, force, separator):
@@ -128,7 +128,7 @@ def test_measurements_in_other_encodings(tmp_path, encoding):
     assert "m.csv" in refused(error)
 
 
-@settings(PROFILE, max_examples=400)
+@settings(PROFILE, max_examples=count(200, 400))
 @given(change=changes())
 def test_measurements_blindly(tmp_path_factory, change):
     TRIED["measurement, blindly"] += 1
@@ -181,7 +181,7 @@ def test_a_bad_cell_of_a_response_is_told_with_its_line(tmp_path, bad, column):
         assert f"r.csv: line {row + 2}: " in refused(error)
 
 
-@settings(PROFILE, max_examples=400)
+@settings(PROFILE, max_examples=count(200, 400))
 @given(change=changes())
 def test_responses_blindly(tmp_path_factory, change):
     TRIED["response, blindly"] += 1
@@ -249,7 +249,7 @@ def family(folder, **changed):
 
 
 @pytest.mark.parametrize("name", [STUDY, VARIANTS])
-@settings(PROFILE, max_examples=200)
+@settings(PROFILE, max_examples=count(100, 200))
 @given(change=changes())
 def test_studies_blindly(tmp_path_factory, name, change):
     TRIED["study, blindly"] += 1

@@ -39,6 +39,7 @@ def test_generic_mechanism_keeps_contact_under_the_line_of_the_source(simulate, 
     assert run["pantograph.joints.violation_rate"].max() < 1e-6
 
 
+@pytest.mark.long
 def test_generic_mechanism_keeps_its_constraints(simulate):
     run = simulate("generic_multibody_ln2")
     assert run.quality["mean"] == pytest.approx(157.5, abs=0.5)
@@ -46,9 +47,9 @@ def test_generic_mechanism_keeps_its_constraints(simulate):
     assert run["pantograph.joints.violation_rate"].max() < 1e-6
 
 
-def test_stagger_rolls_the_head_and_the_strip_follows(simulate):
+def test_stagger_rolls_the_head_and_the_strip_follows(simulate, source_form):
     """The contact sweeps the stagger; the strip's ends rise and fall with the roll."""
-    run = simulate("generic_multibody_ln2")
+    run = simulate(*source_form)
     inside = run.time > 3.6
     lateral = run["pantograph.strip.contact_y"][inside]
     assert lateral.min() < -0.18

@@ -18,12 +18,12 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from master.errors import MasterError, Problem, RequestError, ScenarioError
+from master.errors import MasterError, Problem, RequestError, ScenarioError, hint
 from master.results.results_folder import write_text
+from master.scenario.scenario_place import LIBRARY
 
 STUDY: Final = "study.toml"
 VARIANTS: Final = "variants.csv"
-SCENARIOS: Final = Path("ssp_scenarios")
 _NAME: Final = "variant"
 _RUN: Final = ("stop", "step")
 
@@ -122,16 +122,18 @@ class Family(_Model):
         known = [v.name for v in self.variants]
         for name in names:
             if name not in known:
-                raise RequestError(f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}")
+                raise RequestError(
+                    f"study '{self.name}' has no variant '{name}'; known: {'; '.join(known)}{hint(name, known)}"
+                )
         return tuple(v for v in self.variants if v.name in names or not names)
 
 
-def family_names(root: Path = SCENARIOS) -> tuple[str, ...]:
+def family_names(root: Path = LIBRARY) -> tuple[str, ...]:
     """Return the names of all scenarios that have a study."""
     return tuple(sorted(p.parent.name.removesuffix(".ssp") for p in root.glob(f"*.ssp/{STUDY}")))
 
 
-def load_family(name: str, root: Path = SCENARIOS) -> Family:
+def load_family(name: str, root: Path = LIBRARY) -> Family:
     """Read a family by its name, or by the path of its scenario's folder.
 
     Raises
@@ -141,10 +143,12 @@ def load_family(name: str, root: Path = SCENARIOS) -> Family:
     ScenarioError
         With all mistakes in its files.
     """
-    folder = Path(name) if (Path(name) / STUDY).is_file() else root / f"{name}.ssp"
+    own = sorted(folder for folder in (Path(name), *Path(name).glob("*.ssp")) if (folder / STUDY).is_file())
+    folder = own[0] if len(own) == 1 else root / f"{name}.ssp"
     if not (folder / STUDY).is_file():
-        known = ", ".join(family_names(root)) or "none"
-        raise RequestError(f"there is no study '{name}'; known: {known} (or give a scenario's folder with a {STUDY})")
+        known = family_names(root)
+        text = f"known: {', '.join(known) or 'none'} (or give a scenario's folder with a {STUDY})"
+        raise RequestError(f"there is no study '{name}'; {text}{hint(name, known)}")
     settings = _read_settings(folder / STUDY)
     variants = _read_variants(folder / VARIANTS)
     _check_names(folder / STUDY, settings, variants)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Iterator
@@ -13,11 +12,11 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from master.batch.verification.quantities import QUANTITIES, Choice
-from master.errors import Problem, RequestError, ScenarioError
+from master.errors import Problem, RequestError, ScenarioError, hint
+from master.scenario.scenario_place import LIBRARY
 
-#: The cases that come with the package, and the scenarios that they name.
+#: The cases that come with the package.
 CASES: Final = Path(__file__).parent / "cases"
-SCENARIOS: Final = Path(__file__).parents[3] / "ssp_scenarios"
 _ONLY_RUN: Final = "run"
 
 #: must hold: a row that fails fails the verification. indicative: likewise, though its source calls its data
@@ -147,7 +146,7 @@ class Row(_Data):
     def _problems(self) -> Iterator[str]:
         quantity = QUANTITIES.get(self.quantity)
         if quantity is None:
-            yield f"there is no quantity '{self.quantity}'{_hint(self.quantity, QUANTITIES)}"
+            yield f"there is no quantity '{self.quantity}'{hint(self.quantity, QUANTITIES)}"
             return
         if len(self.references) != 1:
             known = "value, range, minimum, maximum, is, below, above"
@@ -224,7 +223,7 @@ class Case:
     def scenario_path(self, run: str) -> Path:
         """Return the path of the scenario of a run."""
         scenario = self.runs[run].scenario
-        return self.path.parent / scenario if scenario.endswith(".ssp") else SCENARIOS / f"{scenario}.ssp"
+        return self.path.parent / scenario if scenario.endswith(".ssp") else LIBRARY / f"{scenario}.ssp"
 
 
 def find_cases(names: Iterable[str]) -> tuple[Path, ...]:
@@ -250,7 +249,7 @@ def _find(name: str, known: dict[str, Path]) -> Path:
     path = Path(name)
     if path.suffix == ".toml" and path.is_file():
         return path
-    raise RequestError(f"there is no case '{name}'{_hint(name, known)} (--list names them all)")
+    raise RequestError(f"there is no case '{name}'{hint(name, known)} (--list names them all)")
 
 
 def load_cases(paths: Iterable[Path]) -> tuple[Case, ...]:
@@ -307,7 +306,7 @@ def _run_problems(data: _CaseData) -> Iterator[str]:
         for key, names in (("run", (row.run,) if row.run else ()), ("below", row.below), ("above", row.above)):
             for name in names:
                 if name not in data.runs:
-                    yield f"rows[{number}].{key}: there is no run '{name}'{_hint(name, data.runs)}"
+                    yield f"rows[{number}].{key}: there is no run '{name}'{hint(name, data.runs)}"
 
 
 def _sentence(item: Any) -> str:
@@ -319,8 +318,3 @@ def _sentence(item: Any) -> str:
     given = item.get("input")
     shown = f" (given: {given!r})" if isinstance(given, str | int | float) else ""
     return f"{key or 'file'}: {text}{shown}"
-
-
-def _hint(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    return f"; did you mean '{near[0]}'?" if near else ""

@@ -2,4 +2,6 @@
 
 From the definition (`mechanism_definition`, `mechanism_reading`) by the equations (`mechanism`), their assembly, energy
 and integration to `multibody_part`, which a co-simulation steps. The room may import what every pantograph has.
+
+The room is larger than others because a mechanism is declared, derived, assembled and stepped here, each in a file.
 """

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from models.definition_files import field_schema
+from models.definition_files.message_text import hint
 from models.definition_files.toml_reader import Table
 from models.pantograph.multibody.mechanism_definition import (
     JointFriction,
@@ -52,7 +53,7 @@ def _check_references(table: Table, d: MechanismDefinition) -> None:
     uses += [("assembly.body", d.assembly.body)]
     for key, body in uses:
         if body and body not in names:
-            table.problem(key, f"there is no body '{body}' (bodies: {', '.join(sorted(names))})")
+            table.problem(key, f"there is no body '{body}' (bodies: {', '.join(sorted(names))}){hint(body, names)}")
     if d.strip is not None and d.strip.body in d.driven:
         text = f"body '{d.strip.body}' has a prescribed motion; put the strip on one that the contact can move"
         table.problem("strip.body", text)
@@ -78,6 +79,9 @@ def _check_friction(table: Table, d: MechanismDefinition) -> None:
     for f in (f for f in d.forces if isinstance(f, JointFriction)):
         joint = joints.get(f.joint)
         if joint is None:
-            table.problem(f"force.{f.name}.joint", f"there is no joint '{f.joint}'")
+            table.problem(
+                f"force.{f.name}.joint",
+                f"there is no joint '{f.joint}' (joints: {', '.join(joints)}){hint(f.joint, joints)}",
+            )
         elif not isinstance(joint, Revolute | Spherical | Prismatic | Universal):
             table.problem(f"force.{f.name}.joint", f"a {joint.kind} joint takes no friction")

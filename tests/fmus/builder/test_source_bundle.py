@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fmus.builder.fmu_build import build
-from fmus.builder.recipe import ROOTS, recipe
+from fmus.builder.recipe import EMPTIED, ROOTS, recipe
 from fmus.builder.source_bundle import BundleError, Module, check_rewritten, collect, rewrite
 
 HERE = {"models": Path(), "fmus": Path()}
@@ -73,7 +73,7 @@ def test_what_an_fmu_does_not_carry_is_named(tmp_path):
 
 
 def test_the_adapter_can_be_packed():
-    modules = collect("fmus.slave.adapter", ROOTS, frozenset({"pythonfmu"}))
+    modules = collect("fmus.slave.adapter", ROOTS, EMPTIED)
     assert {"models.definition_files.parameter", "fmus.slave.saved_state", "pythonfmu.fmi2slave"} <= modules.keys()
     assert not {"fmus.builder.fmu_build", "pythonfmu.builder"} & modules.keys()
     for module in modules.values():

@@ -9,7 +9,7 @@ import common
 from cofmupy import Coordinator, wrappers
 
 from master.coupling.coupling_schemes import initialise
-from master.run import connected_fmus
+from master.run_session import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
 

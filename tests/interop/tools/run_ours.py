@@ -6,7 +6,7 @@ import common
 
 from master.coupling.coupling_schemes import Jacobi
 from master.coupling.macro_steps import TimeGrid, simulate
-from master.run import connected_fmus
+from master.run_session import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 

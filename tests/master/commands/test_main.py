@@ -100,7 +100,7 @@ def test_overrides_are_honoured(toy, in_folder):
 @pytest.mark.parametrize(
     ("assignment", "text"),
     [
-        ("pantograph.static_farce=1", "did you mean pantograph.static_force"),
+        ("pantograph.static_farce=1", "did you mean 'pantograph.static_force'"),
         ("pantograph.A.z=1", "causality 'output'"),
         ("pantograph.static_force=much", "'much' is not a number"),
         ("pantograph.static_force=inf", "is not finite"),

@@ -92,3 +92,51 @@ def test_a_measurement_elsewhere_is_refused(signals, tmp_path):
     path = write(tmp_path / "m.csv", "position [m],force [N]\n900,1\n901,2\n902,3\n")
     with pytest.raises(MasterError, match="outside the interval of interest"):
         compare_measured(signals, read_measured(path))
+
+
+def in_rows(signals, place, mark="."):
+    """Return the simulated force as rows over ``place``."""
+    rows = (f"{x:.6f};{f:.6f}".replace(".", mark) for x, f in zip(place, signals.raw, strict=True))
+    return "\n".join(["position [m];force [N]", *rows, ""])
+
+
+def test_comments_decimal_commas_tabs_and_decanewtons(signals, tmp_path):
+    text = "# run of 3 May\n\n% km 12\n" + in_rows(signals, signals.position, ",").replace(";", "\t")
+    found = compare_measured(signals, read_measured(write(tmp_path / "m.csv", text)))
+    assert found.rms < 0.01
+    tenth = write(tmp_path / "d.csv", as_csv("position [m],force [daN]", signals.position, signals.raw / 10.0))
+    assert compare_measured(signals, read_measured(tenth)).rms < 0.01
+
+
+def test_two_decimal_marks_in_one_table_are_refused(tmp_path):
+    path = write(tmp_path / "m.csv", "position [m];force [N]\n1,5;120\n2.5;121\n3;122\n")
+    with pytest.raises(MasterError, match="a comma in line 2 and a point in line 3"):
+        read_measured(path)
+
+
+def test_decimal_commas_between_commas_are_explained(tmp_path):
+    with pytest.raises(MasterError, match="need columns separated by semicolons or tabs"):
+        read_measured(write(tmp_path / "m.csv", "position [m],force [N]\n1,5,120,0\n2,5,121,0\n3,5,122,0\n"))
+
+
+def test_an_offset_moves_positions_and_times(signals, tmp_path):
+    over_x = write(tmp_path / "x.csv", as_csv("position [m],force [N]", signals.position + 12000.0, signals.raw))
+    over_t = write(tmp_path / "t.csv", as_csv("time [s],force [N]", signals.time - 3.0, signals.raw))
+    for path, offset, said in ((over_x, -12000.0, "x.csv, its positions -12000 m"), (over_t, 3.0, "times +3 s")):
+        with pytest.raises(MasterError, match=r"interval of interest \(.*\); --measured-offset D moves it"):
+            compare_measured(signals, read_measured(path))
+        found = compare_measured(signals, read_measured(path), offset)
+        assert found.rms < 0.01
+        assert said in found.source
+
+
+def test_kilometrage_that_falls_counts_back_from_the_offset(signals, tmp_path):
+    path = write(tmp_path / "m.csv", in_rows(signals, 12000.0 - signals.position))
+    measured = read_measured(path)
+    assert measured.falls
+    with pytest.raises(MasterError, match=r"the position falls.*D less the measured one"):
+        compare_measured(signals, measured)
+    found = compare_measured(signals, measured, 12000.0)
+    assert found.rms < 0.01
+    assert found.correlation == pytest.approx(1.0, abs=1e-6)
+    assert found.source == "m.csv, at 12000 m less its positions"

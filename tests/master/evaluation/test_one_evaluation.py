@@ -22,7 +22,7 @@ from master.report.charts.line_charts import interval_band
 from master.report.result_tables import figure_rows
 from master.results import results_folder, run_difference, run_results
 from master.results.run_results import Results
-from master.run import run
+from master.run_session import run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.system.contacts import Contact

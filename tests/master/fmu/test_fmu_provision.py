@@ -132,6 +132,22 @@ def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
     assert not (tmp_path / "X.fmu").exists()
 
 
+def test_what_the_scratch_folder_holds_is_used_as_long_as_it_fits(builder, tmp_path):
+    scratch, told = tmp_path / "cache", []
+    scratch.mkdir()
+    for _ in range(2):
+        fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
+    assert builder.asked == ["fingerprint", "build", "fingerprint"]
+    builder.fingerprint = "CD-34"
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
+    assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
+
+
+def test_the_builder_takes_no_modules_from_the_working_folder(monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.path", ["", str(tmp_path)])
+    assert fmu_provision._places() == [str(tmp_path), str(Path(__file__).parents[3])]
+
+
 def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypatch):
     (tmp_path / "slavemodule.txt").write_text("x")
     (tmp_path / "pythonfmu").mkdir()

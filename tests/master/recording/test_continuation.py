@@ -14,7 +14,7 @@ from master.errors import RunError
 from master.recording import checkpoint
 from master.recording.continuation import Continuation
 from master.recording.recording import load
-from master.run import connected_fmus
+from master.run_session import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from tests.master.recording.conftest import go

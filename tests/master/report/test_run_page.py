@@ -30,6 +30,22 @@ def traces_of(chart):
     return {t["name"]: t for t in interactive_figure(chart)["data"]}
 
 
+def test_the_page_bears_the_names_of_scenario_line_and_pantograph(made_up):
+    run = made_up()
+    models = {"catenary": "LN2, simple catenary", "pantograph": "Faiveley <CX>, three-stage lumped mass"}
+    components = [{"name": name, "description": text, "fmu": f"{name}.fmu"} for name, text in models.items()]
+    text = run_page.page(
+        dataclasses.replace(run, summary={**run.summary, "title": "CX on LN2", "components": components})
+    )
+    assert "<h1>CX on LN2</h1>" in text
+    assert (
+        "scenario &lt;made&gt; &amp; up; catenary: LN2, simple catenary; pantograph: Faiveley &lt;CX&gt;, three" in text
+    )
+    assert "<b>Faiveley &lt;CX&gt;</b>" in text
+    assert "<th class='n'>Faiveley &lt;CX&gt;</th>" in text
+    assert "pantograph-catenary interaction</h1>" in run_page.page(run)
+
+
 def test_text_is_escaped_and_incompleteness_is_said_first(made_up):
     page = run_page.page(made_up("failed"))
     assert "&lt;made&gt; &amp; up" in page

@@ -9,7 +9,7 @@ import pytest
 
 from master.errors import RunError
 from master.fmu.isolation.isolated_instance import Isolation
-from master.run import RunOptions
+from master.run_session import RunOptions
 from master.ssp.pack import pack
 from tests.foreign_fmus import (
     compile_library,

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from master.errors import ScenarioError
-from master.run import connected_fmus, run
+from master.run_session import connected_fmus, run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.ssp.ssp_units import Conversion

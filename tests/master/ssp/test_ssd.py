@@ -139,7 +139,7 @@ CONNECTION = (
             '<panto:Interval start="20"',
             '<panto:Interval begin="20"',
             "annotation",
-            "Interval begin: Extra inputs",
+            "Interval has no attribute 'begin' (known: start, end, until)",
         ),
         (
             "<panto:Interval",

@@ -203,11 +203,16 @@ def _moving_strip(n, dt, speed=83.0, start=95.0):
 
 
 def _plain_iteration(model, dt, steps):
-    """The source's fixed-point iteration, run to convergence: every slack dropper's force compensated [2.11]."""
+    """The source's fixed-point iteration, run to convergence: every slack dropper's force compensated [2.11].
+
+    The compensations and the contact force act through responses solved once, so an iteration is a small product.
+    """
     newmark, line = Newmark(dt), NodalLine(model)
     lu = splu((line.K + newmark.a0 * line.M + newmark.a1 * line.C).tocsc())
     d, v, a = (np.zeros(line.size) for _ in range(3))
     contact = model.definition.contact
+    given_way = lu.solve(line.B.T.toarray())
+    between = line.B @ given_way
     element, forces, slack, contacts = -1, [], [], []
     for n in range(1, steps + 1):
         strip = _moving_strip(n, dt)[0]
@@ -218,15 +223,18 @@ def _plain_iteration(model, dt, steps):
         element = found.element
         shape, height = line.row(0, found.element, found.xi)
         z = strip[0, 0, 2] + found.share * (strip[1, 0, 2] - strip[0, 0, 2])
-        new = free
-        for _ in range(2000):
-            pull = pulls(model, line.B @ new, line.B @ (newmark.a1 * (new - d) - v))
-            gap = z - (height + shape @ new)
-            force = contact.stiffness * max(gap, 0.0)
-            load = right + line.B.T @ np.minimum(pull, 0.0) + force * shape
-            before, new = new, lu.solve(load)
-            if np.abs(new - before).max() < 1e-15:
+        pushed = lu.solve(shape)
+        longer_free, longer_before, rate_before = line.B @ free, line.B @ d, line.B @ v
+        to_droppers, to_contact, own = line.B @ pushed, shape @ given_way, shape @ pushed
+        longer, rise = longer_free, shape @ free
+        for _ in range(20000):
+            cut = np.minimum(pulls(model, longer, newmark.a1 * (longer - longer_before) - rate_before), 0.0)
+            force = contact.stiffness * max(z - (height + rise), 0.0)
+            before, longer = longer, longer_free + between @ cut + force * to_droppers
+            rise_before, rise = rise, shape @ free + to_contact @ cut + force * own
+            if max(np.abs(longer - before).max(), abs(rise - rise_before)) < 1e-16:
                 break
+        new = free + given_way @ cut + force * pushed
         acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
         v = v + 0.5 * dt * (a + acceleration)
         d, a = new, acceleration

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from master.evaluation.contact_quality import assess
 from master.evaluation.filters import ForceFilter
@@ -17,6 +17,7 @@ from models.library.catalogue import load_pantograph
 from models.numerics.newmark import Newmark
 from models.pantograph.lumped.lumped_model import LumpedModel
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
+from tests.effort import IS_LONG
 from tests.models.nodal_line import NodalLine
 
 START = 70.0
@@ -44,7 +45,7 @@ def _assembled(line, pantograph, dt, steps):
     M, C, K = (
         sp.block_diag([getattr(catenary, name), getattr(lumped, name)], format="csr") for name in ("M", "C", "K")
     )
-    base = (K + newmark.a0 * M + newmark.a1 * C).tocsc()
+    base = splu((K + newmark.a0 * M + newmark.a1 * C).tocsc())
     B = sp.hstack([catenary.B, sp.csr_matrix((catenary.B.shape[0], m))], format="csr")
     d, v, a = (np.zeros(n + m) for _ in range(3))
     forces, elements = [], [-1] * len(model.wires)
@@ -52,7 +53,7 @@ def _assembled(line, pantograph, dt, steps):
         t = step * dt
         right = M @ (newmark.a0 * d + newmark.a2 * v + newmark.a3 * a) + C @ (newmark.a1 * d + newmark.a4 * v)
         right[n:] += lumped.load(t, np.zeros(2))
-        rows, gaps, elements = _contact_rows(catenary, pantograph, t, spsolve(base, right)[:n], elements, n + m)
+        rows, gaps, elements = _contact_rows(catenary, pantograph, t, base.solve(right)[:n], elements, n + m)
         new, penetration = _settled(line, model, base, B, right, rows, gaps)
         acceleration = newmark.a0 * (new - d) - newmark.a2 * v - newmark.a3 * a
         v = v + 0.5 * dt * (a + acceleration)
@@ -75,13 +76,22 @@ def _contact_rows(catenary, pantograph, t, free, elements, size):
     return np.array(rows), np.array(gaps), met
 
 
+def _solved(base, rows, springs, load):
+    """Solve (base + sum of s r r') d = load; the few springs through what they do to one another (Woodbury)."""
+    free = base.solve(load)
+    if not len(rows):
+        return free
+    response = base.solve(rows.T)
+    return free - response @ np.linalg.solve(np.diag(1.0 / springs) + rows @ response, rows @ free)
+
+
 def _settled(line, model, base, B, right, rows, gaps):
     k, closed, slack = line.contact.stiffness, np.zeros(len(rows), dtype=bool), np.zeros(B.shape[0], dtype=bool)
     for _ in range(50):
         R = sp.csr_matrix(rows[closed])
-        system = base + k * (R.T @ R) - B[slack].T @ sp.diags(model.dropper_law.stiffness[slack]) @ B[slack]
         load = right - k * (R.T @ gaps[closed]) + B[slack].T @ model.static.dropper_force[slack]
-        new = spsolve(system.tocsc(), load)
+        springs = np.concatenate([np.full(closed.sum(), k), -model.dropper_law.stiffness[slack]])
+        new = _solved(base, np.vstack([rows[closed], B[slack].toarray()]), springs, load)
         penetration = gaps + rows @ new
         elastic = model.static.dropper_force + model.dropper_law.stiffness * (B @ new)
         if np.array_equal(penetration > 0.0, closed) and np.array_equal(elastic < 0.0, slack):
@@ -215,6 +225,8 @@ def test_up_to_four_pantographs_of_any_kind_on_one_line(line_maker, kinds):
     ]
     together = CoupledModel(CatenaryModel(line), spaced).run(0.25, 1e-3)
     for i, pantograph in enumerate(spaced):
+        if i == 0 and not IS_LONG:
+            continue  # it is the trailing one that runs through the other's waves
         alone = CoupledModel(CatenaryModel(line), [pantograph]).run(0.25, 1e-3)
         assert alone.contact_force.max() > 50.0
         assert together.contact_force[:, i] == pytest.approx(alone.contact_force[:, 0], abs=0.5)
@@ -228,6 +240,8 @@ def test_a_kilometre_apart_each_runs_as_if_it_were_alone(line_maker, cx):
     spaced = [cx.with_values({"start_position": x, "static_force": 178.0}) for x in starts]
     together = CoupledModel(line, spaced).run(stop, 1e-3)
     for i, pantograph in enumerate(spaced):
+        if i == 0 and not IS_LONG:
+            continue  # it is the trailing one that runs through the other's waves
         alone = CoupledModel(line, [pantograph]).run(stop, 1e-3)
         interval = (starts[i] + 350.0, starts[i] + 600.0)
         figures = [

@@ -139,7 +139,7 @@ def test_every_mistake_is_reported_with_its_key():
     data["force"]["odd"] = {"kind": "string", "length": 3}
     with pytest.raises(DefinitionError) as raised:
         _read(data)
-    assert [(p.key, p.text.split(":")[0].split(" (")[0]) for p in raised.value.problems] == [
+    assert [(p.key, p.text.split(":")[0].split(" (")[0].split(";")[0]) for p in raised.value.problems] == [
         ("law", "'square' is none of linear, cubic"),
         ("body.leg 2", "a name is made of letters, digits, '_' and '-'"),
         ("body.leg 2.inertia", "is missing"),

@@ -70,8 +70,9 @@ def test_every_bar_of_every_line_has_the_stiffness_of_its_nonlinear_force(line_a
 
 def test_it_stands_where_droppers_and_arms_stand_and_nowhere_else(line_and_form):
     line, mesh, static = line_and_form
-    found = CatenaryModel(line).static.pendulum_stiffness()
-    expected = nodal_line.pendulum_stiffness(CatenaryModel(line))
+    model = CatenaryModel(line)
+    found = model.static.pendulum_stiffness()
+    expected = nodal_line.pendulum_stiffness(model)
     assert abs(found - expected).max() < 1e-9 * abs(expected).max()
     rigid = np.zeros((len(mesh.points), NODE_DOFS))
     rigid[:, :3] = 1.0

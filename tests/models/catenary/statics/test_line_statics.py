@@ -176,6 +176,12 @@ def test_command_writes_tables_and_plots_of_every_line(name, tmp_path, capsys):
     assert all(float(row["tension [N]"]) > 0.0 for row in rows)
     tables = {"contact_wire.csv", "messenger_wire.csv", "elasticity.csv", "steady_arms.csv", "summary.csv"}
     assert tables <= {p.name for p in tmp_path.iterdir()}
+    shown = [line.split()[-2] for line in text.splitlines() if "elasticity at 100 N" in line]
+    with (tmp_path / "elasticity.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {int(row["section"]) for row in rows} == set(range(1, len(load_line(name).sections) + 1))
+    values = [float(row["elasticity [mm/N]"]) for row in rows if row["section"] == "1"]
+    assert shown == [f"{min(values):.4f}", f"{max(values):.4f}"]
 
 
 @pytest.mark.parametrize(

@@ -220,7 +220,7 @@ def test_undamped_mechanism_keeps_its_energy():
     assert abs(drift) < 1e-6 * swing * 4.0 / 60.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_undamped_mechanism_keeps_its_energy_over_a_minute():
     swing, drift = swing_and_drift(60.0)
     assert abs(drift) < 1e-6 * swing
@@ -232,7 +232,7 @@ def test_halving_the_tolerance_changes_little(generic):
     assert np.abs(ends[0] - ends[1])[: 3 * mechanism.count].max() < 1e-7
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_halving_the_tolerance_changes_a_ten_second_response_by_less_than_a_micrometre(generic):
     mechanism, y = generic
     ends = [run(mechanism, y.copy(), 10.0, inputs=forcing, tolerance=t) for t in (1e-8, 5e-9)]

@@ -15,7 +15,7 @@ from master.errors import MasterError, RunError
 from master.evaluation.contact_positions import strip_centre, track_position
 from master.recording.recording import load
 from master.results import run_results
-from master.run import run
+from master.run_session import run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 

@@ -1,0 +1,4 @@
+"""What the package hands out to Python: lines and pantographs from definitions, statics, the pair as one system.
+
+The names of `models` are found here. May import every room but the commands; nothing of it goes into an FMU.
+"""

@@ -1,0 +1,222 @@
+"""A line at rest: shape, droppers and steady arms of a section, elasticity and waves of one of its spans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.arrays import BoolArray, FloatArray
+from models.catenary import line_advice
+from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.line_model import CatenaryModel
+from models.catenary.line_part import CatenaryPart
+from models.catenary.statics import elasticity as under_force
+from models.catenary.statics import rest_profile, wire_waves
+from models.definition_files.given_value import quantity
+from models.definition_files.parameter import ParameterError
+from models.interface.column_frames import column_frame
+from models.interface.line_and_pantograph import Line, open_line
+
+if TYPE_CHECKING:
+    import pandas
+
+#: A table: titles with units, and columns.
+Table = tuple[tuple[str, ...], tuple[FloatArray | BoolArray, ...]]
+
+
+@dataclass(frozen=True)
+class LineStatics:
+    """A section of a line at rest, and one span in detail; SI.
+
+    Attributes
+    ----------
+    model : CatenaryModel
+        The line in its static state; no promise is kept for this attribute.
+    section : int
+        Index of the section, from 0.
+    number : int
+        Number of the span in detail, from 1.
+    span : Span
+        Its ``start``, ``end`` and ``droppers`` [m].
+    profiles : tuple of Profile
+        ``component``, ``x``, ``y``, ``z`` of every wire [m].
+    droppers : Droppers
+        ``x``, ``length`` [m], ``force`` [N], ``is_hanger`` of every dropper.
+    arms : ArmLoads
+        ``x`` [m], ``lateral``, ``lift`` [N] of every steady arm.
+    elasticity : Elasticity
+        ``x`` [m], ``value`` [m/N] along the span, ``minimum``, ``maximum``, ``non_uniformity``.
+    others : dict
+        Number and elasticity of the middle span of every other section, by its index.
+    waves : Waves
+        ``speed``, ``limit`` [m/s], ``reflection``, ``doppler``, ``amplification``.
+    warnings : tuple of str
+        What deserves a second look.
+    """
+
+    model: CatenaryModel
+    section: int
+    number: int
+    span: Span
+    profiles: tuple[rest_profile.Profile, ...]
+    droppers: rest_profile.Droppers
+    arms: rest_profile.ArmLoads
+    elasticity: under_force.Elasticity
+    others: dict[int, tuple[int, under_force.Elasticity]]
+    waves: wire_waves.Waves
+    warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<LineStatics of {self.model.definition.name}, span {self.number}>"
+
+    @property
+    def span_droppers(self) -> rest_profile.Droppers:
+        """Return the droppers (and hangers) of the span in detail."""
+        return rest_profile.droppers(self.model, self.span.start, self.span.end, self.section)
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """Titles and columns by name: ``droppers``, ``elasticity``, ``steady_arms``, and every kind of wire."""
+        d, a = self.droppers, self.arms
+        all_sections = {self.section: self.elasticity} | {section: other for section, (_, other) in self.others.items()}
+        parts = [(np.full_like(e.x, section + 1), e.x, 1e3 * e.value) for section, e in sorted(all_sections.items())]
+        titles = ("x [m]", "unstrained length [m]", "tension [N]", "hanger")
+        found: dict[str, Table] = {
+            "droppers": (titles, (d.x, d.length, d.force, d.is_hanger)),
+            "elasticity": (("section", "x [m]", "elasticity [mm/N]"), _joined(parts)),
+            "steady_arms": (("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift)),
+        }
+        for component in dict.fromkeys(p.component for p in self.profiles):
+            same = [(p.x, p.y, p.z) for p in self.profiles if p.component == component]  # stitch wires one by one
+            found[component] = (("x [m]", "y [m]", "z [m]"), _joined(same))
+        return found
+
+    def frame(self, name: str) -> pandas.DataFrame:
+        """Return one of the `tables` as a data frame (needs pandas).
+
+        Raises
+        ------
+        ParameterError
+            If there is no such table.
+        """
+        if name not in self.tables:
+            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
+        return column_frame(*self.tables[name])
+
+
+def statics(
+    line: Line | str | Path,
+    *,
+    span: int | None = None,
+    section: int = 1,
+    speed: float | str = "300 km/h",
+    force: float | str = "100 N",
+) -> LineStatics:
+    """Find the shape of a line at rest, its droppers and steady arms, and elasticity and waves of one span.
+
+    Parameters
+    ----------
+    line : Line, str or Path
+        From `open_line`, or what it takes.
+    span : int, optional
+        Span in detail, from 1; by default the middle one.
+    section : int
+        Section of a line with overlaps, from 1.
+    speed : float or str
+        Speed of the train for the wave figures, in m/s or with a unit.
+    force : float or str
+        Force of the elasticity, in N or with a unit.
+
+    Raises
+    ------
+    ParameterError
+        If the line has no such section or span, or speed or force cannot be meant.
+
+    Examples
+    --------
+    >>> found = statics("LN2", span=12)
+    >>> round(1e3 * found.elasticity.maximum, 2), round(3.6 * found.waves.speed)
+    (0.43, 441)
+    """
+    found = line if isinstance(line, Line) else open_line(line)
+    values = {"speed": given("speed", speed, "m/s"), "force": given("force", force, "N")}
+    return at_rest(found.definition, span, section, **values)
+
+
+def given(name: str, value: float | str, unit: str) -> float:
+    """Return a quantity greater than 0 that was given from Python, in SI.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    try:
+        found = quantity(name, value, unit)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(str(error)) from error
+    if found <= 0.0:
+        raise ParameterError(f"{name}: {value} must be greater than 0 {unit}")
+    if unit == "m/s" and found > FASTEST:
+        raise ParameterError(f"{name}: {found:g} m/s is faster than any train; give it with its unit ('{value} km/h')")
+    return found
+
+
+#: Highest speed that is meant in m/s: above it km/h were [m/s].
+FASTEST = 200.0
+
+
+def at_rest(definition: CatenaryDefinition, span: int | None, section: int, speed: float, force: float) -> LineStatics:
+    """Return the statics of a section and a span, both counted from 1, at a speed [m/s] and under a force [N].
+
+    Raises
+    ------
+    ParameterError
+        If the line has no such section or span.
+    """
+    if not 1 <= section <= len(definition.sections):
+        raise ParameterError(f"section {section}: the line has sections 1 to {len(definition.sections)}")
+    index = section - 1
+    spans = definition.sections[index].spans
+    number = span if span is not None else (len(spans) + 1) // 2
+    if not 1 <= number <= len(spans):
+        raise ParameterError(f"span {number}: the line has spans 1 to {len(spans)}")
+    chosen = spans[number - 1]
+    part = CatenaryPart(definition)
+    model = part.model
+    warnings = (
+        line_advice.speed_warning(definition, speed),
+        line_advice.slack_warning(part.droppers, model.static.is_slack),
+        line_advice.slack_law_warning(definition),
+    )
+    return LineStatics(
+        model=model,
+        section=index,
+        number=number,
+        span=chosen,
+        profiles=rest_profile.profiles(model, index),
+        droppers=rest_profile.droppers(model, section=index),
+        arms=rest_profile.arm_loads(model, index),
+        elasticity=_elasticity(model, index, number, force),
+        others={
+            other: (middle := (len(s.spans) + 1) // 2, _elasticity(model, other, middle, force))
+            for other, s in enumerate(definition.sections)
+            if other != index
+        },
+        waves=wire_waves.waves(definition, speed, chosen.length),
+        warnings=tuple(filter(None, warnings)),
+    )
+
+
+def _elasticity(model: CatenaryModel, section: int, number: int, force: float) -> under_force.Elasticity:
+    span = model.definition.sections[section].spans[number - 1]
+    return under_force.elasticity(model, under_force.positions_in_span(span), force, section)
+
+
+def _joined(parts: Sequence[tuple[FloatArray, ...]]) -> tuple[FloatArray, ...]:
+    """Return columns of several tables, one table after the other."""
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))

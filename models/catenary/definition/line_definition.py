@@ -189,7 +189,7 @@ class Dynamics:
 
 @dataclass(frozen=True, kw_only=True)
 class Irregularity:
-    """Errors of assembly, normal and limited to three standard deviations; drawn anew for every seed."""
+    """Errors of assembly, normal and limited to three standard deviations; every seed has its own."""
 
     seed: int = count("number that decides which errors are drawn", default=0, maximum=LARGEST_SEED)
     dropper_length_sigma: float = quantity(

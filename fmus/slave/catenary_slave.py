@@ -29,10 +29,10 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "wires, where the definition has them) as tensioned Euler-Bernoulli beams, droppers that carry tension only, "
         "steady arms, stagger, clamps as lumped masses, proportional damping. The static shape is found first (given "
         "contact-wire height and pre-sag, the dropper lengths follow), then, with errors of assembly or active faults, "
-        "where the line comes to rest with the lengths and supports that these leave it; the dynamics are linear about it, except for "
-        "slackening droppers and the contact, and are integrated with constant steps. The pantograph gives the ends "
-        "of its collector strip; the line finds where the wire crosses the strip, the contact force from the "
-        "interpenetration, and its point of application. Between communication points the strip is continued from "
+        "where the line comes to rest with the lengths and supports that these leave it; the dynamics are linear about "
+        "it, except for slackening droppers and the contact, and are integrated with constant steps. The pantograph "
+        "gives the ends of its collector strip; the line finds where the wire crosses the strip, the contact force from "
+        "the interpenetration, and its point of application. Between communication points the strip is continued from "
         "its last positions and velocities, so hosts that hold inputs lose no accuracy."
     )
     limits: ClassVar[tuple[str, ...]] = (

@@ -217,7 +217,7 @@ class Fault:
     dropper: int = count("dropper of the span, from 1", minimum=1, tunable=False)
     active: int = count("whether the fault acts: 1 yes, 0 no", default=1, maximum=1)
     value: float | None = quantity(
-        "m", "how far the dropper has slipped: what it is longer than designed", default=None, minimum=-1.0, maximum=5.0
+        "m", "how far the dropper has slipped: what it is longer than designed", default=None, minimum=-5.0, maximum=5.0
     )
 
     def problems(self) -> Iterator[tuple[str, str]]:

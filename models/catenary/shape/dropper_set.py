@@ -57,7 +57,7 @@ def dropper_set(definition: CatenaryDefinition, mesh: CatenaryMesh, points: Floa
         stiffness=np.where(mesh.broken, 0.0, each(lambda dropper: _stiffness(dropper, length))),
         compression_ratio=each(lambda dropper: dropper.compression_ratio),
         slack_delay=each(lambda dropper: alpha if dropper.slack_law == "tension" else 0.0),
-        mass=each(lambda dropper: dropper.mass) * length,
+        mass=each(lambda dropper: dropper.mass) * np.where(mesh.broken, mesh.given_length, length),
     )
 
 

@@ -277,7 +277,7 @@ def test_every_mistake_in_a_fault_is_told():
     assert "dropper_broken, dropper_slipped" in found["fault[9].kind"]
     assert "outside 0 ... 1" in found["fault[10].active"]
     assert "unknown key" in found["fault[11].colour"]
-    assert "outside -1 ... 5" in found["fault[12].value"]
+    assert "outside -5 ... 5" in found["fault[12].value"]
     assert found["fault[13].span"] == "is missing"
     assert len(found) == 12
 

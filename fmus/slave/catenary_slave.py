@@ -31,9 +31,9 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "contact-wire height and pre-sag, the dropper lengths follow), then, with errors of assembly or active faults, "
         "where the line comes to rest with the lengths and supports that these leave it; the dynamics are linear about "
         "it, except for slackening droppers and the contact, and are integrated with constant steps. The pantograph "
-        "gives the ends of its collector strip; the line finds where the wire crosses the strip, the contact force from "
-        "the interpenetration, and its point of application. Between communication points the strip is continued from "
-        "its last positions and velocities, so hosts that hold inputs lose no accuracy."
+        "gives the ends of its collector strip; the line finds where the wire crosses the strip, the contact force "
+        "from the interpenetration, and its point of application. Between communication points the strip is continued "
+        "from its last positions and velocities, so hosts that hold inputs lose no accuracy."
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Displacements are small against the spans: geometry is linearised about the static shape.",

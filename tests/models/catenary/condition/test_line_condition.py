@@ -191,8 +191,8 @@ def test_a_dropper_that_has_slipped_by_a_metre_is_as_good_as_broken(short):
     line, design = short
     slack, gone = (changed(design, with_faults(line, f)) for f in (slipped(4, 1.0, span=3), broken(4, span=3)))
     assert slack.dropper_force == pytest.approx(gone.dropper_force, abs=1e-6 * weight(design.shape.matrices))
-    # Its mass goes with its length, some milligrams.
-    assert np.abs(slack.positions - gone.positions).max() < 1e-6
+    # One that hangs slack has the mass of the distance that it spans, two grams more.
+    assert np.abs(slack.positions - gone.positions).max() < 2e-5
     assert np.count_nonzero(slack.is_slack) == 1
     assert not gone.is_slack.any()
 

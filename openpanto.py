@@ -62,6 +62,28 @@ VERBS: Final[Mapping[str, Verb]] = {
         _MASTER,
         ("run cx_ln2", "run demo --set catenary.contact_wire.tension='20 kN' --out results/20kN"),
     ),
+    "new": Verb(
+        "write a project: a scenario of a line and pantographs, and copies of their definitions to edit",
+        "openpanto:add_new",
+        _MASTER,
+        (
+            "new demo --line LN2 --pantograph DSA380 --speed 250",
+            "new train --line LN2 --pantograph CX --pantograph CX --separation 100 --speed 300",
+            "new theirs --line LN2 --pantograph Theirs.fmu --map contact.force=push --speed 300",
+        ),
+    ),
+    "new-line": Verb(
+        "copy the definition of a line, under a new name, into the project",
+        "openpanto:add_new_line",
+        _MASTER,
+        ("new-line my_line --like LN2",),
+    ),
+    "new-pantograph": Verb(
+        "copy the definition of a pantograph, under a new name, into the project",
+        "openpanto:add_new_pantograph",
+        _MASTER,
+        ("new-pantograph my_pantograph --like CX",),
+    ),
     "validate": Verb(
         "check a scenario without running it",
         "master.commands.scenario_commands:add_validate",
@@ -302,6 +324,140 @@ def _named(place: str) -> Callable[..., Any]:
     module, _, name = place.partition(":")
     found: Callable[..., Any] = getattr(importlib.import_module(module), name)
     return found
+
+
+def add_new(verbs: Any) -> None:
+    """Declare ``new`` and its options."""
+    from master.commands.command_options import assignment, finite_number
+
+    parser = verbs.add_parser("new", help=VERBS["new"].text)
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the project, new or empty")
+    what = "name in the library or the project, file NAME.toml, or an FMU, X.fmu"
+    parser.add_argument("--line", required=True, metavar="LINE", help=what)
+    text = "the same for a pantograph; once for each, the leading one first"
+    parser.add_argument("--pantograph", required=True, action="append", metavar="PANTOGRAPH", help=text)
+    text = "from one pantograph to the next [m]; once, or once for each gap"
+    parser.add_argument("--separation", action="append", type=finite_number, default=[], metavar="M", help=text)
+    parser.add_argument("--speed", required=True, type=finite_number, metavar="KM/H", help="of the train [km/h]")
+    text = "where figures are taken [m]; by default as many spans as the line has room for, ten at most"
+    parser.add_argument("--interval", nargs=2, type=finite_number, metavar=("START", "END"), help=text)
+    text = "which variable of an FMU a port is (A.x ... B.vz, contact.force), if its name does not say; repeatable"
+    parser.add_argument("--map", action="append", type=assignment, default=[], metavar="PORT=VARIABLE", help=text)
+    parser.set_defaults(verb=_new)
+
+
+def add_new_line(verbs: Any) -> None:
+    """Declare ``new-line``."""
+    _add_copy(verbs, "new-line", "lines")
+
+
+def add_new_pantograph(verbs: Any) -> None:
+    """Declare ``new-pantograph``."""
+    _add_copy(verbs, "new-pantograph", "pantographs")
+
+
+def _add_copy(verbs: Any, verb: str, kind: str) -> None:
+    parser = verbs.add_parser(verb, help=VERBS[verb].text)
+    parser.add_argument("name", metavar="NAME", help="of the copy: letters, digits and _")
+    parser.add_argument("--like", required=True, metavar="NAME", help="name of the original, or its file NAME.toml")
+    parser.set_defaults(verb=_copy, kind=kind)
+
+
+def _new(options: argparse.Namespace) -> int:
+    """Write a project."""
+    from master.evaluation.en50367_limits import LimitChoice, limits_at
+    from master.scenario.project import new_project as projects
+    from master.scenario.project.stretch import Wire
+    from models.library import definition_facts as facts
+    from models.library.catalogue import load_line, load_pantograph
+
+    projects.check_folder(options.folder)
+    name, speed = projects.project_name(options.folder), options.speed / 3.6
+    wire, lifts = None, {}
+    line, definition = _source("lines", options.line, name, load_line)
+    if definition is not None:
+        wire = Wire(options.line, *facts.line_facts(definition))
+    train = []
+    for given in options.pantograph:
+        pantograph, definition = _source("pantographs", given, name, load_pantograph)
+        train.append(pantograph)
+        if definition is not None:
+            lifts[pantograph.name] = projects.Lift(*facts.lift_facts(definition))
+    target = limits_at(speed, LimitChoice()).mean_upper.value
+    interval = tuple(options.interval) if options.interval else None
+    request = projects.Request(
+        options.folder, line, wire, train, lifts, options.separation, speed, target, interval, options.map
+    )
+    projects.new_project(request)
+    print(f"{options.folder / 'README.md'} says what each file is; next: openpanto run {options.folder}")
+    return 0
+
+
+def _source(kind: Any, given: str, project: str, load: Callable[[str], Any]) -> tuple[Any, Any]:
+    """Return what is copied into a project, and the definition; of an FMU its path, and None."""
+    from master.scenario.project.new_project import Definition
+
+    if given.lower().endswith(".fmu"):
+        return Path(given), None
+    path, text, definition = _original(kind, given, load)
+    name, text = _renamed(path, text, f"{project}_{path.stem}")
+    from models.library.search_path import LIBRARY
+
+    origin = f"copy of {path.stem} in the library" if path.is_relative_to(LIBRARY) else f"copy of {path}"
+    return Definition(name, text, origin), definition
+
+
+def _copy(options: argparse.Namespace) -> int:
+    """Write a copy of a definition under another name."""
+    from master.errors import RequestError
+    from master.safety.safe_files import write_atomically
+    from models.library import search_path as places
+    from models.library.catalogue import load_line, load_pantograph
+
+    load = load_line if options.kind == "lines" else load_pantograph
+    path, text, _ = _original(options.kind, options.like, load)
+    name, text = _renamed(path, text, options.name)
+    if taken := places.definition_files(options.kind, name, [*places.search_path(), places.LIBRARY]):
+        raise RequestError(f"{taken[0]} is named '{name}' already: take another name")
+    project = places.project_folder(Path())
+    copy = (project or Path()) / options.kind / f"{name}.toml"
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(copy, text.encode())
+    print(copy)
+    if project is None:
+        text = f"for other folders, add {Path().resolve()} to {places.VARIABLE}"
+        print(f"note: this folder lies in no project, so '{name}' is found from here alone; {text}", file=sys.stderr)
+    return 0
+
+
+def _original(kind: Any, given: str, load: Callable[[str], Any]) -> tuple[Path, str, Any]:
+    """Return file, text and definition of a name."""
+    from master.errors import RequestError
+    from models.definition_files.toml_reader import DefinitionError
+    from models.library import catalogue
+
+    try:
+        path = (catalogue.line_path if kind == "lines" else catalogue.pantograph_path)(given)
+        return path, path.read_text(encoding="utf-8"), load(str(path))
+    except (catalogue.UnknownNameError, DefinitionError) as error:
+        raise RequestError(str(error)) from error
+    except UnicodeDecodeError as error:
+        raise RequestError(f"{given} is not a text file in UTF-8") from error
+
+
+def _renamed(path: Path, text: str, name: str) -> tuple[str, str]:
+    """Return a name and the text of a definition that has it."""
+    from master.errors import RequestError
+    from models.library import definition_copy
+
+    try:
+        name = definition_copy.checked_name(name)
+    except definition_copy.CopyError as error:
+        raise RequestError(str(error)) from error
+    try:
+        return name, definition_copy.renamed(text, name)
+    except definition_copy.CopyError as error:
+        raise RequestError(f"{path}: {error}") from error
 
 
 def add_doctor(verbs: Any) -> None:

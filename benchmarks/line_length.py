@@ -43,7 +43,7 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--spans", nargs="+", type=int, default=[10, 20, 50, 100, 200])
     parser.add_argument("--pantographs", nargs="+", type=int, default=[1, 2, 3, 4])
-    # What the process is told that measures one length.
+    # The argument of the process that measures one length.
     parser.add_argument("--alone", type=int, help=argparse.SUPPRESS)
     return parser.parse_args()
 

@@ -132,7 +132,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--line", default="LN2")
     parser.add_argument("--speed", type=float, default=300.0, help="of the moving force [km/h]")
     parser.add_argument("--seconds", type=float, default=2.0, help="simulated time of the comparison of results")
-    # What a process that tries one solver is told.
+    # The arguments of a process that tries one solver.
     parser.add_argument("--case", choices=CASES, default="linear", help=argparse.SUPPRESS)
     parser.add_argument("--solver", help=argparse.SUPPRESS)
     return parser.parse_args()

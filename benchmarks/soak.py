@@ -69,7 +69,7 @@ class Lumped:
 
 
 class Multibody:
-    """A multibody pantograph and a line that both step with what the other told after the last step.
+    """A multibody pantograph and a line that both step with what the other gave after the last step.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Multibody:
         names = [name for name, _, _ in self._pantograph.observed]
         self._place = names.index("joints.violation")
         self.violation = 0.0
-        for _ in range(2):  # each is told what the other says at rest
+        for _ in range(2):  # each receives what the other gives at rest
             self._pantograph.initialise(0.0, self._line.contact_force[0], self._line.contact_point[0], _BASE)
             self._line.initialise(0.0, self._pantograph.strip[None])
 

@@ -52,7 +52,7 @@ def main() -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--spans", type=int, default=200, help="of the longer line, default 200")
-    # What the process is told that starts one line; 0 is LN2.
+    # The argument of the process that starts one line; 0 is LN2.
     parser.add_argument("--alone", type=int, help=argparse.SUPPRESS)
     return parser.parse_args()
 

@@ -1,4 +1,4 @@
-"""Timing by turns: what is compared is measured in the same run, round after round, and told as ratios.
+"""Timing by turns: what is compared is measured in the same run, round after round, and given as ratios.
 
 Jobs run within this process, on one thread, so it is processor time that counts: what other programs take of a busy
 machine does not.
@@ -22,7 +22,7 @@ _WIDTH = 160
 
 
 def on_one_thread() -> None:
-    """Start the script anew with one BLAS thread, unless it runs so already: libraries read that when they load."""
+    """Restart the script with one BLAS thread, unless it runs so already: libraries read that when they load."""
     if os.environ.get("OMP_NUM_THREADS") != "1":
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], environment)

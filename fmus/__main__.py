@@ -15,11 +15,21 @@ from pathlib import Path
 from typing import Any
 
 from fmus.builder.fmu_build import build, why_no_loader
-from fmus.builder.recipe import MAX_PORTS, BuildError, Recipe, UnknownFmuError, fingerprint, known_names, recipe
+from fmus.builder.recipe import (
+    MAX_PORTS,
+    BuildError,
+    Recipe,
+    UnknownFmuError,
+    doubts,
+    fingerprint,
+    known_names,
+    recipe,
+)
 from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
 from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
 from models.definition_files.message_text import printable
+from models.library.search_path import search_path
 
 DEFAULT_FOLDER = Path("build/fmus")
 
@@ -64,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     verb.set_defaults(run=_write_runtime)
     add_doctor(verbs)
     verb = verbs.add_parser("fingerprint", help="print the content hash (GUID) that a build would have now")
-    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
+    _add_lookup(verb)
     verb.add_argument("name", metavar="NAME", help="as for build")
     verb.add_argument("--if-known", action="store_true", help="print nothing for a name that no FMU has")
     verb.set_defaults(run=_fingerprint)
@@ -79,7 +89,7 @@ def add_build(verbs: Any) -> None:
     verb = verbs.add_parser("build", help=text, description=text)
     verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, path/to/LINE.toml ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
-    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of the lines (1)")
+    _add_lookup(verb)
     verb.add_argument(
         "--standalone",
         action=argparse.BooleanOptionalAction,
@@ -88,6 +98,20 @@ def add_build(verbs: Any) -> None:
     )
     verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to bring along (the present one)")
     verb.set_defaults(run=_build)
+
+
+def _add_lookup(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--pantographs", type=_count, metavar="P", help="pantograph ports of a line (1)")
+    text = "look for lines/NAME.toml and pantographs/NAME.toml in this folder, and in its parents up to the project, "
+    verb.add_argument(
+        "--library",
+        action="append",
+        type=Path,
+        metavar="DIR",
+        help=f"{text}before OPENPANTO_LIBRARY and the library; repeatable (default: the working directory)",
+    )
+    text = "definition to take if only the library has one of the name"
+    verb.add_argument("--built-from", type=Path, metavar="FILE", help=text)
 
 
 def add_doctor(verbs: Any) -> None:
@@ -107,7 +131,7 @@ def _count(text: str) -> int:
 def _build(options: argparse.Namespace) -> None:
     if options.runtime is not None and options.standalone is False:
         raise BuildError("--runtime is for standalone FMUs, which --no-standalone excludes")
-    for wanted in _recipes(options.names or known_names(), options.pantographs):
+    for wanted in _recipes(options.names or known_names(), options):
         runtime = _runtime(options, options.out / f"{wanted.name}.fmu")
         print(build(wanted, options.out, runtime=runtime.files if runtime else None))
     if why := why_no_loader():
@@ -145,14 +169,19 @@ def _examine(options: argparse.Namespace) -> int:
     return doctor.main(options.fmu)
 
 
-def _recipes(names: Sequence[str], pantographs: int | None) -> list[Recipe]:
+def _recipes(names: Sequence[str], options: argparse.Namespace) -> list[Recipe]:
     # All names are looked up before anything is built: a typing mistake must not cost a build.
-    return [recipe(name, pantographs) for name in names]
+    folders = search_path(*(options.library or ()))
+    found = [recipe(name, options.pantographs, folders, options.built_from) for name in names]
+    for text in dict.fromkeys(doubts(name, folders) for name in names):
+        if text:
+            print(f"note: {printable(text)}", file=sys.stderr)
+    return found
 
 
 def _fingerprint(options: argparse.Namespace) -> None:
     try:
-        wanted = recipe(options.name, options.pantographs)
+        (wanted,) = _recipes([options.name], options)
     except UnknownFmuError:
         if options.if_known:
             return

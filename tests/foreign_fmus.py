@@ -94,11 +94,11 @@ def description(
     tolerance: str = "",
 ) -> str:
     """The modelDescription.xml; ``units`` are those of u and y."""
-    told = [f' unit="{unit}"' if unit else "" for unit in units]
+    reported = [f' unit="{unit}"' if unit else "" for unit in units]
     rows = (
-        ("u", 0, "input", "continuous", "", f'<Real start="0.5"{told[0]}/>'),
+        ("u", 0, "input", "continuous", "", f'<Real start="0.5"{reported[0]}/>'),
         ("k", 1, "parameter", "fixed", "", '<Real start="1"/>'),
-        ("y", 2, "output", "continuous", "", f"<Real{told[1]}/>"),
+        ("y", 2, "output", "continuous", "", f"<Real{reported[1]}/>"),
         ("x", 3, "output", "continuous", "", "<Real/>"),
         ("t", 4, "output", "continuous", "", "<Real/>"),
         ("tolerance", 5, "output", "continuous", "", "<Real/>"),
@@ -180,9 +180,9 @@ def connector(name: str, kind: str, what: str = "Real") -> str:
     return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{what}/></ssd:Connector>'
 
 
-def connectors(*told: str) -> str:
+def connectors(*reported: str) -> str:
     """Connectors."""
-    return f"<ssd:Connectors>{''.join(told)}</ssd:Connectors>" if told else ""
+    return f"<ssd:Connectors>{''.join(reported)}</ssd:Connectors>" if reported else ""
 
 
 def wire(start: str, end: str, inside: str = "", attributes: str = "") -> str:
@@ -194,9 +194,9 @@ def wire(start: str, end: str, inside: str = "", attributes: str = "") -> str:
     return f"{head}>{inside}</ssd:Connection>" if inside else f"{head}/>"
 
 
-def component(name: str, *told: str, source: str = "resources/panel.fmu", bindings: str = "") -> str:
+def component(name: str, *reported: str, source: str = "resources/panel.fmu", bindings: str = "") -> str:
     """A component with its connectors."""
-    return f'<ssd:Component name="{name}" source="{source}">{connectors(*told)}{bindings}</ssd:Component>'
+    return f'<ssd:Component name="{name}" source="{source}">{connectors(*reported)}{bindings}</ssd:Component>'
 
 
 def values(*pairs: tuple[str, str], units: str = "", prefix: str = "", mapping: str = "") -> str:

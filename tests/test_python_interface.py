@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -144,13 +145,26 @@ def test_wrong_values_are_refused_at_once(toy_run, values, said):
     assert "\n" not in str(caught.value)
 
 
+def test_short_names_must_be_of_one_parameter(toy_run):
+    scenario = toy_run[0]
+    fmu = scenario.system.components[0].fmu
+    wires = ("contact_wire.tension", "messenger_wire.tension")
+    variables = {n: replace(fmu.variables["stiffness"], name=n) for n in (*wires, "damping")}
+    line = replace(scenario.system.components[0], fmu=replace(fmu, variables={**fmu.variables, **variables}))
+    system = replace(scenario.system, components=(line, *scenario.system.components[1:]))
+    with pytest.raises(master.MasterError, match=r"are catenary\.contact_wire\.tension, catenary\.mess"):
+        replace(scenario, system=system).set(tension=2e4)
+    with pytest.raises(master.MasterError, match="catenary and pantograph have a parameter 'damping'"):
+        replace(scenario, system=system).set(damping=1.0)
+
+
 def test_changed_values_reach_the_run_and_the_figures_are_those_of_the_folder(toy_run, tmp_path):
     scenario, results = toy_run
     stiff = master.run(scenario.set(static_force="170"), tmp_path / "stiff")
     difference = stiff.figures_of()["mean force [N]"] - results.figures_of()["mean force [N]"]
     assert difference == pytest.approx(30.0, abs=1.5)
-    told = json.loads((stiff.folder / "summary.json").read_text())["quality"][0]
-    assert stiff.figures_of()["mean force [N]"] == told["mean"]
+    reported = json.loads((stiff.folder / "summary.json").read_text())["quality"][0]
+    assert stiff.figures_of()["mean force [N]"] == reported["mean"]
     assert master.read_results(tmp_path / "stiff").figures_of() == pytest.approx(stiff.figures_of(), nan_ok=True)
     assert stiff.status == "complete"
     assert stiff.pantographs == ("pantograph",)

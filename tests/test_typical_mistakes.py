@@ -59,6 +59,9 @@ LINE_ENGINEER = {
     "droppers that fit no span": Mistake(
         "statics my.toml", 1, "(and 6 more like this)", ('count = [7, "1"', 'spacing = [6.61, "m"')
     ),
+    "a decimal comma on the command line": Mistake(
+        "statics LN2 --set 'line.contact_wire.tension=26,5 kN'", 1, "write a decimal point"
+    ),
     "a speed with its unit": Mistake("couple LN2 DSA380 --speed 250km/h", 2, "write it without its unit"),
 }
 FMI_ENGINEER = {
@@ -108,6 +111,7 @@ DATA_SCIENTIST = {
         "run toy.ssp --set pantograph.static_force", 2, "must be written COMPONENT.PARAMETER=VALUE"
     ),
     "an option mistyped": Mistake("run toy.ssp --stepp 0.001", 2, "did you mean '--step'?"),
+    "a time with a decimal comma": Mistake("run toy.ssp --stop 1,5", 2, "write a decimal point"),
     "a time with its unit": Mistake("run toy.ssp --stop 10s", 2, "write it without its unit"),
     "a folder that no run has left": Mistake("report .", 1, "give the folder that a run printed"),
     "a comparison with nothing": Mistake("compare run", 2, "the following arguments are required: RUN"),

@@ -103,7 +103,7 @@ def archive(
     loader : bool
         See `build`.
     origin : mapping, optional
-        What the mark says about a user's definition.
+        What the mark says about the definition.
     runtime : mapping, optional
         See `build`.
 
@@ -160,9 +160,9 @@ def why_no_loader() -> str:
 
 
 def _origin(wanted: Recipe, folder: Path) -> dict[str, str]:
-    """Return where a user's definition lies, relative to the FMU, which is stale once that file changes."""
+    """Return which definition it is, a user's relative to the FMU, which is stale once that changes."""
     if not wanted.is_own:
-        return {}
+        return {"library": f"{wanted.definition.parent.name}/{wanted.definition.name}"}
     path = wanted.definition.resolve()
     try:
         path = Path(os.path.relpath(path, folder.resolve()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +14,8 @@ import pythonfmu
 from fmus.builder.source_bundle import BundleError, Module, collect
 from fmus.loader.loader_build import sources
 from fmus.loader.pythonfmu_repair import repaired
+from models.definition_files.message_text import hint
+from models.library.search_path import Kind, definition_files, doubles
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARY = REPOSITORY / "models" / "library"
@@ -112,7 +114,9 @@ def known_names() -> list[str]:
     return lines + pantographs
 
 
-def recipe(name: str, pantographs: int | None = None) -> Recipe:
+def recipe(
+    name: str, pantographs: int | None = None, folders: Sequence[Path] = (), built_from: Path | None = None
+) -> Recipe:
     """Return how to make the FMU of a name.
 
     Parameters
@@ -122,25 +126,52 @@ def recipe(name: str, pantographs: int | None = None) -> Recipe:
         definition: ``path/to/LINE.toml``.
     pantographs : int, optional
         Number of pantograph ports of a line; the name gets the suffix ``_Pn``.
+    folders : sequence of Path, optional
+        Searched for the definition before the library (`models.library.search_path`).
+    built_from : Path, optional
+        Definition that such an FMU was built from: taken before the library's.
 
     Raises
     ------
     UnknownFmuError
-        If the library has no definition for it.
+        If there is no definition for it.
     BuildError
         If the file is not there, or is no definition.
     """
     if name.lower().endswith(".toml"):
         return _own_recipe(Path(name), pantographs or 1)
-    kind, _, rest = name.partition("_")
-    stem, ports = _split_ports(rest, pantographs)
-    if kind == "Catenary" and (path := _definition("lines", stem)) is not None:
+    kind, stem, ports = _place(name, pantographs)
+    if kind is not None and (own := definition_files(kind, stem, folders)):
+        found = _own_recipe(own[0], ports)
+        if found.name.partition("_")[0] != name.partition("_")[0]:
+            raise BuildError(f"{own[0]} is no definition for {name}: it defines what {found.name} is made of")
+        return found
+    if built_from is not None:
+        if not built_from.is_file():
+            raise UnknownFmuError(f"{built_from}, which {name} was built from, is missing")
+        return _own_recipe(built_from, pantographs or 1)
+    path = next(iter(definition_files(kind, stem, [LIBRARY])), None) if kind is not None else None
+    if path is not None and kind == "lines":
         return _line_recipe(path, _head(path).get("title", ""), ports)
-    path = _definition("pantographs", rest) if kind == "Pantograph" else None
     if path is not None and (adapter := _PANTOGRAPHS.get(_head(path).get("type", ""))):
         return _pantograph_recipe(path, _head(path).get("title", ""), adapter)
-    known = ", ".join(known_names()) or "none"
-    raise UnknownFmuError(f"There is no FMU '{name}'; known are {known} (and NAME_P2: a line for two pantographs).")
+    known = known_names()
+    text = f"There is no FMU '{name}'; known are {', '.join(known) or 'none'} (and NAME_P2: a line for two pantographs)"
+    raise UnknownFmuError(text + (hint(name, known) or "."))
+
+
+def doubts(name: str, folders: Iterable[Path]) -> str:
+    """Return which of several definitions of an FMU's name is used, empty if there is one; see `recipe`."""
+    kind, stem, _ = _place(name, None)
+    return doubles(definition_files(kind, stem, [*folders, LIBRARY])) if kind is not None else ""
+
+
+def _place(name: str, pantographs: int | None) -> tuple[Kind | None, str, int]:
+    """Return where the definition of an FMU's name stands: kind, its own name, and the number of ports."""
+    prefix, _, rest = name.partition("_")
+    if prefix == "Catenary":
+        return "lines", *_split_ports(rest, pantographs)
+    return ("pantographs" if prefix == "Pantograph" else None), rest, pantographs or 1
 
 
 def _line_recipe(path: Path, title: str, ports: int, is_own: bool = False) -> Recipe:
@@ -188,11 +219,6 @@ def content_hash(files: Mapping[str, bytes]) -> str:
 
 def _definitions(folder: str) -> list[Path]:
     return sorted((LIBRARY / folder).glob("*.toml"))
-
-
-def _definition(folder: str, name: str) -> Path | None:
-    # Looked up, not made into a path: a name could lead out of the library, and the FMU out of its folder.
-    return next((path for path in _definitions(folder) if path.stem == name), None)
 
 
 def _head(path: Path) -> dict[str, str]:

@@ -58,7 +58,14 @@ def task(system: System, parameter: str | None, mean: float | None, tolerance: f
             "the scenario does not say what to calibrate to which mean force; give --parameter and --mean"
         )
     tolerance = tolerance or (known.tolerance if known else 0.1)
-    return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=known.contact if known else 1)
+    is_known = known is not None and parameter == known.parameter
+    contact = known.contact if known and is_known else _contact_of(system, parameter)
+    return Calibration(parameter=parameter, meanForce=mean, tolerance=tolerance, contact=contact)
+
+
+def _contact_of(system: System, parameter: str) -> int:
+    """Return the contact of the pantograph that a parameter belongs to, else the first."""
+    return next((c.index for c in system.contacts if parameter.startswith(f"{c.pantograph}.")), 1)
 
 
 def start_value(system: System, parameter: str) -> float:

@@ -17,7 +17,7 @@ from master.report.progress import progress_shown
 from master.report.terminal_summary import Terminal
 from master.scenario.overrides import Overrides
 from master.ssp.run_settings import SCHEMES
-from master.ssp.ssp_units import split_quantity
+from master.ssp.ssp_units import number_advice
 from master.system.components import System
 
 
@@ -58,8 +58,7 @@ def finite_number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or "_" in text or not text.isascii():
-        advice = "; write it without its unit" if split_quantity(text)[1] else ""
-        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number{advice}")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number{number_advice(text)}")
     return value
 
 

@@ -146,18 +146,20 @@ def read_measured(path: Path) -> Measurement:
 
 @dataclass(frozen=True)
 class _Row:
-    """A row that is not empty, with the line of the file that it ends on."""
+    """A row that is not empty, with the line of the file that it ends on; its numbers may have a decimal comma."""
 
     line: int
     cells: list[str]
+    may_have_comma: bool
 
 
 def _rows(path: Path) -> list[_Row]:
     try:
         lines = [_without_comment(line) for line in path.read_text(encoding="utf-8-sig").splitlines()]
         head = next(filter(None, lines), "")
-        reader = csv.reader(lines, delimiter=next((mark for mark in ";\t" if mark in head), ","))
-        return [_Row(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
+        mark = next((mark for mark in ";\t" if mark in head), ",")
+        reader = csv.reader(lines, delimiter=mark)
+        return [_Row(reader.line_num, cells, mark != ",") for cells in reader if any(cell.strip() for cell in cells)]
     except OSError as error:
         raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:
@@ -173,7 +175,8 @@ def _without_comment(line: str) -> str:
 
 def _check_marks(path: Path, rows: Sequence[_Row], columns: Sequence[int]) -> None:
     """Refuse a table with decimal commas in some numbers and points in others: one of them groups thousands."""
-    marks = {mark: row.line for row in rows for i in columns for mark in ",." if mark in row.cells[i]}
+    mixed = (row for row in rows if row.may_have_comma)
+    marks = {mark: row.line for row in mixed for i in columns for mark in ",." if mark in row.cells[i]}
     if len(marks) > 1:
         where = f"a comma in line {marks[',']} and a point in line {marks['.']}"
         raise MasterError(
@@ -219,7 +222,7 @@ def _column(path: Path, rows: Sequence[_Row], index: int, factor: float) -> Floa
 def _number(path: Path, row: _Row, index: int) -> float:
     text = row.cells[index].strip()
     try:
-        value = float(text.replace(",", "."))
+        value = float(text.replace(",", ".") if row.may_have_comma else text)
     except ValueError:
         value = math.nan
     # Python accepts 1_000, and the digits of every script; in a table they are typing errors.

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import fmpy
 
+from master.fmu.fmu_provision import definition_of
 from master.ssp.archive import read_member
 from master.ssp.ssp_units import BASE_UNITS, Unit
 from master.ssp.ssp_xml import XmlError, is_one_line, safe_root
@@ -63,6 +64,7 @@ def read_fmu(path: Path) -> Fmu:
         units=_units(description.unitDefinitions, f"{path.name} ({_DESCRIPTION})"),
         tolerance=_tolerance(description.defaultExperiment),
         is_single=bool(description.coSimulation.canBeInstantiatedOnlyOncePerProcess),
+        definition=definition_of(path),
         description=description.description or "",
     )
 

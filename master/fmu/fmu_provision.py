@@ -13,7 +13,7 @@ import subprocess
 import sys
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -25,6 +25,8 @@ _BUILD_SECONDS: Final = 600
 #: What identifies an FMU of ours; see docs/interoperability.md.
 _MARK: Final = "resources/openpanto.txt"
 _LONGEST_MARK: Final = 1 << 16
+#: How what ``python -m fmus`` only remarks begins.
+_NOTE: Final = "note: "
 #: What a damaged, encrypted or exotically compressed archive raises.
 _UNREADABLE: Final = (
     OSError,
@@ -39,7 +41,9 @@ _UNREADABLE: Final = (
 )
 
 
-def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = None) -> Path:
+def provide_fmu(
+    path: Path, tell: Callable[[str], None], scratch: Path | None = None, library: Path | None = None
+) -> Path:
     """Build the FMU at ``path`` if it is missing, or ours and older than the sources it is built from.
 
     An FMU without our mark, or changed since it was built, is kept, and ``tell`` is called.
@@ -51,6 +55,8 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
         Called with what takes time, and what is kept.
     scratch : Path, optional
         Folder to build into instead, where nothing may be written next to ``path``; what it holds is used if it fits.
+    library : Path, optional
+        Folder in which, and in whose parents up to the project, definitions are looked up first.
 
     Returns
     -------
@@ -65,10 +71,10 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
     if not has_builder():
         return path
     origin = _origin(path)
-    if origin is not None and not origin.definition.is_file():
+    lookup = Lookup(path.stem, library, origin)
+    wanted = fingerprint(lookup, tell)
+    if wanted is None and origin is not None:
         tell(f"{path.name} is used as it is: {origin.definition}, which it was built from, is missing")
-        return path
-    wanted = fingerprint(origin.definition.as_posix(), origin.pantographs) if origin else fingerprint(path.stem)
     if wanted is None or (path.is_file() and _matches(wanted, stored_guid(path))):
         return path
     if path.exists() and (why := why_not_ours(path)):
@@ -78,7 +84,7 @@ def provide_fmu(path: Path, tell: Callable[[str], None], scratch: Path | None = 
     if place.is_file() and _matches(wanted, stored_guid(place)):
         return place
     tell(f"building {path.name}" + (" again: its sources have changed" if place.is_file() else ""))
-    build(place, origin)
+    build(place, lookup)
     return place
 
 
@@ -88,6 +94,25 @@ class Origin:
 
     definition: Path
     pantographs: str
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """What is asked of ``python -m fmus``: an FMU's name, where to look for its definition first, and its origin."""
+
+    name: str
+    library: Path | None = None
+    origin: Origin | None = None
+
+    @property
+    def arguments(self) -> list[str]:
+        """Return it as the command line has it."""
+        found = ["--library", str(self.library)] if self.library is not None else []
+        if self.origin is not None:
+            found += ["--built-from", self.origin.definition.as_posix()]
+            if self.origin.pantographs not in ("", "1"):
+                found += ["--pantographs", self.origin.pantographs]
+        return [*found, "--", self.name]
 
 
 def read_mark(path: Path) -> dict[str, str]:
@@ -121,7 +146,7 @@ def _origin(path: Path) -> Origin | None:
     mark = read_mark(path) if path.is_file() else {}
     if not mark.get("definition"):
         return None
-    return Origin(Path(os.path.normpath(path.parent / mark["definition"])), mark.get("pantographs", "1"))
+    return Origin(_beside(path, mark), mark.get("pantographs", "1"))
 
 
 def _is_older_build(file: zipfile.ZipFile, name: str, guid: str) -> bool:
@@ -149,15 +174,14 @@ def has_builder() -> bool:
     return any((Path(folder) / "__main__.py").is_file() for folder in folders)
 
 
-def fingerprint(name: str, pantographs: str = "") -> str | None:
-    """Return the content hash that a build of ``name`` would have, None if ``fmus`` does not know it.
+def fingerprint(lookup: Lookup, tell: Callable[[str], None] = lambda _: None) -> str | None:
+    """Return the content hash that a build would have, None if ``fmus`` knows no such FMU.
 
     Parameters
     ----------
-    name : str
-        As for ``python -m fmus build``: an FMU's name or the path of a definition.
-    pantographs : str, optional
-        Number of ports of a line that is given by its path.
+    lookup : Lookup
+    tell : callable
+        Called with its notes, as on two definitions of one name.
 
     Raises
     ------
@@ -165,13 +189,28 @@ def fingerprint(name: str, pantographs: str = "") -> str | None:
         With the builder's own words, if it knows the name but cannot say.
     """
     try:
-        answer = _fmus("fingerprint", "--if-known", *_ports(pantographs), "--", name, seconds=_ASK_SECONDS)
+        answer = _fmus("fingerprint", "--if-known", *lookup.arguments, seconds=_ASK_SECONDS)
     except subprocess.TimeoutExpired:
         return None
     if answer.returncode != 0:
         raise ValueError(f"cannot be built: {_last_line(answer)}")
+    for line in answer.stderr.splitlines():
+        if line.startswith(_NOTE):
+            tell(line.removeprefix(_NOTE))
     lines = answer.stdout.split()
     return lines[-1] if lines else None
+
+
+def definition_of(path: Path) -> str:
+    """Return the definition file that an FMU was built from, empty if it does not say."""
+    mark = read_mark(path)
+    if mark.get("definition"):
+        return str(_beside(path, mark))
+    return f"library: {mark['library']}" if mark.get("library") else ""
+
+
+def _beside(path: Path, mark: Mapping[str, str]) -> Path:
+    return Path(os.path.normpath(path.parent / mark["definition"]))
 
 
 def stored_guid(path: Path) -> str:
@@ -185,19 +224,14 @@ def stored_guid(path: Path) -> str:
     return ""
 
 
-def build(path: Path, origin: Origin | None = None) -> None:
-    """Build ``path`` from the definition of the same name, or from a user's."""
-    name, ports = (origin.definition.as_posix(), _ports(origin.pantographs)) if origin else (path.stem, [])
+def build(path: Path, lookup: Lookup) -> None:
+    """Build ``path`` from the definition that ``lookup`` finds."""
     try:
-        answer = _fmus("build", "--out", str(path.parent), *ports, "--", name, seconds=_BUILD_SECONDS)
+        answer = _fmus("build", "--out", str(path.parent), *lookup.arguments, seconds=_BUILD_SECONDS)
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"could not be built: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0 or not path.is_file():
         raise ValueError(f"could not be built: {_last_line(answer)}")
-
-
-def _ports(number: str) -> list[str]:
-    return ["--pantographs", number] if number not in ("", "1") else []
 
 
 def write_runtime(folder: Path) -> None:

@@ -299,10 +299,10 @@ def read_results(folder: str | Path) -> Results:
 
     Examples
     --------
-    >>> read_results("no_such_folder")
+    >>> read_results("no_such_folder")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    master.errors.MasterError: no_such_folder is not a results folder: it has no summary.json written by this tool
+    master.errors.MasterError: no_such_folder is not a results folder: it has no summary.json...
     """
     return Results(run_results.read(Path(folder)))
 

@@ -134,6 +134,10 @@ class Scenario:
         if len(owners) > 1:
             text = f"{' and '.join(owners)} have a parameter '{name}'"
             raise RequestError(f"{text}; name one of them: set({{'{owners[0]}.{name}': ...}})")
+        longer = [full for full in self.parameters if not owners and full.endswith(f".{name}")]
+        if longer:
+            text = f"no component has a parameter '{name}', but there are {', '.join(longer)}"
+            raise RequestError(f"{text}; name one of them: set({{'{longer[0]}': ...}})")
         return f"{owners[0]}.{name}" if owners else name  # for an unknown one, `with_values` says which are like it
 
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
-from matplotlib.figure import Figure
 
 from master.arrays import FloatArray
 from master.errors import MasterError
 from master.report.charts.chart import COLOURS, GREY, MARK
 from master.report.moving_picture import Movie, Rider
 from master.safety.safe_files import atomic_file
+
+if TYPE_CHECKING:
+    from matplotlib.animation import AbstractMovieWriter
 
 _ELSEWHERE: Final = "another file with --film"
 _RATE: Final = 20
@@ -51,6 +52,8 @@ def write_film(movie: Movie, path: Path, options: FilmOptions) -> Path:
     MasterError
         If the ending is neither ``.gif`` nor ``.mp4``, or ffmpeg is missing.
     """
+    from matplotlib.figure import Figure
+
     writer = _writer(path)
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     line_axes, force_axes = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -76,6 +79,8 @@ def check_name(path: Path) -> None:
 
 
 def _writer(path: Path) -> AbstractMovieWriter:
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
     check_name(path)
     if path.suffix == ".gif":
         return PillowWriter(fps=_RATE)

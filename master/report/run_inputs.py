@@ -206,5 +206,8 @@ def provenance_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         (f"FMU of {c['name']}", ", ".join([c.get("fmu", "-"), c.get("tool", ""), *_identity(c)]))
         for c in summary.get("components", [])
     ]
+    rows += [
+        (f"definition of {c['name']}", c["definition"]) for c in summary.get("components", []) if c.get("definition")
+    ]
     rows += [(f"version of {k}", str(v)) for k, v in summary.get("versions", {}).items()]
     return rows

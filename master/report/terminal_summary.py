@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -104,7 +105,20 @@ def _closing_lines(done: Results) -> list[str]:
     lines += _energy_lines(done.summary["energy"])
     if tolerance := tolerance_words({c["name"]: c.get("tolerance") for c in done.summary.get("components", [])}):
         lines.append(tolerance.removeprefix(", "))
+    lines += _definition_lines(done.summary.get("components", []))
     return [*lines, *_punctuality_lines(performance.get("real_time")), f"results in {done.folder}"]
+
+
+def _definition_lines(components: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return in one line which definition files the run was computed from."""
+    found = [f"{c['name']} {_nearby(c['definition'])}" for c in components if c.get("definition")]
+    return [f"definitions: {', '.join(found)}"] if found else []
+
+
+def _nearby(file: str) -> str:
+    """Return the path of a file relative to the working directory, if it lies in it."""
+    path = Path(file)
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file
 
 
 def _energy_lines(found: Sequence[dict[str, Any]]) -> list[str]:

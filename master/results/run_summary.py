@@ -52,6 +52,7 @@ def _component(component: Component) -> dict[str, Any]:
         "guid": fmu.guid,
         "sha256": fmu.sha256,
         "tool": fmu.tool,
+        "definition": fmu.definition,
         "parameters": component.parameters,
         "tolerance": component.tolerance,
         "inputs": [_input(component, v) for v in fmu.variables.values() if v.causality == "parameter"],

@@ -87,6 +87,7 @@ class _Component(_Loose):
     sha256: str = ""
     guid: str = ""
     tool: str = ""
+    definition: str = ""
     tolerance: float | None = None
     parameters: dict[str, Any] = {}
     inputs: list[_Input] = []

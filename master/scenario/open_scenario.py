@@ -90,7 +90,7 @@ def load_system(
     structure = read_structure(sources, reader)
     if structure is EMPTY:  # without it everything would be missing
         raise ScenarioError(reader.problems)
-    provision = _Provision(build and package.writable, tell, scratch)
+    provision = _Provision(build and package.writable, tell, scratch, package.root)
     fmus = _fmus(sources, structure.components, reader.problems, provision)
     checker = ScenarioChecks(structure, fmus, reader.problems, reader.warnings)
     connections = checker.connections()
@@ -172,16 +172,22 @@ def _fmus(
 
 @dataclass(frozen=True)
 class _Provision:
-    """How FMUs are provided: whether they may be built, who is informed, and where to if not in their place."""
+    """How FMUs are provided.
+
+    Whether they may be built, who is informed, where to if not in their place, where definitions are looked up first.
+    """
 
     build: bool
     tell: Callable[[str], None]
     scratch: Path | None
+    library: Path
 
 
 def _provide(path: Path, provision: _Provision) -> Fmu | str:
     try:
-        place = fmu_provision.provide_fmu(path, provision.tell, provision.scratch) if provision.build else path
+        place = path
+        if provision.build:
+            place = fmu_provision.provide_fmu(path, provision.tell, provision.scratch, provision.library)
         if not place.is_file():
             return "is a folder, not an FMU" if place.is_dir() else "does not exist"
         fmu = read_fmu(place)

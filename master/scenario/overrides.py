@@ -11,7 +11,7 @@ from master.scenario.start_values import out_of_range, settable
 from master.ssp.archive import SSD_NAME
 from master.ssp.run_settings import DEFAULT_RECORDS, Record, RunSettings, Scheme
 from master.ssp.ssd import Structure
-from master.ssp.ssp_units import COMMON, conversion, split_quantity
+from master.ssp.ssp_units import COMMON, conversion, number_advice, split_quantity
 from master.system.components import Component, Fmu, Variable
 from master.system.step_rounding import MEASURED
 from master.system.variable_names import ENERGY_INTERVAL, ENERGY_MONITOR, ENERGY_VARIABLES, matcher
@@ -186,10 +186,11 @@ def _whole(full: str, text: str) -> int:
 
 def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
     """Return a number in the FMU's unit from a text with or without a unit."""
+    advice = number_advice(text) if "," in text else ""
     number, unit = split_quantity(text)
-    if number is None:
+    if number is None or advice:
         example = f", or a number with its unit ('{variable.start or 1} {variable.unit}')" if variable.unit else ""
-        raise RequestError(f"parameter '{full}': '{text}' is not a number{example}")
+        raise RequestError(f"parameter '{full}': '{text}' is not a number{advice or example}")
     if not unit or unit == variable.unit:
         return number
     known = {**fmu.units, **COMMON}

@@ -112,6 +112,10 @@ _QUANTITY: Final = re.compile(
 )
 
 
+#: What looks like a decimal comma.
+_COMMA: Final = re.compile(r"\d,\d", re.ASCII)
+
+
 def split_quantity(text: str) -> tuple[float | None, str]:
     """Return the number in a text such as ``12 kN``, None if there is none, and its unit, empty if it has none.
 
@@ -124,6 +128,19 @@ def split_quantity(text: str) -> tuple[float | None, str]:
     """
     match = _QUANTITY.fullmatch(text)
     return (None, "") if match is None else (float(match[1]), match[2])
+
+
+def number_advice(text: str) -> str:
+    """Return what to do with a text that is not a number but nearly one, empty if it is far from it.
+
+    Examples
+    --------
+    >>> number_advice("1,5"), number_advice("10s"), number_advice("soon")
+    ('; write a decimal point', '; write it without its unit', '')
+    """
+    if _COMMA.search(text):
+        return "; write a decimal point"
+    return "; write it without its unit" if split_quantity(text)[1] else ""
 
 
 def parse_units(node: Any | None, reader: Reader) -> dict[str, Unit]:

@@ -69,6 +69,8 @@ class Fmu:
         Of its default experiment.
     is_single : bool
         Whether a process can hold only one instance of it.
+    definition : str
+        Definition file that one of ours was built from, as it says itself.
     description : str
         What it says that it is.
     """
@@ -84,6 +86,7 @@ class Fmu:
     units: dict[str, Unit] = field(default_factory=dict)
     tolerance: float | None = None
     is_single: bool = False
+    definition: str = ""
     description: str = ""
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from models.commands.physics_files import write_figure
 from models.commands.physics_options import print_table
@@ -20,6 +20,9 @@ from models.pantograph.identification import (
     read_response,
 )
 from models.pantograph.lumped.lumped_rig import chain_stiffness
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -85,6 +88,8 @@ def _rows(model: IdentifiedModel) -> list[tuple[str, str, str]]:
 
 
 def _plot(response: Response, model: IdentifiedModel) -> Figure:
+    from matplotlib.figure import Figure
+
     fitted = chain_stiffness(response.frequency, model.masses, model.dampings, model.stiffnesses)
     figure = Figure(figsize=(8, 5), layout="constrained")
     axes = figure.subplots()

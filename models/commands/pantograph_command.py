@@ -6,11 +6,10 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.figure import Figure
 
 from models.arrays import FloatArray
 from models.commands.physics_files import write_csv, write_figure
@@ -21,6 +20,9 @@ from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
 from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Significant digits of the tables: all that a double has.
 _DIGITS: Final = 17
@@ -193,6 +195,8 @@ def _response_rows(result: Characteristics) -> list[tuple[str, str, str]]:
 
 
 def _plot_response(result: Characteristics) -> Figure:
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(8, 6), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.semilogy(result.frequency, np.abs(result.apparent_mass))
@@ -207,6 +211,8 @@ def _plot_response(result: Characteristics) -> Figure:
 
 
 def _plot_statics(result: Characteristics) -> Figure:
+    from matplotlib.figure import Figure
+
     count = len(result.static_columns) - 1
     figure = Figure(figsize=(8, 2.5 * count), layout="constrained")
     panels = np.atleast_1d(figure.subplots(count, 1, sharex=True))

@@ -12,13 +12,15 @@ import os
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from models.arrays import FloatArray
 from models.definition_files.parameter import ParameterError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: What a file that is being written is called.
 _PART: Final = ".part"

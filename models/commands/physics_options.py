@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
-from models.definition_files.given_value import WITH_UNIT, in_si
+from models.definition_files.given_value import in_si, number_advice
 from models.definition_files.message_text import printable
 from models.definition_files.parameter import Definition, ParameterError
 from models.definition_files.toml_reader import LARGEST, SMALLEST
@@ -106,8 +106,7 @@ def finite(text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST or "_" in text or not text.isascii():
-        advice = "; write it without its unit" if (match := WITH_UNIT.fullmatch(text)) and match[2] else ""
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g}){advice}")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g}){number_advice(text)}")
     return value
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from models.catenary.definition.line_definition import Span
 from models.catenary.statics.elasticity import Elasticity
 from models.catenary.statics.rest_profile import Droppers, Profile, within
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _COLOURS: Final = {
     "contact_wire": "#c2571a",
@@ -24,6 +26,8 @@ _GREY: Final = "#9aa0a6"
 
 def profile(profiles: Sequence[Profile], droppers: Droppers, span: Span) -> Figure:
     """Line from anchor to anchor; one span with its droppers; its contact wire, magnified."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     whole, detail, contact = figure.subplots(3, 1)
     _wires(whole, profiles)
@@ -48,6 +52,8 @@ def profile(profiles: Sequence[Profile], droppers: Droppers, span: Span) -> Figu
 
 def elasticity(result: Elasticity, span: Span) -> Figure:
     """Elasticity along a span, droppers marked."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     axes = figure.subplots()
     axes.plot(result.x, 1e3 * result.value, color=_COLOURS["contact_wire"])
@@ -67,6 +73,8 @@ def elasticity(result: Elasticity, span: Span) -> Figure:
 
 def droppers(result: Droppers, span: Span) -> Figure:
     """Unstrained lengths and static tensions of a span's droppers."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     length, force = figure.subplots(2, 1, sharex=True)
     for chosen, name, colour in (

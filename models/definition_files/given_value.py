@@ -14,6 +14,20 @@ WITH_UNIT: Final = re.compile(
 )
 
 
+def number_advice(text: str) -> str:
+    """Return what to do with a text that is not a number but nearly one, empty if it is far from it.
+
+    Examples
+    --------
+    >>> number_advice("1,5"), number_advice("10s"), number_advice("soon")
+    ('; write a decimal point', '; write it without its unit', '')
+    """
+    if re.search(r"\d,\d", text, re.ASCII):
+        return "; write a decimal point"
+    match = WITH_UNIT.fullmatch(text)
+    return "; write it without its unit" if match is not None and match[2] else ""
+
+
 def in_si(value: float | str, wanted: str | None) -> float:
     """Return a value in its SI unit.
 
@@ -37,6 +51,8 @@ def in_si(value: float | str, wanted: str | None) -> float:
     if not isinstance(value, str):
         return float(value)
     match = WITH_UNIT.fullmatch(value)
+    if "," in value:
+        raise ValueError(f"'{value}' is not a number{number_advice(value)}")
     if match is None:
         raise ValueError(f"'{value}' is not a number, or a number with its unit ('12 kN')")
     number, unit = float(match[1]), match[2]

@@ -1,53 +1,60 @@
-"""A name in the library, or the path of a file, as a definition."""
+"""A name on the search path or in the library, or the path of a file, as a definition."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import load as load_line_file
+from models.definition_files.message_text import hint
 from models.definition_files.toml_reader import Table
+from models.library.search_path import LIBRARY, Kind, definition_files, definition_names, search_path
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import read_mechanism
 
-_HERE = Path(__file__).parent
-
 
 class UnknownNameError(LookupError):
-    """The library has no line or pantograph of this name."""
+    """There is no line or pantograph of this name."""
 
 
 def line_names() -> tuple[str, ...]:
-    """Return the names of all lines."""
-    return _names("lines")
+    """Return the names of all lines of the library."""
+    return definition_names("lines", [LIBRARY])
 
 
 def pantograph_names() -> tuple[str, ...]:
-    """Return the names of all pantographs."""
-    return _names("pantographs")
+    """Return the names of all pantographs of the library."""
+    return definition_names("pantographs", [LIBRARY])
 
 
-def line_path(name: str) -> Path:
+def line_path(name: str, folders: Iterable[Path] | None = None) -> Path:
     """Return the definition file of a line; ``name`` may also be the path of a file.
 
-    Raises
-    ------
-    UnknownNameError
-        If there is none; lists the known names.
-    """
-    return _path("lines", "line", name)
-
-
-def pantograph_path(name: str) -> Path:
-    """Return the definition file of a pantograph; ``name`` may also be the path of a file.
+    Parameters
+    ----------
+    name : str
+    folders : iterable of Path, optional
+        Searched before the library; by default the search path of the working directory.
 
     Raises
     ------
     UnknownNameError
         If there is none; lists the known names.
     """
-    return _path("pantographs", "pantograph", name)
+    return _path("lines", name, folders)
+
+
+def pantograph_path(name: str, folders: Iterable[Path] | None = None) -> Path:
+    """Return the definition file of a pantograph; parameters as for `line_path`.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none; lists the known names.
+    """
+    return _path("pantographs", name, folders)
 
 
 def load_line(name: str) -> CatenaryDefinition:
@@ -77,15 +84,13 @@ def load_lumped(name: str) -> LumpedDefinition:
     return definition
 
 
-def _names(folder: str) -> tuple[str, ...]:
-    return tuple(sorted(p.stem for p in (_HERE / folder).glob("*.toml")))
-
-
-def _path(folder: str, kind: str, name: str) -> Path:
-    path = Path(name)
-    if path.suffix == ".toml":
-        return path
-    path = _HERE / folder / f"{name}.toml"
-    if name not in _names(folder):
-        raise UnknownNameError(f"no {kind} '{name}' in the library; known: {', '.join(_names(folder))}")
-    return path
+def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:
+    if name.lower().endswith(".toml"):
+        return Path(name)
+    searched = [*(search_path() if folders is None else folders), LIBRARY]
+    found = definition_files(kind, name, searched)
+    if not found:
+        known = definition_names(kind, searched)
+        text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{hint(name, known)}"
+        raise UnknownNameError(text)
+    return found[0]

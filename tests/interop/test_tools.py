@@ -59,11 +59,7 @@ def test_contact_force_of_the_beginning(reference, tool_run, tool, package, allo
     _compare(reference, tool_run, tool, package, SHORT, allowed)
 
 
-#: Every run of the suite makes the whole run in one tool; `.ci/long` makes it in all of them.
-WHOLE_RUNS = [pytest.param(*tool, marks=[] if tool[0] == "ecos" else pytest.mark.long) for tool in TOOLS]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("tool", "package", "allowed"), WHOLE_RUNS)
+@pytest.mark.long
+@pytest.mark.parametrize(("tool", "package", "allowed"), TOOLS)
 def test_contact_force_of_the_whole_run(reference, tool_run, tool, package, allowed):
     _compare(reference, tool_run, tool, package, WHOLE, allowed)

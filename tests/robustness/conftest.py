@@ -18,7 +18,7 @@ VELOCITIES = tuple(n for n in ENDS if ".v" in n)
 
 @pytest.fixture(scope="session")
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The toy scenario; whoever changes its files writes all of them anew."""
+    """The toy scenario; whoever changes its files rewrites all of them."""
     folder = tmp_path_factory.mktemp("robustness") / "toy.ssp"
     (folder / "resources").mkdir(parents=True)
     catenary = [(f"pantograph[1].{n}", "input", "m/s" if n in VELOCITIES else "m") for n in ENDS]

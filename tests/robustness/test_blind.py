@@ -42,7 +42,7 @@ def verdict(scenario, *place, warned=lambda: ()):
     return True
 
 
-def told(data):
+def reported(data):
     """What a description says, read by another parser and in another way than the master's."""
     root = ElementTree.fromstring(data)
     every = {n.tag.rpartition("}")[2]: [] for n in root.iter()}
@@ -80,7 +80,7 @@ def test_descriptions(scenario, change):
     data = change(ssd_text().encode())
     rewrite(scenario, SystemStructure__ssd=data)
     if verdict(scenario, SSD):
-        assert read(scenario) == told(data)
+        assert read(scenario) == reported(data)
 
 
 @settings(PROFILE, max_examples=count(170, 500))

@@ -68,7 +68,7 @@ def test_the_sound_set_is_taken_in_newtons(scenario):
     assert parameters(scenario) == pytest.approx({"static_force": 140.0, "ripple": 20.0})
 
 
-def told(data):
+def reported(data):
     """The values of an inline set in newtons, by another parser: values, units and their factors."""
     root = ElementTree.fromstring(data)
     factors = {n.get("name"): float(n[0].get("factor", "1")) for n in root.iter() if n.tag.endswith("}Unit") and len(n)}
@@ -87,7 +87,7 @@ def test_inline_sets_blindly(scenario, change):
     TRIED["inline set, blindly"] += 1
     data = INLINE[:BEGIN].encode() + change(INLINE[BEGIN:END].encode()) + INLINE[END:].encode()
     if judged(scenario, data):
-        found, wanted = parameters(scenario), told(data)
+        found, wanted = parameters(scenario), reported(data)
         assert set(found) <= NAMES
         assert found == pytest.approx(wanted, rel=1e-12)
 
@@ -105,7 +105,7 @@ def test_every_number_and_unit_of_an_inline_set(scenario, place):
         data = INLINE.replace(place, f'{name}="{cell}"', 1).encode()
         if judged(scenario, data):
             accepted += 1
-            assert parameters(scenario) == pytest.approx(told(data), rel=1e-12)
+            assert parameters(scenario) == pytest.approx(reported(data), rel=1e-12)
     assert accepted < len(CELLS) / 2
 
 

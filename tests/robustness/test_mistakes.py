@@ -116,7 +116,7 @@ def test_stop_times_and_intervals_that_do_not_go_together(scenario, tmp_path, ol
 
 @pytest.mark.parametrize("stop", ['stopTime="5.16"', 'stopTime="0.1"', ""])
 def test_a_run_until_the_end_of_its_interval_ends_there(scenario, tmp_path, stop):
-    """It has 60 m to go at 300 km/h, 0.72 s, and goes on for 0.5 s, whatever stop time other tools are told."""
+    """It has 60 m to go at 300 km/h, 0.72 s, and continues for 0.5 s, whatever stop time other tools are given."""
     folder, out = tmp_path / "changed.ssp", tmp_path / "out"
     shutil.copytree(scenario, folder)
     description = folder / "SystemStructure.ssd"

@@ -98,14 +98,15 @@ def test_a_bad_cell_of_a_measurement_is_told_with_its_line(tmp_path, bad, column
         ("force [N]\n1\n2\n3\n", "no column named position or time"),
         ("position [N],force [N]\n1,2\n2,3\n3,4\n", "column 'position' has the unit 'n'; m or km is needed"),
         ("time [m],force [N]\n1,2\n2,3\n3,4\n", "column 'time' has the unit 'm'; s or ms is needed"),
-        ("time [s],force [m]\n1,2\n2,3\n3,4\n", "column 'force' has the unit 'm'; N or kN is needed"),
+        ("time [s],force [m]\n1,2\n2,3\n3,4\n", "column 'force' has the unit 'm'; N or daN or kN is needed"),
         ("time [s],force [lbf]\n1,2\n2,3\n3,4\n", "column 'force' has the unit 'lbf'"),
         ("km [m],time [s],force [N]\n1,2\n2,3\n3,4\n", "m.csv:2: has 2 cells, the head has 3"),
         ("time [s],force [N]\n1,2\n2,3,4\n3,4\n", "m.csv:3: has 3 cells, the head has 2"),
         ("time [s],force [N],Force [kN]\n1,2,3\n2,3,4\n3,4,5\n", "several columns of the same meaning"),
         ("time [s],t [ms],force [N]\n1,2,3\n2,3,4\n3,4,5\n", "several columns of the same meaning"),
         ("time [s],force [N]\n1,2\n1,3\n3,4\n", "m.csv:3: the time does not increase"),
-        ("position [m],force [N]\n3,2\n2,3\n1,4\n", "m.csv:3: the position does not increase"),
+        ("position [m],force [N]\n3,2\n1,3\n2,4\n", "m.csv:4: the position does not fall"),
+        ("position [m],force [N]\n3,2\n2,3\n4,4\n", "m.csv:3: the position does not increase"),
         ("time [s],force [N]\n1,2\n\n2,3\n\n1,4\n", "m.csv:6: the time does not increase"),
         ("time [s],force [N]\n1,2\n2,3\n", "it holds 2"),
         ('time [s],force [N]\n1,"' + "2" * 200_000 + '"\n', "not a table of separated values"),
@@ -343,7 +344,7 @@ CELL = st.one_of(
 @settings(PROFILE, max_examples=count(120, 4000))
 @given(head=st.lists(CELL, max_size=3), rows=st.lists(st.lists(CELL, min_size=1, max_size=4), min_size=1, max_size=4))
 def test_study_tables_of_any_cells(tmp_path_factory, head, rows):
-    """Told in words with the file, or listed; whatever the cells hold, all that is printed can be read."""
+    """Reported in words with the file, or listed; whatever the cells hold, all that is printed can be read."""
     TRIED["study table, any cells"] += 1
     folder = tmp_path_factory.getbasetemp()
     text = io.StringIO()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from master.report.charts.chart import Axis, Band, Bars, Chart, Curve, Dash, Level, Points, Ticks, fill
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _WIDTH: Final = 9.0
 #: Pixels on a page that correspond to an inch in a file.
@@ -32,6 +34,8 @@ _SYMBOLS: Final = {"circle": "o", "x": "x", "triangle-up": "^"}
 
 def static_figure(charts: Sequence[Chart]) -> Figure:
     """Return one figure of all charts, each with its title, its legend and its axes."""
+    from matplotlib.figure import Figure  # takes longer than all else that a command imports
+
     heights = [chart.height / _PIXELS + 0.4 for chart in charts]
     figure = Figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
     rows = figure.subplots(len(charts), 1, squeeze=False, height_ratios=heights)[:, 0]

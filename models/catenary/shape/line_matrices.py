@@ -249,8 +249,8 @@ def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray, size: int) -> sp.csc_mat
 
     Of a broken one a half swings with each wire.
     """
-    bar, halves = (np.kron(m, np.eye(3)) for m in ([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]], 0.5 * np.eye(2)))
-    pattern = np.where(mesh.broken[:, None, None], halves, bar)
+    bar = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
+    pattern = np.where(mesh.broken[:, None, None], 0.5 * np.eye(6), bar)
     return _assembled(mass[:, None, None] * pattern, _translations(mesh.droppers), size)
 
 

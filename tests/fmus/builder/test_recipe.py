@@ -132,3 +132,71 @@ def test_unknown_name_lists_the_known_ones(tmp_path, capsys):
 def test_list_names_every_definition(capsys):
     assert main(["list"]) == 0
     assert "Catenary_LN2" in capsys.readouterr().out.split()
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A project with a line and a pantograph of its own, the line named as one of the library."""
+    folder = tmp_path / "demo"
+    for kind, path, name in (("lines", line_path("C270"), "LN2"), ("pantographs", pantograph_path("CX"), "Mine")):
+        (folder / kind).mkdir(parents=True)
+        shutil.copy(path, folder / kind / f"{name}.toml")
+    (folder / "openpanto.toml").write_text("")
+    (folder / "demo.ssp").mkdir()
+    return folder
+
+
+def test_a_name_is_looked_up_in_the_project_before_the_library(project):
+    found = recipe("Catenary_LN2_P2", folders=[project])
+    assert (found.name, found.definition) == ("Catenary_LN2_P2", project / "lines" / "LN2.toml")
+    assert found.settings == {"pantographs": 2}
+    assert found.is_own
+    assert recipe("Pantograph_Mine", folders=[project]).definition == project / "pantographs" / "Mine.toml"
+    assert not recipe("Catenary_LN2").is_own
+
+
+def test_what_an_fmu_was_built_from_comes_before_the_library_and_after_the_project(project, own):
+    (own / "LN2.toml").write_text((own / "Mine.toml").read_text())
+    known = {"built_from": own / "LN2.toml"}
+    assert recipe("Catenary_LN2", **known).definition == own / "LN2.toml"
+    assert recipe("Catenary_LN2", folders=[project], **known).definition == project / "lines" / "LN2.toml"
+    (own / "LN2.toml").unlink()
+    with pytest.raises(BuildError, match="which Catenary_LN2 was built from, is missing"):
+        recipe("Catenary_LN2", **known)
+
+
+def test_a_pantograph_among_the_lines_is_refused(project):
+    shutil.copy(pantograph_path("CX"), project / "lines" / "CX.toml")
+    with pytest.raises(BuildError, match="is no definition for Catenary_CX: it defines what Pantograph_CX is made of"):
+        recipe("Catenary_CX", folders=[project])
+
+
+def test_the_fmu_of_an_own_definition_is_built_from_where_the_scenario_lies(project, capsys):
+    scenario = project / "demo.ssp"
+    said, path = [], scenario / "resources" / "Pantograph_Mine.fmu"
+    fmu_provision.provide_fmu(path, said.append, library=scenario)
+    assert said == ["building Pantograph_Mine.fmu"]
+    file = project / "pantographs" / "Mine.toml"
+    assert fmu_provision.definition_of(path) == str(file)
+    file.write_text(file.read_text().replace("168", "170"))
+    fmu_provision.provide_fmu(path, said.append, library=scenario)
+    assert said[1:] == ["building Pantograph_Mine.fmu again: its sources have changed"]
+    file.unlink()
+    fmu_provision.provide_fmu(path, said.append, library=scenario)
+    assert "which it was built from, is missing" in said[-1]
+
+
+def test_two_definitions_of_one_name_are_reported(project, capsys):
+    assert main(["fingerprint", "--library", str(project / "demo.ssp"), "Catenary_LN2"]) == 0
+    first, second = project / "lines" / "LN2.toml", line_path("LN2", ())
+    assert capsys.readouterr().err == f"note: two definitions are named 'LN2': {first} is used, {second} is not\n"
+
+
+def test_an_fmu_of_the_library_says_so(tmp_path):
+    path = build(recipe("Pantograph_CX"), tmp_path)
+    assert fmu_provision.definition_of(path) == "library: pantographs/CX.toml"
+
+
+def test_a_mistyped_name_is_answered_by_the_one_that_may_be_meant(capsys):
+    assert main(["build", "Catenary_LN22"]) == 1
+    assert "did you mean 'Catenary_LN2'?" in capsys.readouterr().err

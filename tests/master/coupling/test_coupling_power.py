@@ -25,8 +25,8 @@ def test_a_late_velocity_on_a_loaded_interface_adds_or_takes_power():
 
 def coupled_network(fake_slave):
     ends = ("A.vz", "B.vz")
-    told = tuple(f"pantograph[1].{e}" for e in ends)
-    line = fake_slave("line", told, ("pantograph[1].contact.force",), np.zeros(1), None)
+    reported = tuple(f"pantograph[1].{e}" for e in ends)
+    line = fake_slave("line", reported, ("pantograph[1].contact.force",), np.zeros(1), None)
     pan = fake_slave("pan", ("contact.force",), ends, np.zeros(2), None)
     wires = [Connection("pan", e, "line", f"pantograph[1].{e}") for e in ends]
     wires.append(Connection("line", "pantograph[1].contact.force", "pan", "contact.force"))
@@ -34,8 +34,8 @@ def coupled_network(fake_slave):
 
 
 def observed(observer, network, rows):
-    for n, (given, told) in enumerate(rows):
-        network.outputs[:], network.inputs[:] = given, told
+    for n, (given, reported) in enumerate(rows):
+        network.outputs[:], network.inputs[:] = given, reported
         observer.observe(n, 1e-3 * n, network)
 
 
@@ -44,8 +44,8 @@ def test_interface_power_is_summed_over_the_steps(fake_slave):
     network = coupled_network(fake_slave)
     contacts = [Contact(1, "line", "pan", "line.pantograph[1].contact")]
     random = np.random.default_rng(1)
-    given, told = random.normal(size=(2, 50, 3))
-    rows = list(zip(given, told, strict=True))
+    given, reported = random.normal(size=(2, 50, 3))
+    rows = list(zip(given, reported, strict=True))
     whole, first, second = (CouplingPowerObserver(contacts, network) for _ in range(3))
     observed(whole, network, rows)
     observed(first, network, rows[:20])
@@ -53,8 +53,8 @@ def test_interface_power_is_summed_over_the_steps(fake_slave):
     observed(second, network, rows[20:])
     assert second.summary(0.01) == whole.summary(0.01)
     (found,) = whole.summary(0.01)
-    velocity, velocity_told = given[:, 1:].mean(axis=1), told[:, :2].mean(axis=1)
-    residual = power_residual(given[:, 0], told[:, 2], velocity, velocity_told)
+    velocity, velocity_told = given[:, 1:].mean(axis=1), reported[:, :2].mean(axis=1)
+    residual = power_residual(given[:, 0], reported[:, 2], velocity, velocity_told)
     assert found.energy == pytest.approx(0.01 * residual.sum())
     assert found.transferred == pytest.approx(0.01 * np.abs(given[:, 0] * velocity).sum())
     assert found.rms == pytest.approx(np.sqrt(np.mean(residual**2)))

@@ -76,7 +76,7 @@ def test_gauss_seidel_order_of_slaves_matters_and_is_honoured(fake_slave):
 
 
 def test_after_a_step_the_inputs_are_what_the_slaves_were_told(fake_slave):
-    """Also what the first of three was told, though its source, the second, has gone on before the third steps."""
+    """Also what the first of three received, though its source, the second, has stepped before the third does."""
     slaves = [
         fake_slave(f"s{i}", ("u",), ("y",), np.array([float(i + 1)]), lambda s, u, t, h: s + h * u, lambda s, u: s)
         for i in range(3)

@@ -31,17 +31,17 @@ def talker(fake_slave):
 
 def test_every_warning_is_told_once_and_none_after_the_first_step(talker, fake_slave):
     loud, silent = talker, fake_slave("train", (), (), np.zeros(0), lambda state, *_: state)
-    network, told = Network([loud, silent], []), []
-    observer = FmuWarningObserver(told.append)
+    network, reported = Network([loud, silent], []), []
+    observer = FmuWarningObserver(reported.append)
     loud.words = ("slack",)
     observer.begin(0.0, network)
-    assert told == [FmuWarning("line", "slack")]
+    assert reported == [FmuWarning("line", "slack")]
     loud.words = ("slack", "too long")
     observer.observe(1, 0.1, network)
     loud.words = ("slack", "too long", "later")
     observer.observe(2, 0.2, network)
-    assert told == observer.warnings == [FmuWarning("line", "slack"), FmuWarning("line", "too long")]
-    assert str(told[0]) == "warning: component 'line' says: slack"
+    assert reported == observer.warnings == [FmuWarning("line", "slack"), FmuWarning("line", "too long")]
+    assert str(reported[0]) == "warning: component 'line' says: slack"
 
 
 @pytest.fixture

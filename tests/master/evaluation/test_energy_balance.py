@@ -80,7 +80,7 @@ def test_what_is_not_watched_has_no_balance(rows):
 def test_balances_have_a_row_in_the_report():
     found = find_balances([every_step(), recording(0.1, **balance([0.0, 1.0, 1.0]))], [])
     rows = dict(quality_rows({"energy": [{"what": b.what, "text": b.text} for b in found]}))
-    assert rows["energy, line"] == "drift 1 J, at most 0.005 of 200 J, beyond 1e-06 from t = 0.1 s on"
+    assert rows["energy drift, line"] == "drift 1 J, at most 0.005 of 200 J, beyond 1e-06 from t = 0.1 s on"
 
 
 def test_asking_for_it_of_fmus_that_cannot_is_refused(toy, tmp_path, capsys):

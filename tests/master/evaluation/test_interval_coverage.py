@@ -165,9 +165,9 @@ def test_all_cells_are_checked_before_the_first_run(family_folder, tmp_path, cap
     (family_folder / "variants.csv").write_text(VARIANTS.format(cell))
     command = ["study", str(family_folder), "--no-build", "--quiet", "--out", str(tmp_path / "out")]
     assert main(command) == 1
-    told = " ".join(capsys.readouterr().err.split())
-    assert "variant 'two'" in told
-    assert said in told
+    reported = " ".join(capsys.readouterr().err.split())
+    assert "variant 'two'" in reported
+    assert said in reported
     assert not (tmp_path / "out").exists()
 
 

@@ -53,9 +53,9 @@ def statistics(folder, name=CONTACT.prefix):
 @pytest.mark.parametrize("kind", ["", '<panto:Filter kind="fft"/>', '<panto:Filter phase="causal" cutoff="15"/>'])
 def test_a_users_own_statistics_of_the_force_file_are_the_figures(toy, toy_text, tmp_path, kind):
     done = go(toy, tmp_path / "out", toy_text(f'<panto:Interval start="20" end="45"/>{kind}'))
-    told = json.loads((done.folder / "summary.json").read_text())["quality"][0]
+    reported = json.loads((done.folder / "summary.json").read_text())["quality"][0]
     found = statistics(done.folder)
-    assert {name: told[name] for name in found} == found  # to the last bit
+    assert {name: reported[name] for name in found} == found  # to the last bit
     (done.folder / results_folder.FORCES).unlink()
     assert main(["report", str(done.folder)]) == 0
     assert statistics(done.folder) == found
@@ -128,9 +128,9 @@ def made_up(bump=0.05, where=(50.0, 100.0, 150.0), moment=0.3, slack=None):
     names = [f"catenary.support[{i}].uplift" for i in (1, 2, 3)] + ["catenary.dropper[1].force"]
     slow = Recording(time[::5], tuple(names), ("m", "m", "m", "N"), np.column_stack((*rises, dropper))[::5])
     if slack is not None:
-        told = np.where(np.abs(time - slack) < 0.05, 1.0, 0.0)[::5, None]
+        reported = np.where(np.abs(time - slack) < 0.05, 1.0, 0.0)[::5, None]
         names, units = (*names, "catenary.dropper[1].slack"), ("m", "m", "m", "N", "1")
-        slow = Recording(slow.time, tuple(names), units, np.hstack((slow.values, told)))
+        slow = Recording(slow.time, tuple(names), units, np.hstack((slow.values, reported)))
     geometry = {f"support[{i}].x": x for i, x in enumerate(where, 1)} | {"dropper[1].x": 120.0}
     settings = {"start": 0.0, "interval": {"start": 90.0, "end": 160.0}}
     summary = {"status": "complete", "contacts": [dataclasses.asdict(CONTACT)], "settings": settings}
@@ -141,12 +141,12 @@ def test_run_study_and_verification_tell_the_same_uplift_and_slack():
     done = made_up()
     rows = {row[0]: row[1] for row in figure_rows(done.assessments())}
     (entry,) = entries("one", done, Interval(name="i", start=90.0, end=160.0))
-    told = [QUANTITIES[name].measure(done, Choice()).values[0] for name in ("uplift", "slack")]
+    reported = [QUANTITIES[name].measure(done, Choice()).values[0] for name in ("uplift", "slack")]
     # 90 mm at the first support come from the raising, outside the interval.
     assert rows["uplift at supports, largest [mm]"] == "50.0"
-    assert 1e3 * entry.uplift == pytest.approx(told[0]) == pytest.approx(50.0, rel=1e-3)
+    assert 1e3 * entry.uplift == pytest.approx(reported[0]) == pytest.approx(50.0, rel=1e-3)
     assert rows["slack droppers at passage [%]"] == "100"
-    assert (entry.slack, told[1]) == (1.0, 100.0)
+    assert (entry.slack, reported[1]) == (1.0, 100.0)
     assert max(u.maximum for u in done.uplifts) == pytest.approx(0.09, rel=1e-3)
 
 
@@ -155,10 +155,10 @@ def test_droppers_are_slack_when_the_line_says_so(slack, share):
     """The force vanishes at 2.4 s, at the passage; 3.9 s are long after. Without the line's word the force counts."""
     done = made_up(slack=slack)
     (entry,) = entries("one", done, Interval(name="i", start=90.0, end=160.0))
-    told = [QUANTITIES[name].measure(done, choice).values[0] for name, choice in (
+    reported = [QUANTITIES[name].measure(done, choice).values[0] for name, choice in (
         ("slack", Choice()), ("slack_share", Choice(within=5.0)),
     )]  # fmt: skip
-    assert (entry.slack, *told) == (share, 100.0 * share, 100.0 * share)
+    assert (entry.slack, *reported) == (share, 100.0 * share, 100.0 * share)
 
 
 def test_the_verdict_on_uplift_is_that_of_the_interval():
@@ -188,8 +188,8 @@ def test_figures_of_older_results_are_made_with_the_filter_of_their_time(toy, to
     assert "the filters differ" in " ".join(capsys.readouterr().out.split())
     assert "the filters differ" in (tmp_path / "c.html").read_text()
     assert main(["compare", str(old.folder), str(new.folder), "--json"]) == 0
-    (told,) = json.loads(capsys.readouterr().out)
-    assert (told["same_filter"], told["rms"]) == (False, 0.0)  # one force, one filter for the difference
+    (reported,) = json.loads(capsys.readouterr().out)
+    assert (reported["same_filter"], reported["rms"]) == (False, 0.0)  # one force, one filter for the difference
     assert main(["report", str(old.folder)]) == 0
     again = json.loads((old.folder / "summary.json").read_text())
     assert (again["format"], again["quality"][0]["sigma"]) == (results_folder.FORMAT, sigma)

@@ -32,6 +32,8 @@ class Builder:
         self.asked.append(arguments[0])
         self.orders.append(arguments)
         if arguments[0] == "fingerprint":
+            if "--built-from" in arguments and not Path(arguments[arguments.index("--built-from") + 1]).is_file():
+                return subprocess.CompletedProcess(arguments, 0, "", "")  # as for a name that it does not know
             return subprocess.CompletedProcess(arguments, self.code, self.fingerprint + "\n", self.said)
         if not self.said:
             name, folder = arguments[-1], arguments[2]
@@ -48,15 +50,15 @@ def builder(monkeypatch):
 
 
 def test_missing_then_fresh_then_stale(builder, tmp_path):
-    path, told = tmp_path / "X.fmu", []
-    fmu_provision.provide_fmu(path, told.append)
+    path, reported = tmp_path / "X.fmu", []
+    fmu_provision.provide_fmu(path, reported.append)
     assert builder.asked == ["fingerprint", "build"]
-    fmu_provision.provide_fmu(path, told.append)
+    fmu_provision.provide_fmu(path, reported.append)
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
-    fmu_provision.provide_fmu(path, told.append)
+    fmu_provision.provide_fmu(path, reported.append)
     assert builder.asked[-2:] == ["fingerprint", "build"]
-    assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
+    assert reported == ["building X.fmu", "building X.fmu again: its sources have changed"]
     assert fmu_provision.stored_guid(path) == "{cd-34}"
 
 
@@ -78,8 +80,8 @@ def test_a_foreign_fmu_is_left_alone(builder, tmp_path):
     ],
 )
 def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, change, why):
-    path, told = tmp_path / "X.fmu", []
-    fmu_provision.provide_fmu(path, told.append)
+    path, reported = tmp_path / "X.fmu", []
+    fmu_provision.provide_fmu(path, reported.append)
     with zipfile.ZipFile(path) as file:
         members = {name: file.read(name) for name in file.namelist()} | change
     with zipfile.ZipFile(path, "w") as file:
@@ -88,9 +90,9 @@ def test_what_is_not_as_we_built_it_is_kept_and_that_is_said(builder, tmp_path, 
                 file.writestr(name, data)
     before = path.read_bytes()
     builder.fingerprint = "CD-34"
-    assert fmu_provision.provide_fmu(path, told.append) == path
+    assert fmu_provision.provide_fmu(path, reported.append) == path
     assert path.read_bytes() == before
-    assert told[1:] == [f"X.fmu is used as it is: {why}; to have it rebuilt, remove it"]
+    assert reported[1:] == [f"X.fmu is used as it is: {why}; to have it rebuilt, remove it"]
 
 
 @pytest.mark.parametrize(("script", "is_ours"), [("X_ab1234567890", True), ("X_cd1234567890", False), ("own", False)])
@@ -108,21 +110,47 @@ def test_older_builds_are_known_by_the_name_of_their_script(builder, tmp_path, s
 def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     (tmp_path / "lines").mkdir()
     (tmp_path / "lines" / "Mine.toml").write_text("")
-    path, told = tmp_path / "Mine.fmu", []
+    path, reported = tmp_path / "Mine.fmu", []
     write_fmu(path, "ab-12", definition="lines/Mine.toml", pantographs="2")
     builder.mark = {"definition": "lines/Mine.toml", "pantographs": "2"}
-    fmu_provision.provide_fmu(path, told.append)
-    assert told == []
-    ports = ("--pantographs", "2", "--", f"{tmp_path}/lines/Mine.toml")
+    fmu_provision.provide_fmu(path, reported.append)
+    assert reported == []
+    ports = ("--built-from", f"{tmp_path}/lines/Mine.toml", "--pantographs", "2", "--", "Mine")
     assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
     builder.fingerprint = "CD-34"
-    fmu_provision.provide_fmu(path, told.append)
-    assert told == ["building Mine.fmu again: its sources have changed"]
+    fmu_provision.provide_fmu(path, reported.append)
+    assert reported == ["building Mine.fmu again: its sources have changed"]
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
-    fmu_provision.provide_fmu(path, told.append)
-    assert "which it was built from, is missing" in told[-1]
-    assert len(builder.asked) == 3
+    fmu_provision.provide_fmu(path, reported.append)
+    assert "which it was built from, is missing" in reported[-1]
+    assert builder.asked == ["fingerprint", "fingerprint", "build", "fingerprint"]
+
+
+def test_definitions_are_looked_up_where_the_scenario_lies(builder, tmp_path):
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", print, library=tmp_path)
+    assert builder.orders[0] == ("fingerprint", "--if-known", "--library", str(tmp_path), "--", "X")
+    assert builder.orders[1][3:] == ("--library", str(tmp_path), "--", "X")
+
+
+def test_notes_of_the_builder_are_passed_on(monkeypatch, tmp_path):
+    said = "note: two definitions are named 'X': a is used, b is not\nanything else\n"
+    answer = subprocess.CompletedProcess((), 0, "", said)
+    monkeypatch.setattr(fmu_provision, "_fmus", lambda *a, seconds: answer)
+    reported = []
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append)
+    assert reported == ["two definitions are named 'X': a is used, b is not"]
+
+
+def test_an_fmu_says_which_definition_it_was_built_from(tmp_path):
+    path = tmp_path / "demo.ssp" / "resources" / "X.fmu"
+    path.parent.mkdir(parents=True)
+    write_fmu(path, "ab-12", definition="../../lines/X.toml", pantographs="1")
+    assert fmu_provision.definition_of(path) == str(tmp_path / "lines" / "X.toml")
+    write_fmu(path, "ab-12", library="lines/X.toml")
+    assert fmu_provision.definition_of(path) == "library: lines/X.toml"
+    write_fmu(path, "ab-12")
+    assert fmu_provision.definition_of(path) == ""
 
 
 def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
@@ -133,14 +161,14 @@ def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
 
 
 def test_what_the_scratch_folder_holds_is_used_as_long_as_it_fits(builder, tmp_path):
-    scratch, told = tmp_path / "cache", []
+    scratch, reported = tmp_path / "cache", []
     scratch.mkdir()
     for _ in range(2):
-        fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
+        fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, scratch)
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
-    fmu_provision.provide_fmu(tmp_path / "X.fmu", told.append, scratch)
-    assert told == ["building X.fmu", "building X.fmu again: its sources have changed"]
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, scratch)
+    assert reported == ["building X.fmu", "building X.fmu again: its sources have changed"]
 
 
 def test_the_builder_takes_no_modules_from_the_working_folder(monkeypatch, tmp_path):
@@ -152,9 +180,9 @@ def test_the_builder_takes_no_modules_from_fmus_that_ran_here(tmp_path, monkeypa
     (tmp_path / "slavemodule.txt").write_text("x")
     (tmp_path / "pythonfmu").mkdir()
     (tmp_path / "pythonfmu" / "__init__.py").write_text("raise ImportError('of another FMU')")
-    before = fmu_provision.fingerprint("Pantograph_CX")
+    before = fmu_provision.fingerprint(fmu_provision.Lookup("Pantograph_CX"))
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert fmu_provision.fingerprint("Pantograph_CX") == before
+    assert fmu_provision.fingerprint(fmu_provision.Lookup("Pantograph_CX")) == before
 
 
 def test_the_builders_words_are_passed_on(builder, tmp_path):
@@ -174,7 +202,7 @@ def test_without_fmus_nothing_is_asked(monkeypatch, tmp_path):
 
 
 def test_a_name_that_looks_like_an_option_is_a_name():
-    assert fmu_provision.fingerprint("--help") is None
+    assert fmu_provision.fingerprint(fmu_provision.Lookup("--help")) is None
 
 
 @pytest.mark.parametrize("data", [b"", b"not a zip"])

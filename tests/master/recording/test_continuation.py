@@ -105,8 +105,8 @@ def test_a_run_that_goes_on_has_its_scheme_s_memory(toy, tmp_path):
                 assert scheme.save().tolist() == expected
                 if not renewed:
                     assert dict(zip(network.output_names, network.outputs.tolist(), strict=True)) == found.outputs
-                    told = dict(zip(network.input_names, network.inputs.tolist(), strict=True))
-                    assert told == found.inputs
+                    reported = dict(zip(network.input_names, network.inputs.tolist(), strict=True))
+                    assert reported == found.inputs
 
 
 def test_a_scheme_does_not_take_another_s_memory(toy, saved):

@@ -58,8 +58,8 @@ def told_slack():
     def with_slack(run, number):
         fast, slow = run.recordings
         names, units = (*slow.names, f"catenary.dropper[{number}].slack"), (*slow.units, "1")
-        told = Recording(slow.time, names, units, np.column_stack((slow.values, np.ones(len(slow.time)))))
-        return dataclasses.replace(run, recordings=(fast, told))
+        reported = Recording(slow.time, names, units, np.column_stack((slow.values, np.ones(len(slow.time)))))
+        return dataclasses.replace(run, recordings=(fast, reported))
 
     return with_slack
 

@@ -1,4 +1,4 @@
-"""The first signal is a wish, heeded at once where nothing is lost; the second is an order."""
+"""The first signal is a request, granted at once where nothing is lost; the second is an order."""
 
 from __future__ import annotations
 

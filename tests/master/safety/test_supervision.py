@@ -1,4 +1,4 @@
-"""A command ends as it says, or is told to have ended otherwise."""
+"""A command ends as it says, or reports that it has ended otherwise."""
 
 from __future__ import annotations
 

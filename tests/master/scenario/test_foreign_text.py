@@ -150,13 +150,13 @@ def test_the_claim_is_looked_at_before_there_is_room_for_it(instance, monkeypatc
 
 def test_values_that_cannot_be_are_warned_of_once(fake_slave):
     slave = fake_slave("line", (), ("a", "b"), np.zeros(2), lambda state, *_: state)
-    network, told = Network([slave], []), []
-    observer = FmuWarningObserver(told.append)
+    network, reported = Network([slave], []), []
+    observer = FmuWarningObserver(reported.append)
     observer.begin(0.0, network)
     for step, value in enumerate((LARGEST, -1e300, 1e300), 1):
         network.outputs[:] = (1.0, value)
         observer.observe(step, 0.1 * step, network)
-    assert [str(c) for c in told] == [
+    assert [str(c) for c in reported] == [
         "warning: component 'line': b became -1e+300 at t = 0.2 s, larger than anything here can be (1e+15); the "
         "results mean nothing"
     ]

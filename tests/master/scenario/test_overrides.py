@@ -58,6 +58,7 @@ def test_number_and_unit_are_told_apart(text, number, unit):
     ("name", "text", "value"),
     [
         ("tension", "12 kN", 12000.0),
+        ("tension", "1200 daN", 12000.0),
         ("tension", "12", 12.0),
         ("tension", "12 N", 12.0),
         ("speed", "300 km/h", 300.0 / 3.6),
@@ -81,7 +82,7 @@ def test_values_are_given_in_the_unit_of_the_fmu(name, text, value):
         ("tension", "12 kg", "'a.tension' = 12 kg: give it in a unit of N"),
         ("tension", "12 kilo", "unit 'kilo' is not known (known: panto, half, 1, %"),
         ("tension", "much", "'much' is not a number, or a number with its unit ('1 N')"),
-        ("tension", "1,5", "unit ',5' is not known"),
+        ("tension", "1,5", "'1,5' is not a number; write a decimal point"),
         ("tension", "nan", "is not finite"),
         ("plain", "3 m", "give it in no unit: the FMU declares none"),
         ("odd", "3 m", "give it in a unit of lost"),

@@ -143,8 +143,8 @@ def test_doubly_connected_inputs_are_refused_and_unconnected_ones_told():
     checker = ScenarioChecks(structure([a, b], [wire(), wire()]), fmus, problems, warnings)
     checker.components(checker.connections())
     assert [(p.line, p.text) for p in problems] == [(3, "input 'b.u' has 2 connections; one is allowed")]
-    told = "input 'b.w' is declared but not connected; it keeps its start value of the FMU"
-    assert [(w.line, w.text) for w in warnings] == [(4, told)]
+    reported = "input 'b.w' is declared but not connected; it keeps its start value of the FMU"
+    assert [(w.line, w.text) for w in warnings] == [(4, reported)]
 
 
 @pytest.mark.parametrize(

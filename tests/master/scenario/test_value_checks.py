@@ -1,4 +1,4 @@
-"""What the numbers of a scenario rule out before anything is run: told by hand-made components, without FMUs."""
+"""What the numbers of a scenario rule out before anything is run, shown by hand-made components, without FMUs."""
 
 from pathlib import Path
 
@@ -28,8 +28,8 @@ LINE = Component("line", Fmu(Path("line.fmu"), "", "", {}, can_restore=True, sha
 
 def system(*trains, stop=5.0, start=0.0, step=0.001, first=100.0, last=390.0):
     trains = trains or (pantograph(),)
-    told = [(t.name, f"pantograph[{i}].contact.force") for i, t in enumerate(trains, 1)]
-    connections = tuple(Connection("line", output, name, "contact.force") for name, output in told)
+    reported = [(t.name, f"pantograph[{i}].contact.force") for i, t in enumerate(trains, 1)]
+    connections = tuple(Connection("line", output, name, "contact.force") for name, output in reported)
     settings = RunSettings(interval=EvaluationInterval(start=first, end=last))
     return System("one", (LINE, *trains), connections, start, stop, step, settings)
 

@@ -20,8 +20,8 @@ def scenario(tmp_path, library):
 
     def write(text, files=None, **others):
         folder = tmp_path / "foreign.ssp"
-        for name, told in {"panel": description(), **others}.items():
-            write_fmu(folder / f"resources/{name}.fmu", library, told)
+        for name, reported in {"panel": description(), **others}.items():
+            write_fmu(folder / f"resources/{name}.fmu", library, reported)
         for name, content in (files or {}).items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(content)

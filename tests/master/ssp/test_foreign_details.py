@@ -68,26 +68,26 @@ OWN_NOT = changed(
 
 
 @pytest.mark.parametrize(
-    ("told", "wanted"), [(OWN, 2.0), (OF_TYPE, 2.0), (OWN_NOT, 275.15), (description(("", "degC")), 275.15)]
+    ("reported", "wanted"), [(OWN, 2.0), (OF_TYPE, 2.0), (OWN_NOT, 275.15), (description(("", "degC")), 275.15)]
 )
-def test_the_offset_of_a_unit_falls_out_of_a_difference(scenario, tmp_path, told, wanted):
-    folder = scenario(two("2"), one=told, other=description(("K", "")))
+def test_the_offset_of_a_unit_falls_out_of_a_difference(scenario, tmp_path, reported, wanted):
+    folder = scenario(two("2"), one=reported, other=description(("K", "")))
     assert ran(folder, tmp_path)["b.y"][-1] == pytest.approx(wanted, rel=1e-9)
 
 
 def test_so_it_does_from_a_value_of_the_scenario(scenario):
-    told = changed(('<Real start="1"/>', '<Real start="1" unit="K" relativeQuantity="1"/>'))
+    reported = changed(('<Real start="1"/>', '<Real start="1" unit="K" relativeQuantity="1"/>'))
     bound = values(("k", 'Real value="20" unit="degC"'), ("u", 'Real value="20" unit="degC"'))
     folder = scenario(
-        ssd(system(component("a", Y, bindings=bound))), panel=told.replace('start="0.5"', 'start="0.5" unit="K"')
+        ssd(system(component("a", Y, bindings=bound))), panel=reported.replace('start="0.5"', 'start="0.5" unit="K"')
     )
     assert opened(folder).components[0].parameters == pytest.approx({"k": 20.0, "u": 293.15})
 
 
 def test_limits_of_a_type_hold(scenario):
-    told = changed(('<Real start="1"/>', '<Real start="1" declaredType="T"/>'), typed('min="0" max="2" unit="m"'))
+    reported = changed(('<Real start="1"/>', '<Real start="1" declaredType="T"/>'), typed('min="0" max="2" unit="m"'))
     text = ssd(system(component("a", Y, bindings=values(("k", 'Real value="3"')))))
-    assert problems(scenario(text, panel=told)) == [
+    assert problems(scenario(text, panel=reported)) == [
         "SystemStructure.ssd:3: parameter 'a.k' = 3 m is above its maximum 2; a value without a unit is in m: check its size, or write its unit [range]"
     ]
 
@@ -100,7 +100,7 @@ def unit(name, attributes):
 
 
 @pytest.mark.parametrize(
-    ("name", "first", "second", "told"),
+    ("name", "first", "second", "reported"),
     [
         ("pace", 'm="1" s="-1"', 'm="1" s="-1" factor="0.5"', "component 'b': unit 'pace' of its FMU has another meaning than in the FMU of 'a': it is declared with factor 0.5, there with factor 1"),
         ("pace", 'm="1" s="-1"', 'kg="1"', "component 'b': unit 'pace' of its FMU has another meaning than in the FMU of 'a': it measures something else"),
@@ -109,9 +109,9 @@ def unit(name, attributes):
         ("m", 'kg="1"', 'kg="1"', "component 'a': unit 'm' of its FMU is declared to measure something else than everywhere"),
     ],
 )  # fmt: skip
-def test_a_unit_of_two_fmus_has_one_meaning(scenario, name, first, second, told):
+def test_a_unit_of_two_fmus_has_one_meaning(scenario, name, first, second, reported):
     one, other = (description((name, name), unit(name, attributes)) for attributes in (first, second))
-    assert problems(scenario(two(), one=one, other=other)) == [f"SystemStructure.ssd:3: {told} [unit]"]
+    assert problems(scenario(two(), one=one, other=other)) == [f"SystemStructure.ssd:3: {reported} [unit]"]
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def mapping(content, attributes=""):
 
 
 @pytest.mark.parametrize(
-    ("bound", "told"),
+    ("bound", "reported"),
     [
         (inline(attributes=' source="p.ssv"'), "the ParameterBinding has a source, 'p.ssv', and content as well; remove one of them [binding]"),
         (inline(SET + SET.replace("7", "9")), "the ParameterBinding holds 2 elements; one is allowed [binding]"),
@@ -155,9 +155,9 @@ def mapping(content, attributes=""):
         (mapping(ENTRY, ' type="text/csv"'), "the ParameterMapping is of type 'text/csv'; only application/x-ssp-parameter-mapping is supported [unsupported]"),
     ],
 )  # fmt: skip
-def test_a_binding_is_of_one_content(scenario, bound, told):
+def test_a_binding_is_of_one_content(scenario, bound, reported):
     folder = scenario(ssd(system(component("a", Y, bindings=bound))), {"p.ssv": SSV})
-    assert problems(folder) == [f"SystemStructure.ssd:3: {told}"]
+    assert problems(folder) == [f"SystemStructure.ssd:3: {reported}"]
 
 
 def test_an_empty_source_is_none(scenario):
@@ -183,7 +183,7 @@ E_OUT = '<ssd:Connector name="e_out" kind="output"/>'
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         (through("Integer"), "SystemStructure.ssd:4: 'a.y' is Real and 'w' is Integer; only variables of the same type can be connected [type]"),
         (through("Real", "Boolean"), "SystemStructure.ssd:5: 'a.y' is Real and 'o' is Boolean; only variables of the same type can be connected [type]"),
@@ -194,8 +194,8 @@ E_OUT = '<ssd:Connector name="e_out" kind="output"/>'
         (ssd(system(component("a", E_OUT), wire("a.e_out", ".o"), connectors(connector("o", "output", 'Enumeration name="Speed"')))), "SystemStructure.ssd:3: connector 'o': enumeration 'Speed' is not declared in ssd:Enumerations [enumeration]"),
     ],
 )  # fmt: skip
-def test_mistakes_at_connectors_of_systems(scenario, text, told):
-    assert problems(scenario(text)) == [told]
+def test_mistakes_at_connectors_of_systems(scenario, text, reported):
+    assert problems(scenario(text)) == [reported]
 
 
 def test_a_chain_through_connectors_without_a_type(scenario):
@@ -236,8 +236,8 @@ def test_and_take_one(scenario, inside):
 
 
 def test_one_instance_in_a_process(scenario, tmp_path):
-    told = changed(("<CoSimulation ", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '))
-    folder = scenario(ssd(system(component("a", Y) + component("b", Y))), panel=told)
+    reported = changed(("<CoSimulation ", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '))
+    folder = scenario(ssd(system(component("a", Y) + component("b", Y))), panel=reported)
     with pytest.raises(
         RunError, match=r"'a' and 'b': both are of panel.fmu, of which a process can hold only one; --isolate"
     ):
@@ -258,18 +258,20 @@ LAST = (
 
 @pytest.mark.parametrize("isolation", [None, Isolation()])
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ((EARLY,), r"failed in a step at t = 0\.5 s, status discard: the FMU gave no reason"),
         ((EARLY, ENDS), r"failed in a step at t = 0\.5 s, status discard: the FMU has ended the simulation at t = 0\.5 s, before the stop time"),
         ((EARLY, ENDS, LAST), r"failed in a step at t = 0\.5 s, status discard: the FMU has ended the simulation at t = 0\.53 s, before the stop time"),
     ],
 )  # fmt: skip
-def test_an_fmu_that_ends_early_says_so(scenario, tmp_path, changes, told, isolation):
+def test_an_fmu_that_ends_early_says_so(scenario, tmp_path, changes, reported, isolation):
     """FMPy ends in silence; here the run has not reached its stop time, and is not called complete."""
     folder = scenario(ssd(system(component("a", Y, X))))
     write_fmu(folder / "resources/panel.fmu", compile_library(tmp_path, *changes), description())
-    with pytest.raises(RunError, match=rf"component 'a' \(panel\.fmu\) {told}\. What was computed up to t = 0\.5 s"):
+    with pytest.raises(
+        RunError, match=rf"component 'a' \(panel\.fmu\) {reported}\. What was computed up to t = 0\.5 s"
+    ):
         ran(folder, tmp_path, None if isolation is None else RunOptions(isolation=isolation))
 
 
@@ -285,14 +287,14 @@ def test_up_to_a_stop_time_between_steps_a_run_is_that_of_fmpy(scenario, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("source", "told"),
+    ("source", "reported"),
     [
         ("", "component 'a' has an empty source [source]"),
         ("resources", "component 'a': resources is a folder, not an FMU [fmu]"),
     ],
 )
-def test_sources_that_are_no_files(scenario, source, told):
-    assert problems(scenario(ssd(system(component("a", Y, source=source))))) == [f"SystemStructure.ssd:3: {told}"]
+def test_sources_that_are_no_files(scenario, source, reported):
+    assert problems(scenario(ssd(system(component("a", Y, source=source))))) == [f"SystemStructure.ssd:3: {reported}"]
 
 
 def test_a_missing_source_is_told_once(scenario):
@@ -309,8 +311,8 @@ def test_blanks_around_values_are_none(scenario):
 def test_annotations_of_other_tools_are_noted(scenario):
     steps = '<ssd:Annotations><ssc:Annotation type="org.openmodelica"><x:FixedStepMaster xmlns:x="urn:x" stepSize="0.5"/></ssc:Annotation></ssd:Annotations>'
     text = ssd(system(component("a", Y)).replace("</ssd:System>", f"{steps}</ssd:System>"))
-    told = "SystemStructure.ssd:3: annotations of type 'org.openmodelica' are not read; what they say of steps, solvers and events has no effect [note]"
-    assert opened(scenario(text), strict=True).warnings == (told,)  # a note is no mistake
+    reported = "SystemStructure.ssd:3: annotations of type 'org.openmodelica' are not read; what they say of steps, solvers and events has no effect [note]"
+    assert opened(scenario(text), strict=True).warnings == (reported,)  # a note is no mistake
 
 
 def test_a_connection_leads_to_elements_of_its_system(scenario):
@@ -326,8 +328,8 @@ def test_names_are_one_line(scenario):
     assert problems(scenario(text.replace('Component name="a"', 'Component name="a&#10;b"'))) == [
         "SystemStructure.ssd:3: element 'a\\nb': a name is one line of text [name]"
     ]
-    told = description().replace('name="x"', 'name="x&#10;y"')
-    assert "the variable name 'x\\ny' is not one line of text" in problems(scenario(text, panel=told))[0]
+    reported = description().replace('name="x"', 'name="x&#10;y"')
+    assert "the variable name 'x\\ny' is not one line of text" in problems(scenario(text, panel=reported))[0]
 
 
 def test_an_archive_names_what_lies_beside_it_as_a_folder_would(scenario, tmp_path):

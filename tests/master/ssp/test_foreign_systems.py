@@ -1,4 +1,4 @@
-"""Systems as others write them: what is accepted gives the values it must, what is not is told once, with its place."""
+"""Systems as others write them: what is accepted gives the values it must, what is not is reported once, with its place."""
 
 # ruff: noqa: E501 (XML, a thing a line)
 
@@ -144,7 +144,7 @@ def test_conversions_on_the_way_are_applied_in_turn(scenario):
     millinewton = 3 * 1000 * (2 * 4000 + 10) + 5
     assert opened(folder).components[0].parameters["k"] == pytest.approx(0.5 * (millinewton / 1000) + 1, rel=1e-12)
     for leg in ("", ' suppressUnitConversion="true"'):
-        told = ssd(
+        stated = ssd(
             outer.replace(
                 'endConnector="k"><ssc:LinearTransformation factor="0.5"',
                 f'endConnector="k"{leg}><ssc:LinearTransformation factor="0.5"',
@@ -152,7 +152,7 @@ def test_conversions_on_the_way_are_applied_in_turn(scenario):
             units,
         )
         scale = 1 if leg else 1000
-        assert opened(scenario(told)).components[0].parameters["k"] == pytest.approx(
+        assert opened(scenario(stated)).components[0].parameters["k"] == pytest.approx(
             0.5 * (millinewton / scale) + 1, rel=1e-12
         )
 
@@ -247,8 +247,8 @@ def test_enumerations_are_exchanged(scenario, tmp_path, value):
     ],
 )
 def test_items_that_are_none_are_refused(scenario, value, text):
-    told = pair("Enumeration", "e_out", "e_in", values(("e_in", value)), 'Enumeration name="Speed"', DECLARED)
-    found = problems(scenario(told))
+    stated = pair("Enumeration", "e_out", "e_in", values(("e_in", value)), 'Enumeration name="Speed"', DECLARED)
+    found = problems(scenario(stated))
     assert len(found) == 1
     assert text in found[0]
 
@@ -256,8 +256,8 @@ def test_items_that_are_none_are_refused(scenario, value, text):
 def test_enumerations_with_other_items_are_not_connected(scenario):
     text = pair("Enumeration", "e_out", "e_in", "", 'Enumeration name="Speed"', DECLARED, other=True)
     found = problems(scenario(text, other=description(items=(("off", 0), ("low", 1), ("high", 2)))))
-    told = "has the items off = 1, low = 2, high = 3, the FMU's type off = 0, low = 1, high = 2"
-    assert [told in p for p in found] == [True, True]  # b's two connectors
+    stated = "has the items off = 1, low = 2, high = 3, the FMU's type off = 0, low = 1, high = 2"
+    assert [stated in p for p in found] == [True, True]  # b's two connectors
     bare = pair("Enumeration", "e_out", "e_in", "", other=True).replace("<ssc:Enumeration/>", "")
     found = problems(scenario(bare, other=description(items=(("off", 0), ("low", 1), ("high", 2)))))
     assert ["connected enumerations must have the same ones" in p for p in found] == [True]
@@ -295,7 +295,7 @@ def test_all_types_isolated_and_iterated(scenario, tmp_path):
     assert {n: v.tolist() for n, v in plain.items()} == {n: v.tolist() for n, v in isolated.items()}
     run_settings = '<ssd:Annotations><ssc:Annotation type="urn:openpanto:ssp"><panto:Run xmlns:panto="urn:openpanto:ssp"><panto:Coupling scheme="iterative" weight="0.5"/></panto:Run></ssc:Annotation></ssd:Annotations></ssd:SystemStructureDescription>'
     iterated = ran(scenario(text.replace("</ssd:SystemStructureDescription>", run_settings)), tmp_path)
-    assert plain["b.i_out"].tolist() == [0.0, *range(10)]  # told at the beginning of a step
+    assert plain["b.i_out"].tolist() == [0.0, *range(10)]  # received at the beginning of a step
     assert iterated["b.i_out"].tolist() == [*range(11)]  # and at its end
 
 
@@ -440,10 +440,10 @@ def test_the_same_unit_written_twice_is_none(scenario):
             "1.0", parameters(("u", 'Real value="36" unit="km/h"')) + f"<ssv:Units>{second}</ssv:Units>"
         )
     }
-    told = ssd(system(component("a", U, Y, bindings=BOUND.format("p.ssv"))), f"<ssd:Units>{first}</ssd:Units>")
-    assert opened(scenario(told, files, panel=description(("m/s", "")))).components[0].parameters["u"] == pytest.approx(
-        10, rel=1e-5
-    )
+    stated = ssd(system(component("a", U, Y, bindings=BOUND.format("p.ssv"))), f"<ssd:Units>{first}</ssd:Units>")
+    assert opened(scenario(stated, files, panel=description(("m/s", "")))).components[0].parameters[
+        "u"
+    ] == pytest.approx(10, rel=1e-5)
 
 
 def test_units_that_only_an_fmu_defines_are_known(scenario):
@@ -457,8 +457,8 @@ def test_units_that_only_an_fmu_defines_are_known(scenario):
 
 def test_inline_sets_are_held_to_the_schema(scenario):
     twice = '<ssv:Parameter name="k"><ssv:Real value="1"/><ssv:Real value="2"/></ssv:Parameter>'
-    told = values(("u", 'Real value="1"')).replace("</ssv:Parameters>", f"{twice}</ssv:Parameters>")
-    found = problems(scenario(ssd(system(component("a", U, Y, bindings=told)))))
+    stated = values(("u", 'Real value="1"')).replace("</ssv:Parameters>", f"{twice}</ssv:Parameters>")
+    found = problems(scenario(ssd(system(component("a", U, Y, bindings=stated)))))
     assert len(found) == 1
     assert found[0].endswith("[schema]")
     again = values(("k", 'Real value="1"'), ("k", 'Real value="2"'))
@@ -526,12 +526,12 @@ def test_types_of_version_2_under_their_new_names(scenario, tmp_path):
 
 
 def test_the_tolerance_of_the_default_experiment_is_passed_on(scenario, tmp_path, capsys):
-    told = connector("tolerance", "output")
-    folder = scenario(ssd(system(component("a", told))), panel=description(tolerance="1e-5"))
+    stated = connector("tolerance", "output")
+    folder = scenario(ssd(system(component("a", stated))), panel=description(tolerance="1e-5"))
     assert set(ran(folder, tmp_path)["a.tolerance"]) == {1e-5}
     assert set(ran(folder, tmp_path, tolerance=1e-8)["a.tolerance"]) == {1e-8}
     assert set(ran(folder, tmp_path, RunOptions(isolation=Isolation()))["a.tolerance"]) == {1e-5}
-    assert set(ran(scenario(ssd(system(component("a", told)))), tmp_path)["a.tolerance"]) == {-1.0}
+    assert set(ran(scenario(ssd(system(component("a", stated)))), tmp_path)["a.tolerance"]) == {-1.0}
     assert main(["validate", str(folder), "--no-build", "--tolerance", "1e-7"]) == 0
     assert "tolerance 1e-07 for all FMUs" in " ".join(capsys.readouterr().out.split())
 

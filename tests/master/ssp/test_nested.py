@@ -161,12 +161,12 @@ def test_mistakes_in_a_mapping_are_found_with_file_and_line(toy, toy_text):
     (toy / "m.ssm").write_text(MAPPING.format("mass"))
     rewrite(toy, toy_text().replace(BINDING, MAPPED))
     with open_scenario(toy, build=False) as scenario:
-        told = "m.ssm:7: the parameter set holds no 'mass': nothing is set for 'speed' [mapping]"
-        assert scenario.system.warnings == (told,)
+        reported = "m.ssm:7: the parameter set holds no 'mass': nothing is set for 'speed' [mapping]"
+        assert scenario.system.warnings == (reported,)
     (toy / "m.ssm").write_text(re.sub('.*"{}".*\n', "", MAPPING))
     with open_scenario(toy, Overrides(strict=True), build=False) as scenario:  # a note is not even strictly a mistake
-        told = "m.ssm:4: the mapping names no 'ripple' of the parameter set: not used [note]"
-        assert scenario.system.warnings == (told,)
+        reported = "m.ssm:4: the mapping names no 'ripple' of the parameter set: not used [note]"
+        assert scenario.system.warnings == (reported,)
     (toy / "m.ssm").write_text(MAPPING.format("ripple").replace('target="speed"', 'target="static_force"'))
     assert problems(toy) == ["m.ssm:7: 'static_force' is the target of two entries; remove one [mapping]"]
 

@@ -154,6 +154,6 @@ def test_what_is_refused(folder, row):
     text, reason = REFUSED[row]
     with pytest.raises(ScenarioError) as caught:
         opened(folder, text)
-    told = [str(p) for p in caught.value.problems]
-    assert any(reason in p for p in told), told
-    assert all(re.match(r"SystemStructure\.ssd:\d+: ", p) for p in told), told
+    reported = [str(p) for p in caught.value.problems]
+    assert any(reason in p for p in reported), reported
+    assert all(re.match(r"SystemStructure\.ssd:\d+: ", p) for p in reported), reported

@@ -95,8 +95,8 @@ def test_slack_droppers_are_named(line_maker):
     assert slack_warning(part.droppers, is_slack) == ""
     loose = is_slack.copy()
     loose[[3, 11]] = True
-    told = slack_warning(part.droppers, loose)
-    assert told == (
+    reported = slack_warning(part.droppers, loose)
+    assert reported == (
         f"droppers {part.droppers[3].name} at {part.droppers[3].x:.2f} m, "
         f"{part.droppers[11].name} at {part.droppers[11].x:.2f} m are slack at rest"
     )
@@ -106,11 +106,11 @@ def test_slack_droppers_are_named(line_maker):
 def test_droppers_that_pull_before_they_are_taut_are_told_with_figure_and_cure(ln2):
     assert slack_law_warning(ln2) == ""
     dropper = dataclasses.replace(ln2.dropper, slack_law="tension")
-    told = slack_law_warning(dataclasses.replace(ln2, dropper=dropper))
-    assert "alpha = 0.0272 s" in told
-    assert "at 0.5 m/s pulls 14 mm before it is taut" in told
-    assert "[damping.dropper]" in told
-    assert 'slack_law = "elastic_only" in [dropper]' in told
+    reported = slack_law_warning(dataclasses.replace(ln2, dropper=dropper))
+    assert "alpha = 0.0272 s" in reported
+    assert "at 0.5 m/s pulls 14 mm before it is taut" in reported
+    assert "[damping.dropper]" in reported
+    assert 'slack_law = "elastic_only" in [dropper]' in reported
     own = dataclasses.replace(ln2.damping, dropper=Rayleigh(1e-3, 0.0))
     assert slack_law_warning(dataclasses.replace(ln2, dropper=dropper, damping=own)) == ""
 

@@ -77,8 +77,8 @@ def test_outside_its_band_a_row_fails_of_whatever_kind(kind):
     inside, beside = ("agrees", "departs") if kind == "report" else ("holds", "fails")
     assert [_verdict(row, v)[0] for v in (38.0, 34.0, 33.0)] == [inside, beside, beside]
     assert [_verdict(row, v)[0] for v in (32.9, 40.1, 41.0, math.nan)] == ["fails"] * 4
-    told = decide(row, QUANTITIES["sigma"], Measured((41.0,)), {}).remark
-    assert told == "outside the band: untuned readings span 33 to 40 N"
+    stated = decide(row, QUANTITIES["sigma"], Measured((41.0,)), {}).remark
+    assert stated == "outside the band: untuned readings span 33 to 40 N"
     assert decide(row, QUANTITIES["sigma"], Measured((38.0,)), {}).remark == "untuned readings span 33 to 40 N"
 
 
@@ -151,5 +151,5 @@ def test_a_row_tells_its_band_that_it_is_recalled_and_what_other_filters_give():
     assert remark == said
     plain = _row(value=38.9, tolerance=1)
     assert decide(plain, QUANTITIES["sigma"], measured, {}).remark == ""
-    told = Measured((38.0,), others=(("fft 20 Hz", 30.0),), depends_on_filter=True)
-    assert decide(plain, QUANTITIES["sigma"], told, {}).remark == "with other filters 30.0 (fft 20 Hz)"
+    stated = Measured((38.0,), others=(("fft 20 Hz", 30.0),), depends_on_filter=True)
+    assert decide(plain, QUANTITIES["sigma"], stated, {}).remark == "with other filters 30.0 (fft 20 Hz)"

@@ -1,4 +1,4 @@
-"""An isolated FMU gives the values of one that is not, and its end is told in one sentence."""
+"""An isolated FMU gives the values of one that is not, and its end is one sentence."""
 
 from __future__ import annotations
 

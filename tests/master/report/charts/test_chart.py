@@ -1,4 +1,4 @@
-"""One description of a chart, two drawings of it: curves that can be told apart, and the same of both renderers."""
+"""One description of a chart, two drawings of it: curves that differ to the eye, and the same from both renderers."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def test_apparent_mass_is_force_over_acceleration_of_the_moving_pantograph(cx):
     count, last = round(8.0 / h), round(2.0 / h)
     time, acceleration = h * np.arange(1, count + 1), np.empty(count)
     for n in range(count):
-        # A contact force is told to push down; a rig's force is positive up.
+        # A contact force pushes down; a rig's force is positive up.
         part.step(amplitude * (1.0 + np.sin(2.0 * np.pi * frequency * n * h)), np.zeros(3), np.zeros(2), h)
         acceleration[n] = part.state.acceleration[-1]
     wave = np.exp(-2j * np.pi * frequency * time[-last:])

@@ -15,6 +15,7 @@ from models.pantograph.multibody.analysis.mechanism_statics import contact_force
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble, constraint_rank, null_space
 from models.pantograph.multibody.mechanism_integrator import Integrator
+from tests.effort import count
 from tests.models.pantograph.multibody import independent
 from tests.models.pantograph.multibody.mechanisms import library, library_data, mechanism_from
 from tests.models.pantograph.multibody.test_mechanisms import line_force, run
@@ -97,10 +98,13 @@ def forcing(t):
     return Inputs(base, 1313.7, 157.5 + 60.0 * np.sin(9.0 * t), 0.2 * np.sin(2.0 * t) + 0.05)
 
 
+DURATION = count(1, 2)
+
+
 @pytest.fixture(scope="module")
 def both_formulations(generic):
     mechanism, y = generic
-    duration = 2.0
+    duration = DURATION
     q0 = independent.coordinates(mechanism, y)
 
     def slope(t, u):
@@ -121,7 +125,7 @@ def test_cartesian_form_agrees_with_independent_coordinates(generic, both_formul
     np.testing.assert_allclose(mine, q, atol=2e-7)
     centre, *_ = independent.head(q)
     head = mechanism.numbers["pan_head"]
-    moved = mechanism.split(y).r[head] - [0.0, 0.0, forcing(2.0).base[0]]
+    moved = mechanism.split(y).r[head] - [0.0, 0.0, forcing(DURATION).base[0]]
     np.testing.assert_allclose(moved, centre, atol=1e-6)
     assert abs(q[2]) > 0.005
 

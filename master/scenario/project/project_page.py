@@ -1,0 +1,125 @@
+"""The README of a project, which says what each file is, and the file that marks its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from master.scenario.project.stretch import Stretch
+
+PROJECT_FILE: Final = "openpanto.toml"
+_MARK: Final = """\
+# Marks the folder of an openpanto project. Its scenarios look for definitions in lines/ and pantographs/ here, before
+# the folders of OPENPANTO_LIBRARY and the library.
+
+name = "{name}"
+"""
+_LIFT: Final = (
+    "The lifting force is constant: it depends neither on the speed nor on the direction of travel, and what of it is "
+    "left at the wire falls with the height of the strip as the pantograph's springs have it."
+)
+
+
+def project_text(name: str) -> str:
+    """Return the file that marks a project's folder."""
+    return _MARK.format(name=name)
+
+
+@dataclass(frozen=True)
+class ProjectPage:
+    """What the README of a project says.
+
+    Attributes
+    ----------
+    name : str
+    folder : str
+        Name of the project's folder.
+    definitions : mapping
+        Files of own definitions, and what each was copied from.
+    foreign : sequence of str
+        FMUs from elsewhere.
+    train : sequence of str
+        Pantographs, the leading one first.
+    calibrated : str
+        Parameter that a calibration changes; empty for none.
+    mean_force : float
+        Wanted mean contact force [N].
+    speed : float
+        [m/s]
+    way : Stretch
+    own_start : sequence of str
+        Pantographs that cannot be set to where they start.
+    """
+
+    name: str
+    folder: str
+    definitions: Mapping[str, str]
+    foreign: Sequence[str]
+    train: Sequence[str]
+    calibrated: str
+    mean_force: float
+    speed: float
+    way: Stretch
+    own_start: Sequence[str]
+
+    def text(self) -> str:
+        """Return the page, in Markdown."""
+        commands = [("validate", "checks it"), ("run", "figures, verdict, and report.html in the folder results")]
+        if self.calibrated:
+            commands.insert(1, ("calibrate", "finds the lifting force for the wanted mean force"))
+        return "\n".join(
+            [
+                f"# {self.name}",
+                "",
+                "In the folder that holds this one:",
+                "",
+                *(f"    openpanto {verb} {self.folder}".ljust(44) + f"# {what}" for verb, what in commands),
+                "",
+                "| file | what it is |",
+                "|---|---|",
+                *(f"| `{file}` | {what} |" for file, what in self._files()),
+                "",
+                "What was chosen:",
+                "",
+                *(f"- {text}" for text in self._choices()),
+                "",
+                "More definitions: in this folder, `openpanto new-line NAME --like LN2` or `openpanto new-pantograph "
+                "NAME --like CX`.",
+                "",
+            ]
+        )
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        for file, origin in self.definitions.items():
+            yield file, f"{origin}: edit it, and the next run builds its FMU again"
+        scenario = f"{self.name}.ssp"
+        yield (
+            f"{scenario}/SystemStructure.ssd",
+            "the scenario: what is coupled, interval of interest, settings of the run",
+        )
+        for name in self.train:
+            yield f"{scenario}/{name}.ssv", f"values of `{name}`: speed, start, lifting force"
+        yield f"{scenario}/resources/", "the FMUs; those of definitions are built when they are needed"
+        for file in self.foreign:
+            yield f"{scenario}/resources/{file}", "an FMU from elsewhere, used as it is"
+        yield PROJECT_FILE, "marks this folder: definitions are looked up here first"
+
+    def _choices(self) -> Iterator[str]:
+        start, end = (f"{x:g}" for x in self.way.interval)
+        places = ", ".join(f"`{n}` at {x:g} m" for n, x in zip(self.train, self.way.starts, strict=True))
+        yield f"Speed {self.speed * 3.6:g} km/h; start of the strip: {places}."
+        yield f"Figures are taken from {start} to {end} m (`Interval`); 0.5 s after the last strip has passed, it ends."
+        target = f"the mean force that EN 50367 allows at most at this speed, AC (recalled): {self.mean_force:.1f} N"
+        if self.calibrated:
+            yield f"`openpanto calibrate` seeks {target}, by `{self.calibrated}`; the value written is a first guess."
+        else:
+            yield f"Nothing is calibrated, as no lifting force of `{self.train[0]}` is known; compare with {target}."
+        if self.calibrated and len(self.train) > 1:
+            yield "The other pantographs are calibrated by `--parameter`, as in `--parameter trailing.static_force`."
+        for name in self.own_start:
+            yield (
+                f"`{name}` has no parameters that set its start and its speed: both must be these by themselves. The "
+                f"run ends at {self.way.stop:g} s."
+            )
+        yield _LIFT

@@ -1,0 +1,82 @@
+"""What a scenario has to know of definitions: where a line can be run on, what lifts a pantograph."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from models.catenary.definition.line_definition import CatenaryDefinition, Section
+from models.pantograph.lumped.lumped_definition import LumpedDefinition
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
+
+
+class LineFacts(NamedTuple):
+    """A line along the track, all in m.
+
+    Attributes
+    ----------
+    begin, end : float
+        Where the contact wire is at its working height.
+    supports : tuple of float
+        Within that.
+    lowest, height : float
+        Height of the contact wire: the lowest, and at the supports.
+    is_ring : bool
+        Whether the line closes on itself at ``end``.
+    """
+
+    begin: float
+    end: float
+    supports: tuple[float, ...]
+    lowest: float
+    height: float
+    is_ring: bool
+
+
+class LiftFacts(NamedTuple):
+    """What lifts a pantograph.
+
+    Attributes
+    ----------
+    parameter, unit : str
+    value : float
+    softening : float or None
+        How much less of it is left for every metre that the strip is above the reference height [N/m]; None if the
+        parameter is no force on the strip, or that is not known.
+    """
+
+    parameter: str
+    unit: str
+    value: float
+    softening: float | None
+
+
+def line_facts(line: CatenaryDefinition) -> LineFacts:
+    """Return where a line can be run on."""
+    begin = min(_working(section)[0] for section in line.sections)
+    end = max(_working(section)[1] for section in line.sections)
+    supports = sorted({x for section in line.sections for span in section.spans for x in (span.start, span.end)})
+    inside = tuple(x for x in supports if begin <= x <= end)
+    return LineFacts(begin, end, inside, _lowest(line), line.profile.contact_wire_height, line.sections[0].periodic)
+
+
+def lift_facts(pantograph: LumpedDefinition | MechanismDefinition) -> LiftFacts:
+    """Return what lifts a pantograph."""
+    if isinstance(pantograph, LumpedDefinition):  # only the spring to the roof pulls the raised strip back
+        return LiftFacts("static_force", "N", pantograph.static_force, pantograph.stage[0].stiffness)
+    if pantograph.static_moment is not None:
+        return LiftFacts("static_moment", "N.m", pantograph.static_moment, None)
+    return LiftFacts("static_force", "N", pantograph.static_force or 0.0, None)
+
+
+def _working(section: Section) -> tuple[float, float]:
+    if section.periodic:
+        return section.spans[0].start, section.spans[-1].end
+    return section.ends.working
+
+
+def _lowest(line: CatenaryDefinition) -> float:
+    """Return the lowest height that is prescribed for the contact wire [m]."""
+    profile = line.profile
+    longest = max(span.length for section in line.sections for span in section.spans)
+    measured = [z for section in line.sections for _, z in section.measured]
+    return min(measured, default=profile.contact_wire_height - max(0.0, profile.pre_sag) * longest)

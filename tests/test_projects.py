@@ -1,0 +1,148 @@
+"""Projects by the installed command: written, valid, run, and run again after an edit of the line."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+import openpanto
+from models.library.catalogue import line_names
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    """Call the command in an empty folder and return exit code, output and errors."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("OPENPANTO_LIBRARY", raising=False)
+    monkeypatch.setenv("COLUMNS", "1000")
+
+    def called(line):
+        code = openpanto._worked(line.split())
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return called
+
+
+@pytest.mark.parametrize("line", line_names())
+def test_every_line_of_the_library_has_room_for_a_train(call, tmp_path, line):
+    assert call(f"new demo --line {line} --pantograph CX --speed 200")[0] == 0
+    assert (tmp_path / "demo" / "lines" / f"demo_{line}.toml").is_file()
+
+
+@pytest.mark.parametrize("pantograph", ["DSA380", "generic_multibody"])
+def test_a_project_is_valid_as_it_is_written(call, tmp_path, pantograph):
+    assert call(f"new demo --line EN50318_2002 --pantograph {pantograph} --speed 250") == (
+        0,
+        "demo/README.md says what each file is; next: openpanto run demo\n",
+        "",
+    )
+    code, out, _ = call("validate demo --strict")
+    assert (code, out.split(";")[0]) == (0, "demo: valid")
+    data = (tmp_path / "demo" / "demo.ssp" / "SystemStructure.ssd").read_text()
+    assert 'meanForce="130.625"' in data  # 0.00097 v^2 + 70 at 250 km/h
+
+
+def test_a_train_is_valid_and_the_mean_force_is_that_of_its_speed(call, tmp_path):
+    train = "--pantograph CX --pantograph DSA380 --separation 80"
+    assert call(f"new train --line EN50318_2002 {train} --speed 160")[0] == 0
+    code, out, _ = call("validate train --strict")
+    assert (code, out.split(",")[0]) == (0, "train: valid; 3 components")
+    data = (tmp_path / "train" / "train.ssp" / "SystemStructure.ssd").read_text()
+    assert f'meanForce="{0.00047 * 160**2 + 90:.6g}"' in data
+
+
+def test_copies_of_definitions_lie_in_the_project_and_are_found_there(call, tmp_path, monkeypatch):
+    assert call("new demo --line EN50318_2002 --pantograph EN50318_2002 --speed 250")[0] == 0
+    (tmp_path / "demo" / "notes").mkdir()
+    monkeypatch.chdir(tmp_path / "demo" / "notes")
+    assert call("new-line mine --like demo_EN50318_2002") == (0, f"{tmp_path}/demo/lines/mine.toml\n", "")
+    assert call("new-pantograph mine --like CX")[0] == 0
+    assert call("pantograph mine")[0] == 0
+    assert call("new-line mine --like LN2")[2].endswith("is named 'mine' already: take another name\n")
+    monkeypatch.chdir(tmp_path)
+    assert "no pantograph 'mine'" in call("pantograph mine")[2]
+    code, out, err = call("new-line mine --like LN2")
+    assert (code, out) == (0, "lines/mine.toml\n")
+    assert "this folder lies in no project" in err
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("new . --line LN2 --pantograph CX --speed 250", ". exists and is not empty: name a new folder, or empty it"),
+        (
+            "new d --line LN22 --pantograph CX --speed 250",
+            "no line 'LN22' in the library; known: .*; did you mean 'LN2'?",
+        ),
+        (
+            "new d --line LN2 --pantograph DSA --speed 250",
+            "no pantograph 'DSA' in the library; .* did you mean 'DSA380'?",
+        ),
+        ("new d --line nix.toml --pantograph CX --speed 250", "nix.toml: No such file or directory"),
+        ("new d --line LN2 --pantograph nix.fmu --speed 250", "nix.fmu: there is no such FMU"),
+        ("new d --line bad.toml --pantograph CX --speed 250", r"bad.toml: type: is missing(\nbad.toml: .*)+"),
+        ("new d --line binary.toml --pantograph CX --speed 250", "binary.toml.*"),
+        (
+            "new d --line LN2 --pantograph CX --speed 0",
+            "--speed 0: give the speed of the train in km/h, more than 0 .*",
+        ),
+        ("new d --line LN2 --pantograph CX --speed 250 --interval 300 2000", "--interval 300 2000: .* 97 and 1012 m"),
+        ("new d --line LN2 --pantograph CX --pantograph CX --speed 250", "2 pantographs: give --separation, .* once"),
+        (
+            "new d --line LN2 --pantograph CX --pantograph CX --separation 0 --speed 250",
+            "--separation 0: .* 1 m apart.*",
+        ),
+        (
+            "new d --line LN2 --pantograph CX --speed 250 --map A.x=q",
+            "--map A.x=q: catenary is made from a definition.*",
+        ),
+        (
+            "new-line a/b --like LN2",
+            "'a/b' cannot name a definition, its file and its FMU: take letters, digits and _ .*",
+        ),
+        ("new-line LN2 --like LN2", ".*LN2.toml is named 'LN2' already: take another name"),
+        ("new-pantograph mine --like CX_", "no pantograph 'CX_' in the library; known: .*; did you mean 'CX'?"),
+    ],
+)
+def test_a_mistake_is_one_sentence_that_says_what_to_do(call, tmp_path, line, said):
+    (tmp_path / "bad.toml").write_text("name = 'bad'\n")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
+    code, _, err = call(line)
+    assert code == 1
+    assert re.fullmatch(rf"error: {said}\n".replace("?", r"\?"), err), err
+    assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.slow
+def test_an_edit_of_the_line_changes_the_figures_with_nothing_else_done_by_hand(call, tmp_path):
+    assert call("new demo --line LN2 --pantograph DSA380 --speed 250 --interval 250 320")[0] == 0
+    code, out, err = call("run demo --out before --no-report")
+    assert code == 0, err
+    assert "building Catenary_demo_LN2.fmu\n" in err
+    assert "definitions: catenary demo/lines/demo_LN2.toml, pantograph demo/pantographs/demo_DSA380.toml" in out
+    line = tmp_path / "demo" / "lines" / "demo_LN2.toml"
+    text = line.read_text()
+    assert "45.3, 45.5, 45.0, 45.0, 45.0" in text
+    line.write_text(text.replace("45.3, 45.5, 45.0, 45.0, 45.0", "45.3, 45.5, 45.0, 47.0, 43.0"))  # within the interval
+    code, out, err = call("run demo --out after --no-report")
+    assert code == 0, err
+    assert "building Catenary_demo_LN2.fmu again: its sources have changed" in err
+    assert "building Pantograph" not in err
+    found = [json.loads((tmp_path / name / "summary.json").read_text()) for name in ("before", "after")]
+    (before,), (after,) = (summary["quality"] for summary in found)
+    assert abs(before["sigma"] - after["sigma"]) > 0.1
+    assert {c["name"]: c["definition"] for c in found[0]["components"]} == {
+        "catenary": str(line),
+        "pantograph": str(tmp_path / "demo" / "pantographs" / "demo_DSA380.toml"),
+    }
+    # A second definition of the name, nearer to the scenario: it counts, and that is said.
+    nearer = tmp_path / "demo" / "demo.ssp" / "lines" / line.name
+    nearer.parent.mkdir()
+    nearer.write_text(text)
+    _, out, err = call("run demo --out again --no-report")
+    assert f"two definitions are named 'demo_LN2': {nearer} is used, {line} is not" in err
+    assert re.search(r"definitions: catenary demo/demo\.ssp/lines/demo_LN2\.toml", out)
+    assert (tmp_path / "before" / "timeseries.csv").read_bytes() == (tmp_path / "again" / "timeseries.csv").read_bytes()

@@ -208,7 +208,7 @@ def test_blindly(tmp_path_factory, kind, change):
 @pytest.mark.parametrize(("verb", "kind"), [("statics", "line LN2"), ("pantograph", "pantograph CX_multibody")])
 def test_the_commands_say_the_same(tmp_path, verb, kind):
     text, path = FILES[kind].read_text(encoding="utf-8"), tmp_path / "broken.toml"
-    cases = [c for maker in MAKERS for c in maker(text)][::5]
+    cases = [c for maker in MAKERS for c in maker(text)][:: 5 if IS_LONG else 4]
     assert len(cases) > 100
     for case in cases:
         TRIED[f"models {verb}"] += 1

@@ -173,7 +173,7 @@ def test_measured_heights_cover_the_line():
 
 
 def test_unreadable_files(tmp_path):
-    with pytest.raises(DefinitionError, match="cannot be read"):
+    with pytest.raises(DefinitionError, match="there is no such file"):
         load(tmp_path / "none.toml")
     bad = tmp_path / "bad.toml"
     bad.write_text("name = \n", encoding="utf-8")

@@ -9,7 +9,7 @@ from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import load as load_line_file
 from models.definition_files.message_text import hint
 from models.definition_files.toml_reader import Table
-from models.library.search_path import LIBRARY, Kind, definition_files, definition_names, search_path
+from models.library.search_path import LIBRARY, Kind, definition_files, definition_names, doubles, search_path
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import read_mechanism
@@ -82,6 +82,11 @@ def load_lumped(name: str) -> LumpedDefinition:
     if not isinstance(definition, LumpedDefinition):
         raise UnknownNameError(f"pantograph '{name}' is a multibody model where a lumped one is needed")
     return definition
+
+
+def doubts(kind: Kind, name: str) -> str:
+    """Return which of several definitions of a name is used, empty if there is one or a file is named."""
+    return doubles(definition_files(kind, name, [*search_path(), LIBRARY]))
 
 
 def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:

@@ -96,6 +96,8 @@ def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:
     found = definition_files(kind, name, searched)
     if not found:
         known = definition_names(kind, searched)
-        text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{hint(name, known)}"
+        other: Kind = "pantographs" if kind == "lines" else "lines"
+        advice = f"; it is a {other[:-1]}" if definition_files(other, name, searched) else hint(name, known)
+        text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{advice}"
         raise UnknownNameError(text)
     return found[0]

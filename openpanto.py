@@ -29,6 +29,7 @@ if __name__ == "__main__" and sys.path[0] != os.path.dirname(__file__) and not s
 import argparse
 import importlib
 import re
+import shlex
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -398,7 +399,8 @@ def _new(options: argparse.Namespace) -> int:
         options.folder, line, wire, train, lifts, options.separation, speed, target, interval, options.map
     )
     projects.new_project(request)
-    print(f"{options.folder / 'README.md'} says what each file is; next: openpanto run {options.folder}")
+    print(f"{options.speed:g} km/h; {options.folder / 'README.md'} says what each file is and what was chosen")
+    print(f"next: openpanto run {shlex.quote(str(options.folder))}")
     return 0
 
 

@@ -33,7 +33,7 @@ TIERS: dict[str, list[set[str]]] = {
     "models.catenary": [
         {"definition"},
         {"shape"},
-        {"linear_motion"},
+        {"linear_motion", "condition"},
         {"contact_and_slack", "line_state"},
         {"step"},
         {"line_model"},

@@ -9,6 +9,7 @@ import pytest
 
 import openpanto
 from models.library.catalogue import line_names
+from models.library.search_path import LIBRARY
 
 
 @pytest.fixture
@@ -36,7 +37,7 @@ def test_every_line_of_the_library_has_room_for_a_train(call, tmp_path, line):
 def test_a_project_is_valid_as_it_is_written(call, tmp_path, pantograph):
     assert call(f"new demo --line EN50318_2002 --pantograph {pantograph} --speed 250") == (
         0,
-        "demo/README.md says what each file is; next: openpanto run demo\n",
+        "250 km/h; demo/README.md says what each file is and what was chosen\nnext: openpanto run demo\n",
         "",
     )
     code, out, _ = call("validate demo --strict")
@@ -146,3 +147,32 @@ def test_an_edit_of_the_line_changes_the_figures_with_nothing_else_done_by_hand(
     assert f"two definitions are named 'demo_LN2': {nearer} is used, {line} is not" in err
     assert re.search(r"definitions: catenary demo/demo\.ssp/lines/demo_LN2\.toml", out)
     assert (tmp_path / "before" / "timeseries.csv").read_bytes() == (tmp_path / "again" / "timeseries.csv").read_bytes()
+
+
+def test_a_folder_with_a_blank_is_quoted_where_it_is_to_be_typed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert openpanto._worked(["new", "my line", "--line", "LN2", "--pantograph", "CX", "--speed", "69.4"]) == 0
+    said = capsys.readouterr().out
+    assert "69.4 km/h" in said  # who meant m/s sees it
+    assert "openpanto run 'my line'" in said
+    assert "openpanto run 'my line'" in (tmp_path / "my line" / "README.md").read_text()
+
+
+def test_statics_of_a_name_that_two_definitions_have_says_which_is_used(call, tmp_path, monkeypatch):
+    for folder in (tmp_path, tmp_path / "company"):
+        (folder / "lines").mkdir(parents=True)
+        text = (LIBRARY / "lines" / "EN50318_2002.toml").read_text()
+        (folder / "lines" / "mine.toml").write_text(text.replace('"EN50318_2002"', '"mine"'))
+    monkeypatch.setenv("OPENPANTO_LIBRARY", str(tmp_path / "company"))
+    code, _, said = call("statics mine")
+    assert code == 0
+    assert "two definitions are named 'mine'" in said
+
+
+def test_a_definition_that_does_not_build_is_answered_once(call, tmp_path):
+    call("new demo --line LN2 --pantograph CX --speed 200")
+    path = tmp_path / "demo" / "lines" / "demo_LN2.toml"
+    path.write_text(path.read_text().replace('20000, "N"', '20000, "kN"'))
+    code, _, said = call("validate demo")
+    assert code == 1
+    assert f"could not be built: {path}: contact_wire.tension" in said

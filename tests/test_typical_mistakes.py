@@ -47,13 +47,16 @@ LINE_ENGINEER = {
         "statics my.toml", 1, "did you mean 'encumbrance'?", ("encumbrance = [1.4", "encumbrence = [1")
     ),
     "a decimal comma": Mistake("statics my.toml", 1, "have a decimal comma? write a point", ("[5.08,", "[5,08,")),
+    "a decimal comma before a tenth": Mistake(
+        "statics my.toml", 1, "has it a decimal comma? write 20.5", ('[20000, "N"', '[20,5, "kN"')
+    ),
     "no source": Mistake(
         "statics my.toml", 1, 'must be written [value, "unit", "source"]', (', "N", "Table 5.2"]', ', "N"]')
     ),
     "a sum of spans that is another": Mistake(
         "statics my.toml",
         1,
-        "the spans do not add up: they end at 1136.9 m, not at 1140 m",
+        "the spans do not add up: they end at 1136.9 m, not at 1140 m; correct their lengths or this end",
         ("end = [1136.9", "end = [1140"),
     ),
     "droppers that fit no span": Mistake(

@@ -231,7 +231,7 @@ def build(path: Path, lookup: Lookup) -> None:
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"could not be built: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0 or not path.is_file():
-        raise ValueError(f"could not be built: {_last_line(answer)}")
+        raise ValueError(f"could not be built: {_last_line(answer).removeprefix(f'{path.stem} cannot be built: ')}")
 
 
 def write_runtime(folder: Path) -> None:

@@ -38,7 +38,7 @@ from models.interface.coupled_run import (
     contact_point,
     travelled,
 )
-from models.library.catalogue import load_line, load_lumped
+from models.library.catalogue import doubts, load_line, load_lumped
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -66,6 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_step(arguments.step)
     chosen = chosen_filter(arguments)
     definition = load_line(arguments.line)
+    warn([doubts("lines", arguments.line), doubts("pantographs", arguments.pantograph)])
     definition = definition.with_values(settings(arguments.set, "line", definition))
     line = CatenaryModel(definition)
     way, speed = travelled(line, arguments.start, arguments.end), arguments.speed / 3.6

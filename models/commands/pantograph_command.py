@@ -15,7 +15,7 @@ from models.arrays import FloatArray
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.physics_options import add_settings, finite, new_folder, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
-from models.library.catalogue import load_pantograph
+from models.library.catalogue import doubts, load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
@@ -69,6 +69,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
     definition = load_pantograph(arguments.pantograph)
+    warn([doubts("pantographs", arguments.pantograph)])
     definition = definition.with_values(settings(arguments.set, "pantograph", definition))
     result = (
         _multibody(definition, arguments)

@@ -13,7 +13,7 @@ from models.commands import statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
 from models.interface.line_statics import LineStatics, at_rest
-from models.library.catalogue import load_line
+from models.library.catalogue import doubts, load_line
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -50,6 +50,7 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
         If the line has no such section or span.
     """
     definition = load_line(arguments.line)
+    warn([doubts("lines", arguments.line)])
     definition = definition.with_values(settings(arguments.set, "line", definition))
     found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
     warn(found.warnings)

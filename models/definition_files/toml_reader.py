@@ -339,7 +339,9 @@ class Table:
     ) -> tuple[float, ...] | None:
         form = "[[v1, v2, ...]" if many else "[value"
         if not (isinstance(entry, list) and len(entry) == 3 and all(isinstance(e, str) for e in entry[1:])):
-            self.problem(name, f'{shown_value(entry)} must be written {form}, "unit", "source"]')
+            self.problem(
+                name, f'{shown_value(entry)} must be written {form}, "unit", "source"]{_two_numbers_advice(entry)}'
+            )
             return None
         raw, written_unit, source = entry
         if not source.strip():
@@ -405,6 +407,12 @@ def _once(problems: Iterable[Problem]) -> list[Problem]:
         first if not others else dataclasses.replace(first, text=f"{first.text} (and {len(others)} more like this)")
         for first, *others in alike.values()
     ]
+
+
+def _two_numbers_advice(entry: Any) -> str:
+    """Return advice if an entry is ``[20,5, "kN", "source"]``, which is read as two numbers."""
+    commas = isinstance(entry, list) and len(entry) == 4 and all(type(e) is int for e in entry[:2])
+    return f"; has it a decimal comma? write {entry[0]}.{entry[1]}" if commas else ""
 
 
 def _comma_advice(path: Path, error: str) -> str:

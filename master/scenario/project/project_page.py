@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -74,7 +75,10 @@ class ProjectPage:
                 "",
                 "In the folder that holds this one:",
                 "",
-                *(f"    openpanto {verb} {self.folder}".ljust(44) + f"# {what}" for verb, what in commands),
+                *(
+                    f"    openpanto {verb} {shlex.quote(str(self.folder))}".ljust(44) + f"# {what}"
+                    for verb, what in commands
+                ),
                 "",
                 "| file | what it is |",
                 "|---|---|",

@@ -73,7 +73,8 @@ def _read_boundaries(table: Table) -> list[float]:
     if table.has("end"):
         end = table.quantity("end", "m")
         if abs(end - boundaries[-1]) > 1e-6:
-            table.problem("end", f"the spans do not add up: they end at {boundaries[-1]:g} m, not at {end:g} m")
+            sums = f"they end at {boundaries[-1]:g} m, not at {end:g} m"
+            table.problem("end", f"the spans do not add up: {sums}; correct their lengths or this end")
     return boundaries
 
 

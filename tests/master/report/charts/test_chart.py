@@ -113,3 +113,8 @@ def test_a_logarithmic_axis_is_one_in_both():
     (axes,) = static_figure([spectrum]).axes
     assert axes.get_xscale() == "log"
     assert axes.get_xlim() == (1.0, 10.0)
+
+
+def test_the_limits_that_are_not_met_wrap_on_a_narrow_page():
+    rule = next(line for line in asset("style.css").splitlines() if line.startswith(".fail {"))
+    assert "nowrap" not in rule  # several limits are one line too long for 400 px

@@ -110,6 +110,15 @@ VERBS: Final[Mapping[str, Verb]] = {
         _MASTER,
         ("study --list", "study cx_ln2_overlap", "study cx_ln2_overlap --only '200 m'"),
     ),
+    "sweep": Verb(
+        "run a scenario over a grid, a sample or a table of values",
+        "master.commands.sweep_command:add_sweep",
+        _MASTER,
+        (
+            "sweep cx_ln2 --over speed=200:320:10",
+            "sweep demo --samples 200 --vary 'catenary.contact_wire.tension=normal(20kN, 0.2kN)' --jobs 4",
+        ),
+    ),
     "compare": Verb(
         "show two or more runs side by side",
         "master.commands.report_commands:add_compare",

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from master.errors import MasterError
+    from master.interface.parameter_sweeps import Sweep, sweep
     from master.interface.results_view import Results, compare, contact_figures, read_results
     from master.interface.scenario_runs import Calibrated, calibrate, run
     from master.interface.scenario_view import Parameter, Scenario, open_scenario
@@ -23,17 +24,20 @@ __all__ = [
     "Parameter",
     "Results",
     "Scenario",
+    "Sweep",
     "calibrate",
     "compare",
     "contact_figures",
     "open_scenario",
     "read_results",
     "run",
+    "sweep",
 ]
 
 if not TYPE_CHECKING:  # a type checker shall notice a name that is not there
     _PLACES = {
         "errors": ("MasterError",),
+        "interface.parameter_sweeps": ("Sweep", "sweep"),
         "interface.results_view": ("Results", "compare", "contact_figures", "read_results"),
         "interface.scenario_runs": ("Calibrated", "calibrate", "run"),
         "interface.scenario_view": ("Parameter", "Scenario", "open_scenario"),

@@ -33,7 +33,7 @@ TIERS: dict[str, list[set[str]]] = {
     "models.catenary": [
         {"definition"},
         {"shape"},
-        {"linear_motion"},
+        {"linear_motion", "condition"},
         {"contact_and_slack", "line_state"},
         {"step"},
         {"line_model"},
@@ -78,6 +78,8 @@ ONLY_IN = {
     "fmpy": lambda name: name.startswith("master.fmu."),
     "lxml": lambda name: name.startswith("master.ssp."),
     "pythonfmu": lambda name: name.startswith("fmus."),
+    "dask": lambda name: name == "master.batch.sweep.dask_engine",
+    "distributed": lambda name: name == "master.batch.sweep.dask_engine",
     "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.", "master.interface.")),
     "pandas": lambda name: name.startswith(("models.interface.", "master.interface.")),
 }

@@ -33,6 +33,7 @@ WHOLE = {
     "master/safety/safe_files.py": {"write_atomically"},
     "master/report/report_files.py": {"write"},
     "master/results/parquet_export.py": {"_write"},
+    "master/batch/sweep/sweep_table.py": {"write_parquet"},
     "master/report/film_file.py": {"write_film"},
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_atomically", "write_csv", "write_figure"},

@@ -105,7 +105,7 @@ FMI_ENGINEER = {
         "new project --line LN2 --pantograph CX --speed 1e300", 1, "give the speed of the train in km/h"
     ),
     "line and pantograph exchanged": Mistake(
-        "new project --line CX --pantograph LN2 --speed 300", 1, "no line 'CX' in the library, but a pantograph"
+        "new project --line CX --pantograph LN2 --speed 300", 1, "it is a pantograph"
     ),
     "a port without its variable": Mistake(
         "new project --line LN2 --pantograph X.fmu --speed 300 --map contact.force", 2, "must be written PORT=VARIABLE"

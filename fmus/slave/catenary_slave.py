@@ -28,11 +28,12 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "An overhead contact line of several spans in three dimensions: contact wire and messenger wire (and stitch "
         "wires, where the definition has them) as tensioned Euler-Bernoulli beams, droppers that carry tension only, "
         "steady arms, stagger, clamps as lumped masses, proportional damping. The static shape is found first (given "
-        "contact-wire height and pre-sag, the dropper lengths follow); the dynamics are linear about it, except for "
-        "slackening droppers and the contact, and are integrated with constant steps. The pantograph gives the ends "
-        "of its collector strip; the line finds where the wire crosses the strip, the contact force from the "
-        "interpenetration, and its point of application. Between communication points the strip is continued from "
-        "its last positions and velocities, so hosts that hold inputs lose no accuracy."
+        "contact-wire height and pre-sag, the dropper lengths follow), then, with errors of assembly or active faults, "
+        "where the line comes to rest with the lengths and supports that these leave it; the dynamics are linear about "
+        "it, except for slackening droppers and the contact, and are integrated with constant steps. The pantograph "
+        "gives the ends of its collector strip; the line finds where the wire crosses the strip, the contact force "
+        "from the interpenetration, and its point of application. Between communication points the strip is continued "
+        "from its last positions and velocities, so hosts that hold inputs lose no accuracy."
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Displacements are small against the spans: geometry is linearised about the static shape.",
@@ -43,6 +44,8 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "the form of the 2012 thesis, its damper goes on acting. dropper[...].force is all that a dropper carries, the "
         "damper's part included; dropper[...].slack says whether it is slack.",
         "The contact is unilateral, without friction along the strip.",
+        "Errors of assembly and faults are there from the start of a run, under the tensions of the design; uplift "
+        "counts from where they have left the line, not from the design.",
         "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
         "definition.",
@@ -83,7 +86,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         along_track = strips[:, :, 1, 0]
         part.check_strips(strips)
         yield part.start_warning(strips)
-        yield slack_warning(part.droppers, part.model.static.dropper_force)
+        yield slack_warning(part.droppers, part.model.static.is_slack)
         yield slack_law_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 

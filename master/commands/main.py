@@ -18,6 +18,7 @@ from master.commands.report_commands import add_compare, add_report
 from master.commands.run_command import add_run
 from master.commands.scenario_commands import add_pack, add_validate
 from master.commands.study_command import add_study
+from master.commands.sweep_command import add_sweep
 from master.commands.verify_command import add_verify
 from master.errors import MasterError, UsageError
 from master.report.terminal_summary import WIDTH, Terminal
@@ -32,6 +33,7 @@ VERBS: Final[Mapping[str, Callable[[Any], None]]] = {
     "calibrate": add_calibrate,
     "verify": add_verify,
     "study": add_study,
+    "sweep": add_sweep,
 }
 
 

@@ -7,6 +7,7 @@ import re
 import sys
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -137,6 +138,11 @@ def filter_data(chosen: ForceFilter) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Return the versions of the software that computed."""
+    return dict(_versions())
+
+
+@cache  # each look-up keeps what it has found in folders that FMUs have changed: a leak over many runs
+def _versions() -> dict[str, str]:
     found = {"python": platform.python_version()}
     for name in ("openpanto", "fmpy", "numpy"):
         try:

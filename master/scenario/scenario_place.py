@@ -54,7 +54,8 @@ def located(place: Path | str) -> Path:
         return LIBRARY / f"{place}{_SUFFIX}"
     if path.is_dir():
         return path  # opening it says what it lacks
-    text = f"there is no such folder or .ssp archive, nor such a scenario in the library{hint(path.stem, names)}"
+    known = [*names, *(scenario.parent.name for scenario in path.parent.glob(f"*/*{_SUFFIX}"))]  # projects beside it
+    text = f"there is no such folder or .ssp archive, nor such a scenario in the library{hint(path.stem, known)}"
     raise ScenarioError([Problem(str(place), 0, "scenario", text)])
 
 

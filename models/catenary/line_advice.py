@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Final, Protocol
 
-from models.arrays import FloatArray
+from models.arrays import BoolArray
 from models.catenary.definition.line_definition import CatenaryDefinition, Contact
 from models.catenary.statics.wire_waves import OPERATION_LIMIT, contact_wire_wave_speed
 
@@ -107,17 +107,16 @@ def step_warning(definition: CatenaryDefinition, step: float, head_mass: float =
     )
 
 
-def slack_warning(droppers: Sequence[Named], force: FloatArray) -> str:
+def slack_warning(droppers: Sequence[Named], is_slack: BoolArray) -> str:
     """Return a warning that names the droppers that are slack at rest.
 
     Parameters
     ----------
     droppers : sequence
-        In the order of ``force``.
-    force : ndarray, shape (n_droppers,)
-        Static tension [N].
+        In the order of ``is_slack``.
+    is_slack : ndarray, shape (n_droppers,)
     """
-    slack = [d for d, f in zip(droppers, force.tolist(), strict=True) if f <= 0.0]
+    slack = [d for d, loose in zip(droppers, is_slack.tolist(), strict=True) if loose]
     if not slack:
         return ""
     listed = ", ".join(f"{d.name} at {d.x:.2f} m" for d in slack[:_NAMED])

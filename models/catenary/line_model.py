@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import BoolArray, FloatArray
+from models.catenary.condition.line_condition import find_condition
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.dropper_law import DropperLaw
 from models.catenary.contact_and_slack.local_problem import (
@@ -60,6 +61,8 @@ class _Step:
 class CatenaryModel:
     """A line ready to step: static shape found, matrices in modes of intervals and displacements of attachments.
 
+    The static shape is that of the design, or what errors of assembly and faults have made of it.
+
     Parameters
     ----------
     definition : CatenaryDefinition
@@ -74,8 +77,8 @@ class CatenaryModel:
 
     def __init__(self, definition: CatenaryDefinition) -> None:
         self.definition = definition
-        self.mesh: CatenaryMesh = build_mesh(definition)
-        self.static: StaticState = find_form(definition, self.mesh)
+        self.static: StaticState = find_condition(find_form(definition, build_mesh(definition)))
+        self.mesh: CatenaryMesh = self.static.shape.mesh
         attached = attachments(self.mesh)
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]
         self._angles = plan_angles((part for parts in by_wire for part in parts), self.static.shape.points)

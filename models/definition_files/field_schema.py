@@ -198,9 +198,16 @@ def direction(*, default: Any = dataclasses.MISSING) -> Any:
     return _field(_Direction(), default)
 
 
-def count(description: str, *, default: Any = dataclasses.MISSING, minimum: int = 0, maximum: int = 10**6) -> Any:
+def count(
+    description: str,
+    *,
+    default: Any = dataclasses.MISSING,
+    minimum: int = 0,
+    maximum: int = 10**6,
+    tunable: bool = True,
+) -> Any:
     """Declare a whole number."""
-    return _field(_Number("1", description, minimum, maximum, integer=True), default)
+    return _field(_Number("1", description, minimum, maximum, integer=True, tunable=tunable), default)
 
 
 def monitoring() -> Any:

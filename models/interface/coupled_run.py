@@ -207,7 +207,7 @@ def advice(line: CatenaryModel, pantograph: LumpedDefinition, step: float) -> tu
     return (
         limits.speed_warning(line.definition, pantograph.speed),
         limits.step_warning(line.definition, step, pantograph.stage[-1].mass),
-        limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.dropper_force),
+        limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.is_slack),
         limits.slack_law_warning(line.definition),
     )
 

@@ -190,7 +190,7 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
     model = part.model
     warnings = (
         line_advice.speed_warning(definition, speed),
-        line_advice.slack_warning(part.droppers, model.static.dropper_force),
+        line_advice.slack_warning(part.droppers, model.static.is_slack),
         line_advice.slack_law_warning(definition),
     )
     return LineStatics(

@@ -97,7 +97,7 @@ def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:
     if not found:
         known = definition_names(kind, searched)
         other: Kind = "pantographs" if kind == "lines" else "lines"
-        meant = f", but a {other.removesuffix('s')}" if definition_files(other, name, searched) else ""
-        text = f"no {kind.removesuffix('s')} '{name}' in the library{meant}; known: {', '.join(known)}"
-        raise UnknownNameError(text + hint(name, known))
+        advice = f"; it is a {other[:-1]}" if definition_files(other, name, searched) else hint(name, known)
+        text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{advice}"
+        raise UnknownNameError(text)
     return found[0]

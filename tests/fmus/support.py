@@ -148,14 +148,14 @@ def push(instance: Instance, n: int) -> tuple[list[str], list[float]]:
     return names, values
 
 
-def short_line_recipe(folder: Path, lengths: str = "", pantographs: int = 1) -> Recipe:
-    """Return the recipe of LN2 with five spans of 50 m, on droppers of given lengths if wanted."""
+def short_line_recipe(folder: Path, lengths: str = "", pantographs: int = 1, more: str = "") -> Recipe:
+    """Return the recipe of LN2 with five spans of 50 m, on droppers of given lengths if wanted, with more tables."""
     text = line_path("LN2").read_text(encoding="utf-8")
     spans = '[spans]\nstart = [0, "m", "test"]\ncount = 5\nlength = [50, "m", "test"]\n'
     text = re.sub(r"\[spans\]\n.*?(?=\n\[)", spans, text, count=1, flags=re.DOTALL)
     if lengths:
         text = text.replace("[spans.droppers]\n", f'[spans.droppers]\nlengths = [{lengths}, "m", "test"]\n')
-    (folder / "Short.toml").write_text(text, encoding="utf-8")
+    (folder / "Short.toml").write_text(text + more, encoding="utf-8")
     settings = {"pantographs": pantographs}
     return Recipe(
         "Catenary_Short", "short", "fmus.slave.catenary_slave", "CatenarySlave", folder / "Short.toml", settings

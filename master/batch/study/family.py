@@ -77,6 +77,7 @@ class Settings(_Model):
     calibration: Calibration | None = None
     histories: Histories | None = None
     sharing: Sharing | None = None
+    sweep: dict[str, Any] | None = None  # read by the verb of that name
 
 
 class Variant(_Model):

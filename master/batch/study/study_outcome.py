@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import Any, Final
 
+from master.batch.assessment_figures import FIGURES, verdict_of
 from master.batch.batch_session import BatchState
 from master.batch.study.family import Family, Interval, Variant
 from master.batch.study.study_evaluation import StudyEntry, entries
@@ -17,19 +18,6 @@ from master.safety.safe_files import safe_cell
 
 #: Version of ``study.json`` and ``study.csv``; files without one are of version 1.
 FORMAT: Final = 2
-#: Columns of the figures: title, unit, how to read it, decimals.
-FIGURES: Final[tuple[tuple[str, str, Callable[[StudyEntry], float | None], int], ...]] = (
-    ("mean", "N", lambda e: e.assessment.quality.mean, 1),
-    ("sigma", "N", lambda e: e.assessment.quality.sigma, 1),
-    ("sigma / mean", "1", lambda e: e.assessment.quality.sigma_share, 3),
-    ("maximum", "N", lambda e: e.assessment.quality.maximum, 1),
-    ("minimum", "N", lambda e: e.assessment.quality.minimum, 1),
-    ("amplitude", "N", lambda e: e.assessment.quality.amplitude, 1),
-    ("statistical minimum", "N", lambda e: e.assessment.quality.statistical_minimum, 1),
-    ("share of loss", "%", lambda e: e.assessment.quality.losses.percentage, 2),
-    ("uplift", "mm", lambda e: None if e.uplift is None else 1e3 * e.uplift, 1),
-    ("slack droppers", "%", lambda e: None if e.slack is None else 1e2 * e.slack, 0),
-)
 
 
 @dataclass(frozen=True)
@@ -76,18 +64,6 @@ class StudyOutcome(BatchState):
 def shown(value: float | None, decimals: int) -> str:
     """Return a figure as text."""
     return "-" if value is None else f"{value:.{decimals}f}"
-
-
-def verdict(entry: StudyEntry) -> str:
-    """Return the verdict in a few words."""
-    if entry.assessment.withheld:
-        return "not judged"
-    criteria = entry.assessment.criteria
-    failed = [c.name for c in criteria if not c.passed]
-    if failed:
-        return f"fails: {', '.join(failed)}"
-    at_limit = entry.assessment.at_limit
-    return f"passes, at the limit: {', '.join(at_limit)}" if at_limit else "passes"
 
 
 def filters(outcome: StudyOutcome) -> tuple[str, ...]:
@@ -158,11 +134,11 @@ def as_csv(outcome: StudyOutcome) -> str:
     filtered = {d.name: d.results.evaluation.filter.short for d in outcome.done}
     for interval in outcome.family.settings.interval:
         for e in outcome.entries(interval):
-            values = [shown(get(e), 6) for _, _, get, _ in FIGURES]
+            values = [shown(get(e.assessment), 6) for _, _, get, _ in FIGURES]
             named = map(safe_cell, (e.variant, interval.name, e.pantograph))
             given = _values_of(outcome.family, e.variant)
             own = [given.get(name, "") for name in swept]
-            cells = [*values, verdict(e), filtered[e.variant], *_sharing_cells(e), *own]
+            cells = [*values, verdict_of(e.assessment), filtered[e.variant], *_sharing_cells(e), *own]
             writer.writerow([*named, *cells])
     return text.getvalue()
 
@@ -211,7 +187,7 @@ def as_data(outcome: StudyOutcome) -> dict[str, Any]:
 
 
 def _entry_data(e: StudyEntry) -> dict[str, Any]:
-    figures = {f"{title} [{unit}]": get(e) for title, unit, get, _ in FIGURES}
+    figures = {f"{title} [{unit}]": get(e.assessment) for title, unit, get, _ in FIGURES}
     return {
         "variant": e.variant,
         "interval": e.interval.name,

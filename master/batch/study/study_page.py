@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from master.batch.assessment_figures import FIGURES, verdict_of
 from master.batch.study import study_charts
 from master.batch.study.study_evaluation import StudyEntry
 from master.batch.study.study_outcome import (
-    FIGURES,
     StudyOutcome,
     differences,
     filter_remarks,
     filters,
     judged_by,
     shown,
-    verdict,
 )
 from master.report import html_markup
 from master.report.charts.chart import Chart
@@ -55,7 +54,9 @@ def page(outcome: StudyOutcome) -> str:
 
 def _tables(found: Sequence[StudyEntry], title: str) -> list[str]:
     heads = ["variant, pantograph", *(f"{name} [{unit}]".removesuffix(" [1]") for name, unit, _, _ in FIGURES), title]
-    rows = [[e.name, *(shown(get(e), d) for _, _, get, d in FIGURES), verdict(e)] for e in found]
+    rows = [
+        [e.name, *(shown(get(e.assessment), d) for _, _, get, d in FIGURES), verdict_of(e.assessment)] for e in found
+    ]
     note = INTERVAL_NOTE
     parts = [html_markup.table(heads, rows), f"<p class='note'>{note}</p>"]
     parts += [f"<p class='note'>{html_markup.text(r)}</p>" for r in filter_remarks(found)]

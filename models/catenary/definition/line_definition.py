@@ -25,6 +25,8 @@ GRAVITY = 9.81
 SHEAR_RATIO = 2.6
 #: Shortest internal step [s]: a thousandth of the usual one, below which a run would never end.
 SHORTEST_STEP = 1e-6
+#: Largest seed: the largest whole number of FMI.
+LARGEST_SEED = 2**31 - 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,6 +187,47 @@ class Dynamics:
     )  # fmt: skip
 
 
+@dataclass(frozen=True, kw_only=True)
+class Irregularity:
+    """Errors of assembly, normal and limited to three standard deviations; every seed has its own."""
+
+    seed: int = count("number that decides which errors are drawn", default=0, maximum=LARGEST_SEED)
+    dropper_length_sigma: float = quantity(
+        "m", "standard deviation of the unstrained lengths of droppers and hangers about the design's; 0: none",
+        default=0.0, minimum=0.0, maximum=0.5,
+    )  # fmt: skip
+    support_height_sigma: float = quantity(
+        "m", "standard deviation of the heights of supports (messenger wire and registration end) about the design's; "
+        "0: none",
+        default=0.0, minimum=0.0, maximum=0.5,
+    )  # fmt: skip
+
+
+FaultKind = Literal["dropper_broken", "dropper_slipped"]
+FAULT_KINDS: tuple[FaultKind, ...] = ("dropper_broken", "dropper_slipped")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """A fault of one dropper, there from the start of a run if it is active."""
+
+    kind: FaultKind = text(choices=FAULT_KINDS)
+    section: int = count("section, from 1", default=1, minimum=1, tunable=False)
+    span: int = count("span of the section, from 1", minimum=1, tunable=False)
+    dropper: int = count("dropper of the span, from 1", minimum=1, tunable=False)
+    active: int = count("whether the fault acts: 1 yes, 0 no", default=1, maximum=1)
+    value: float | None = quantity(
+        "m", "how far the dropper has slipped: what it is longer than designed", default=None, minimum=-5.0, maximum=5.0
+    )
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield a problem if the value is missing or means nothing."""
+        if self.kind == "dropper_slipped" and self.value is None:
+            yield "value", "is missing: how far has the dropper slipped?"
+        if self.kind == "dropper_broken" and self.value is not None:
+            yield "value", "means nothing for a broken dropper: remove it"
+
+
 @dataclass(frozen=True)
 class Span:
     """A span: its ends, its droppers, and in a compound line the hangers of its auxiliary wire.
@@ -327,6 +370,8 @@ class CatenaryDefinition:
     steady_arm: SteadyArm | None = part(SteadyArm, default=None)
     messenger_support: MessengerSupport | None = part(MessengerSupport, default=None)
     dynamics: Dynamics = part(Dynamics, default=Dynamics())
+    irregularity: Irregularity = part(Irregularity, default=Irregularity())
+    fault: tuple[Fault, ...] = ()
     extrapolation_order: int = count(
         "order of the extrapolation of the strip inside a step: 0 held, 1 velocity, 2 acceleration",
         default=2, minimum=0, maximum=2,

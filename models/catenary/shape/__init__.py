@@ -3,5 +3,7 @@
 The static state keeps the `LineShape` that it was found with; rooms above take mesh, matrices and droppers from there
 and assemble nothing.
 
+A little larger than a room should be: the design and a changed line come to rest by one iteration.
+
 May import `definition`, arrays and numerics.
 """

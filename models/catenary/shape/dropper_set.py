@@ -25,7 +25,7 @@ class DropperSet:
     length : ndarray, shape (n_droppers,)
         Distance between the ends [m].
     stiffness : ndarray, shape (n_droppers,)
-        Axial stiffness, as given or EA/L [N/m].
+        Axial stiffness, as given or EA/L; 0 where broken [N/m].
     compression_ratio : ndarray, shape (n_droppers,)
         Stiffness in compression over that in tension.
     slack_delay : ndarray, shape (n_droppers,)
@@ -54,10 +54,10 @@ def dropper_set(definition: CatenaryDefinition, mesh: CatenaryMesh, points: Floa
     return DropperSet(
         rows=_rows(mesh, points),
         length=length,
-        stiffness=each(lambda dropper: _stiffness(dropper, length)),
+        stiffness=np.where(mesh.broken, 0.0, each(lambda dropper: _stiffness(dropper, length))),
         compression_ratio=each(lambda dropper: dropper.compression_ratio),
         slack_delay=each(lambda dropper: alpha if dropper.slack_law == "tension" else 0.0),
-        mass=each(lambda dropper: dropper.mass) * length,
+        mass=each(lambda dropper: dropper.mass) * np.where(mesh.broken, mesh.given_length, length),
     )
 
 

@@ -4,21 +4,30 @@ Either the geometry is specified (the height of the contact wire at every droppe
 hanger) and the lengths of the droppers follow, or the unstrained length of a dropper is given and the height follows.
 The unknowns are displacements and dropper forces. For given reference points this is one linear saddle-point system;
 the points are then moved to the solution and the system is solved again, until the deformed mesh is its own reference.
+
+A designed line whose lengths, supports or droppers have changed since is brought to rest in the same way, with its
+droppers' lengths given and its registration ends where they are.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from models.arrays import FloatArray
+from models.arrays import BoolArray, FloatArray
 from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set
-from models.catenary.shape.line_matrices import Matrices, axial_stiffness, pendulum_stiffness, steady_arm_tension
+from models.catenary.shape.line_matrices import (
+    Matrices,
+    arm_load,
+    axial_stiffness,
+    pendulum_stiffness,
+    steady_arm_tension,
+)
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.line_shape import LineShape, line_shape
 from models.catenary.shape.wire_intervals import attachments
@@ -74,6 +83,11 @@ class StaticState:
         """Return the static positions of the nodes, shape (n, 3) [m]."""
         return _displaced(self.shape.points, self.displacement)
 
+    @property
+    def is_slack(self) -> BoolArray:
+        """Return which droppers hang slack, shape (n_droppers,); a broken one does not hang."""
+        return (self.dropper_force <= 0.0) & ~self.shape.mesh.broken
+
     def pendulum_stiffness(self) -> sp.csc_matrix:
         """Return the pendulum stiffness of droppers and steady arms under their tension, zero where they push."""
         mesh, tension = self.shape.mesh, np.concatenate([self.dropper_force, self.arm_force])
@@ -93,36 +107,78 @@ def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
         If a dropper would have to push to give the specified profile, if the equations are singular, or if the
         iteration does not converge.
     """
-    points = mesh.points.copy()
-    movable = _movable(mesh)
+    return _settled(definition, mesh, mesh.points.copy(), None)
+
+
+def find_rest(design: StaticState, mesh: CatenaryMesh, points: FloatArray) -> StaticState:
+    """Find where a designed line comes to rest after a change, under the tensions that it was designed with.
+
+    Parameters
+    ----------
+    design : StaticState
+        The line as designed: its arms have their lengths from there.
+    mesh : CatenaryMesh
+        The design's, with the unstrained length of every dropper given; some may be broken, seats of supports moved.
+    points : ndarray, shape (n, 3)
+        Points of the design, with what holds the line (supports, registration ends) where it is now [m].
+
+    Raises
+    ------
+    EquilibriumError
+        If an arm would have to push, if the equations are singular, or if the iteration does not converge.
+    """
+    return _settled(design.shape.definition, mesh, points.copy(), design)
+
+
+def _settled(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, design: StaticState | None
+) -> StaticState:
+    """Move reference points until the line is at rest about them: of the wanted form, or as a design has become."""
+    movable = _movable(mesh, carries_arms=design is None)
     unstretched = np.zeros(mesh.fixed.shape)
     unstretched[:, :3] = movable
-    force = np.full(len(mesh.droppers), _FIRST_FORCE)
+    force = np.full(len(mesh.droppers), _FIRST_FORCE) if design is None else design.dropper_force
+    # What a design keeps as displacements (of the wire at its arms, their stretch) is no move of the reference.
+    kept = np.zeros(mesh.fixed.shape) if design is None else unstretched * design.displacement.reshape(-1, NODE_DOFS)
     slack = np.zeros(len(mesh.droppers), dtype=bool)
     for iteration in range(_MAX_ITERATIONS):
-        shape = line_shape(definition, mesh, points)
+        shape = _shape(definition, mesh, points, design)
         matrices = shape.matrices
         # Moving a reference point redefines the length of the wire, so it does not stretch the wire.
-        stretch = axial_stiffness(definition, mesh, points) @ sp.diags(unstretched.ravel())
+        stretch = axial_stiffness(definition, mesh, points, arms=design is None) @ sp.diags(unstretched.ravel())
         # Likewise the guides act on moves of the reference only, and vanish from the result with them.
-        guides = _swing(shape, force) @ sp.diags(unstretched.ravel())
+        guides = _swing(shape, force, design) @ sp.diags(unstretched.ravel())
         conditions = _conditions(shape, slack)
-        displacement, force = _solve(shape, matrices.K - stretch + guides, conditions)
-        move = np.where(movable, displacement.reshape(-1, NODE_DOFS)[:, :3], 0.0)
+        load = matrices.load if design is None else matrices.load + (guides - stretch) @ kept.ravel()
+        displacement, force = _solve(shape, matrices.K - stretch + guides, conditions, load)
+        move = np.where(movable, (displacement.reshape(-1, NODE_DOFS) - kept)[:, :3], 0.0)
         _check_move(shape, move)
         now_slack = _slack(mesh, _displaced(points, displacement))
         if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
             # Solve once more without the guides, to remove what the tolerance of the iteration leaves of them.
-            return _static_state(shape, *_solve(shape, matrices.K, conditions), slack)
+            return _static_state(shape, *_solve(shape, matrices.K, conditions, matrices.load), slack, design)
         _straighten(mesh, points, move)
         points = points + move
-        _carry_arms(mesh, points, move)
-        if iteration >= _TAUT_ITERATIONS:
+        if design is None:
+            _carry_arms(mesh, points, move)
+        if design is not None or iteration >= _TAUT_ITERATIONS:
             slack = now_slack
+    search = "form finding of" if design is None else "the search for the condition of"
     raise EquilibriumError(
-        f"form finding of line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
+        f"{search} line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
         f"a point still moves by {np.abs(move).max():.2g} m"
     )
+
+
+def _shape(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, design: StaticState | None
+) -> LineShape:
+    """Return the line about reference points; the arms of a design keep their lengths."""
+    shape = line_shape(definition, mesh, points)
+    if design is None or definition.steady_arm is None:
+        return shape
+    load = shape.matrices.load + arm_load(definition, mesh, points, design.shape.points)
+    return replace(shape, matrices=replace(shape.matrices, load=load))
 
 
 def _displaced(points: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -142,16 +198,17 @@ def _check_move(shape: LineShape, move: FloatArray) -> None:
         )
 
 
-def _movable(mesh: CatenaryMesh) -> np.ndarray:
+def _movable(mesh: CatenaryMesh, *, carries_arms: bool) -> np.ndarray:
     """Return which coordinates of the reference form finding may move.
 
-    Not x (the stretch of the wires remains a displacement); not the lateral position of registered nodes, whose
-    displacement loads the steady arm; and not that of nodes between two attachments, which follow these on a straight
-    line.
+    Not x (the stretch of the wires remains a displacement); not the lateral position of registered nodes whose arms are
+    carried along, as their displacement loads the arm; and not that of nodes between two attachments, which follow
+    these on a straight line.
     """
     movable = ~mesh.fixed[:, :3]
     movable[:, 0] = False
-    movable[mesh.arms[:, 1], 1] = False
+    if carries_arms:
+        movable[mesh.arms[:, 1], 1] = False
     movable[~attachments(mesh), 1] = False
     return movable[mesh.owner]
 
@@ -211,9 +268,11 @@ def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
     return result
 
 
-def _solve(shape: LineShape, K: sp.csc_matrix, conditions: _Conditions) -> tuple[FloatArray, FloatArray]:
+def _solve(
+    shape: LineShape, K: sp.csc_matrix, conditions: _Conditions, load: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], with R, D and right from the droppers' conditions."""
-    mesh, load = shape.mesh, shape.matrices.load
+    mesh = shape.mesh
     free = np.flatnonzero(~mesh.fixed.ravel())
     B = shape.droppers.rows[:, free]
     # The scale makes the rows of the conditions comparable with those of the stiffness.
@@ -233,21 +292,29 @@ def _solve(shape: LineShape, K: sp.csc_matrix, conditions: _Conditions) -> tuple
     return displacement, solution[len(free) :] * scale
 
 
-def _swing(shape: LineShape, force: FloatArray) -> sp.csc_matrix:
-    """Return the stiffness N/L of the droppers across their axes, as pendulums.
+def _swing(shape: LineShape, force: FloatArray, design: StaticState | None) -> sp.csc_matrix:
+    """Return the stiffness N/L of the droppers across their axes, as pendulums; of a design's arms as well.
 
-    This guides the iteration where only the droppers hold a wire laterally.
+    This guides the iteration where only the droppers hold a wire laterally, and where arms turn.
     """
-    return pendulum_stiffness(shape.mesh.droppers, np.maximum(force, 1.0), shape.points)
+    bars, tension = shape.mesh.droppers, np.maximum(force, 1.0)
+    if design is not None:
+        bars = np.vstack([bars, shape.mesh.arms])
+        tension = np.concatenate([tension, np.maximum(design.arm_force, 0.0)])
+    return pendulum_stiffness(bars, tension, shape.points)
 
 
-def _static_state(shape: LineShape, displacement: FloatArray, force: FloatArray, slack: np.ndarray) -> StaticState:
+def _static_state(
+    shape: LineShape, displacement: FloatArray, force: FloatArray, slack: np.ndarray, design: StaticState | None
+) -> StaticState:
     _check_tension(shape, force)
-    arm_force = steady_arm_tension(shape.definition, shape.mesh, shape.points, displacement)
+    uncut = None if design is None else design.shape.points
+    arm_force = steady_arm_tension(shape.definition, shape.mesh, shape.points, displacement, uncut)
     _check_arms(shape, arm_force)
     droppers = dropper_set(shape.definition, shape.mesh, _displaced(shape.points, displacement))
     stiffness, given = shape.droppers.stiffness, shape.mesh.given_length
-    unstrained = np.where(~np.isnan(given), given, droppers.length - force / stiffness)
+    with np.errstate(invalid="ignore"):  # 0 / 0 of a broken dropper, whose length is given
+        unstrained = np.where(~np.isnan(given), given, droppers.length - force / stiffness)
     elastic = np.where(slack, stiffness * (droppers.length - unstrained), force)
     force = np.where(slack, droppers.compression_ratio * elastic, force)
     return StaticState(

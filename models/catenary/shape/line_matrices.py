@@ -112,11 +112,15 @@ def _on_nodes(nodes: IntArray, axis: int, size: int) -> sp.csc_matrix:
     return sp.csc_matrix((np.ones(len(dofs)), (dofs, dofs)), shape=(size, size))
 
 
-def axial_stiffness(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> sp.csc_matrix:
-    """Return the part of K that comes from the axial stiffness of the beams, EA/l."""
+def axial_stiffness(
+    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, *, arms: bool
+) -> sp.csc_matrix:
+    """Return the part of K that comes from the axial stiffness of the wires, EA/l, and of the arms if asked for."""
     start, end = mesh.beams.T
     axes, length = frames(points[start], points[end])
     EA = beam_properties(definition, mesh).EA
+    if not arms:
+        EA[mesh.component == COMPONENTS.index("steady_arm")] = 0.0
     none = np.zeros_like(EA)
     K_e = to_global(beam_stiffness(EA, none, none, length), axes)
     return _assembled(K_e, element_dofs(mesh.owner[mesh.beams]), NODE_DOFS * len(points))
@@ -157,8 +161,37 @@ def _translations(bars: IntArray) -> IntArray:
     return (bars[:, :, None] * NODE_DOFS + np.arange(3)).reshape(len(bars), 6)
 
 
+def arm_load(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, design: FloatArray) -> FloatArray:
+    """Return the load of steady arms whose shape without forces is that between other points, shape (6 n,).
+
+    It pulls by what they have become longer. What they have turned by (a few degrees) bends them as little as it did
+    their wires: their ends are free to turn as well.
+
+    Parameters
+    ----------
+    points, design : ndarray, shape (n, 3)
+        Reference positions, and those between which the arms are without forces [m].
+    """
+    end, node = mesh.arms.T
+    axes, length = frames(points[end], points[node])
+    along, before = axes[:, 0, :], design[node] - design[end]
+    free = np.linalg.norm(before, axis=1)
+    unloaded = np.zeros((len(end), 12))
+    unloaded[:, 6:9] = -(length - free)[:, None] * along
+    unloaded[:, 3:6] = unloaded[:, 9:12] = np.cross(before / free[:, None], along)
+    EA, EI, GJ = (np.full(len(end), value) for value in _component(definition, "steady_arm")[:3])
+    K_e = to_global(beam_stiffness(EA, GJ, EI, length), axes)
+    load = np.zeros(NODE_DOFS * len(points))
+    np.add.at(load, element_dofs(mesh.owner[mesh.arms]), np.einsum("nij,nj->ni", K_e, unloaded))
+    return load
+
+
 def steady_arm_tension(
-    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, displacement: FloatArray
+    definition: CatenaryDefinition,
+    mesh: CatenaryMesh,
+    points: FloatArray,
+    displacement: FloatArray,
+    design: FloatArray | None = None,
 ) -> FloatArray:
     """Return the axial force of every steady arm from its elongation [N], shape (n_arms,); negative where it pushes.
 
@@ -168,6 +201,8 @@ def steady_arm_tension(
         Reference positions [m].
     displacement : ndarray, shape (6 n,)
         Displacement from there [m, rad].
+    design : ndarray, shape (n, 3), optional
+        Points between which the arms are without forces, the reference positions by default [m].
     """
     if definition.steady_arm is None:
         return np.zeros(0)
@@ -177,6 +212,8 @@ def steady_arm_tension(
     move = displacement.reshape(-1, NODE_DOFS)[:, :3]
     EA = definition.steady_arm.youngs_modulus * definition.steady_arm.area
     tension: FloatArray = EA / length**2 * np.einsum("ij,ij->i", along, move[node] - move[end])
+    if design is not None:
+        tension += EA / length * (length - np.linalg.norm(design[node] - design[end], axis=1))
     return tension
 
 
@@ -208,8 +245,12 @@ def _clamp_mass(mesh: CatenaryMesh, size: int) -> sp.csc_matrix:
 
 
 def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray, size: int) -> sp.csc_matrix:
-    """Return the consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions."""
-    pattern = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
+    """Return the consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions.
+
+    Of a broken one a half swings with each wire.
+    """
+    bar = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
+    pattern = np.where(mesh.broken[:, None, None], 0.5 * np.eye(6), bar)
     return _assembled(mass[:, None, None] * pattern, _translations(mesh.droppers), size)
 
 

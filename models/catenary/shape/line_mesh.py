@@ -56,6 +56,8 @@ class CatenaryMesh:
         Specified static height of the lower node [m].
     given_length : ndarray, shape (n_droppers,)
         Unstrained length where given instead of the height, NaN elsewhere [m].
+    broken : ndarray, shape (n_droppers,)
+        True where only the clamps and half of the dropper's mass are left on each wire.
     fixed : ndarray, shape (n, 6)
         Degrees of freedom held at zero.
     sprung : ndarray, shape (n_supports,)
@@ -86,6 +88,7 @@ class CatenaryMesh:
     is_hanger: BoolArray
     target: FloatArray
     given_length: FloatArray
+    broken: BoolArray
     fixed: BoolArray
     sprung: IntArray
     seat: FloatArray
@@ -399,6 +402,7 @@ def _numbered(draft: _Draft) -> CatenaryMesh:
         is_hanger=np.array(draft.is_hanger, dtype=bool),
         target=np.array(draft.target),
         given_length=np.array(draft.given_length),
+        broken=np.zeros(len(draft.droppers), dtype=bool),
         fixed=np.array(draft.fixed)[order],
         sprung=new[np.array(draft.sprung, dtype=np.int64)],
         seat=points[np.array(draft.sprung, dtype=np.int64), 2],

@@ -139,6 +139,48 @@ def test_fast_modes_can_be_left_out(short, tmp_path):
         instance.free()
 
 
+FAULTS = "".join(
+    f'\n[[fault]]\nkind = "{kind}"\nspan = 3\ndropper = {dropper}\nactive = 0\n{value}'
+    for kind, dropper, value in (("dropper_broken", 3, ""), ("dropper_slipped", 5, 'value = [20, "mm", "test"]\n'))
+)
+
+
+def test_one_fmu_serves_all_samples_of_errors_and_faults(tmp_path, tmp_path_factory):
+    """Every sample has the bits of a line made with these values, in a host that knows nothing of it."""
+    made_for = short_line_recipe(tmp_path, more=FAULTS)
+    fmu = build(made_for, tmp_path_factory.mktemp("fmu"))
+    errors = {"irregularity.dropper_length_sigma": 0.01, "irregularity.support_height_sigma": 0.005}
+    samples: list[dict[str, float]] = [
+        {},
+        errors | {"irregularity.seed": 1},
+        errors | {"irregularity.seed": 2},
+        {"fault[1].active": 1},
+        {"fault[2].active": 1, "fault[2].value": 0.03},
+    ]
+    found = []
+    for values in samples:
+        instance, part = Instance(fmu), CatenaryPart(load(made_for.definition).with_values(values))
+        instance.initialise(**values)
+        numbers = range(1, len(part.droppers) + 1)
+        lengths, heights, forces = (
+            instance.get([f"dropper[{j}].{name}" for j in numbers]) for name in ("length", "lower.z", "force")
+        )
+        assert lengths == part.geometry.dropper_length.tolist()
+        assert heights == part.geometry.dropper_lower_z.tolist()
+        assert forces == pytest.approx(part.model.static.dropper_force.tolist(), abs=1e-9)
+        found.append((lengths, heights, forces))
+        instance.free()
+    healthy, one, other, broken, slipped = found
+    plain = CatenaryPart(load(short_line_recipe(tmp_path).definition))
+    assert healthy[1] == plain.geometry.dropper_lower_z.tolist(), "inactive faults change no digit"
+    assert one[0] != other[0]
+    third, fifth = 14 + 2, 14 + 4
+    assert broken[0] == healthy[0]
+    assert broken[2][third] == 0.0
+    assert broken[1][third] < healthy[1][third] - 0.005
+    assert slipped[0][fifth] == pytest.approx(healthy[0][fifth] + 0.03, abs=1e-12)
+
+
 def _strip(n):
     """Return a strip that lifts the middle of LN2 with five spans."""
     return np.array([[[[121.0 + 0.08 * n, y, 5.08], [80.0, 0.0, 0.0]] for y in (0.7, -0.7)]])

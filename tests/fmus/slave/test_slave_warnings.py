@@ -119,4 +119,4 @@ def test_a_wire_at_another_working_height(instantiate, pantographs, name, z, exp
 @pytest.mark.parametrize("name", line_names())
 def test_no_dropper_of_the_library_is_slack_at_rest(name):
     part = CatenaryPart(load_line(name))
-    assert slack_warning(part.droppers, part.model.static.dropper_force) == ""
+    assert slack_warning(part.droppers, part.model.static.is_slack) == ""

@@ -68,3 +68,10 @@ def test_an_installed_library_is_left_alone(tmp_path, monkeypatch):
     assert fmu_cache(tmp_path / "demo.ssp") is None
     with pytest.raises(RequestError, match="belongs to the installed library"):
         refuse_installed(own)
+
+
+def test_a_mistyped_project_is_answered_by_the_one_that_is_there(tmp_path, monkeypatch):
+    (tmp_path / "demo" / "demo.ssp").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ScenarioError, match=r"did you mean 'demo'\?"):
+        located("demoo")

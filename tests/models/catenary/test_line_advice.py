@@ -91,16 +91,16 @@ def test_the_stiffness_is_the_slope_of_the_law(exponent):
 
 def test_slack_droppers_are_named(line_maker):
     part = CatenaryPart(line_maker())
-    force = part.model.static.dropper_force
-    assert slack_warning(part.droppers, force) == ""
-    loose = force.copy()
-    loose[[3, 11]] = 0.0
+    is_slack = part.model.static.is_slack
+    assert slack_warning(part.droppers, is_slack) == ""
+    loose = is_slack.copy()
+    loose[[3, 11]] = True
     reported = slack_warning(part.droppers, loose)
     assert reported == (
         f"droppers {part.droppers[3].name} at {part.droppers[3].x:.2f} m, "
         f"{part.droppers[11].name} at {part.droppers[11].x:.2f} m are slack at rest"
     )
-    assert slack_warning(part.droppers, np.zeros(len(force))).endswith(f"and {len(force) - 8} more are slack at rest")
+    assert slack_warning(part.droppers, ~is_slack).endswith(f"and {len(is_slack) - 8} more are slack at rest")
 
 
 def test_droppers_that_pull_before_they_are_taut_are_told_with_figure_and_cure(ln2):

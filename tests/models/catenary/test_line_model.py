@@ -40,6 +40,7 @@ def _single_wire(length, elements):
         beside_stitch=np.zeros(elements, dtype=bool),
         target=np.zeros(0),
         given_length=np.zeros(0),
+        broken=np.zeros(0, dtype=bool),
         fixed=fixed,
         sprung=np.zeros(0, dtype=np.int64),
         seat=np.zeros(0),

@@ -61,6 +61,13 @@ def test_a_name_that_is_not_there_is_answered_by_the_known_ones(project):
         line_path("mine", search_path(project))
 
 
+def test_a_line_given_for_a_pantograph_is_recognised():
+    with pytest.raises(UnknownNameError, match=r"it is a line$"):
+        pantograph_path("LN2")
+    with pytest.raises(UnknownNameError, match=r"it is a pantograph$"):
+        line_path("DSA380")
+
+
 @pytest.mark.parametrize("name", ["../pantographs/CX", "", "LN2.toml.bak", "*"])
 def test_a_name_is_no_path_and_no_pattern(name):
     with pytest.raises(UnknownNameError):

@@ -216,3 +216,78 @@ def test_unknown_lines_are_told_with_the_known_ones():
 def test_a_file_may_set_what_the_line_declares_at_its_root(line_maker):
     line = line_maker(extrapolation_order=1, monitor_energy=1, time_step=[2.0, "ms", "test"])
     assert (line.extrapolation_order, line.monitor_energy, line.time_step) == (1, 1, 0.002)
+
+
+def fault(**values):
+    return {"kind": "dropper_broken", "span": 12, "dropper": 4} | values
+
+
+def test_faults_are_read_with_their_parameters():
+    slip = fault(kind="dropper_slipped", dropper=5, value=[20, "mm", SOURCE], active=0)
+    line = read(Table.from_dict(definition_of("LN2", fault=[fault(), slip])))
+    assert [(f.kind, f.section, f.span, f.dropper, f.active, f.value) for f in line.fault] == [
+        ("dropper_broken", 1, 12, 4, 1, None),
+        ("dropper_slipped", 1, 12, 5, 0, 0.02),
+    ]
+    names = [p.name for p in line.parameters() if p.name.startswith(("fault", "irregularity"))]
+    assert names == [
+        "irregularity.seed",
+        "irregularity.dropper_length_sigma",
+        "irregularity.support_height_sigma",
+        "fault[1].active",
+        "fault[2].active",
+        "fault[2].value",
+    ]
+    (value,) = (p for p in line.parameters() if p.name == "fault[2].value")
+    assert (value.value, value.unit, value.source) == (0.02, "m", SOURCE)
+    changed = line.with_values({"fault[2].active": 1, "fault[2].value": 0.03, "irregularity.seed": 2**31 - 1})
+    assert (changed.fault[1].active, changed.fault[1].value) == (1, 0.03)
+    assert changed.fault[0] == line.fault[0]
+    assert changed.irregularity.seed == 2**31 - 1
+
+
+def test_every_mistake_in_a_fault_is_told():
+    found = problems(
+        definition_of(
+            "LN2",
+            fault=[
+                fault(span=25),
+                fault(dropper=8),
+                fault(section=2),
+                fault(),
+                fault(kind="dropper_slipped", value=[10, "mm", SOURCE]),
+                fault(span=3, kind="dropper_slipped"),
+                fault(span=4, value=[10, "mm", SOURCE]),
+                fault(span=5, kind="dropper_slipped", value=[10, "kg", SOURCE]),
+                fault(span=6, kind="arm_bent"),
+                fault(span=7, active=2),
+                fault(span=8, colour="red"),
+                fault(span=9, kind="dropper_slipped", value=[6, "m", SOURCE]),
+                {"kind": "dropper_broken", "dropper": 1},
+            ],
+        )
+    )
+    assert found["fault[1].span"] == "there is no span 25: the section has 24"
+    assert found["fault[2].dropper"] == "there is no dropper 8: span 12 has 7"
+    assert found["fault[3].section"] == "there is no section 2: the line has 1"
+    assert found["fault[5].dropper"] == "dropper 4 of span 12 has a fault already, fault[4]"
+    assert found["fault[6].value"] == "is missing: how far has the dropper slipped?"
+    assert "remove it" in found["fault[7].value"]
+    assert "kg" in found["fault[8].value"]
+    assert "dropper_broken, dropper_slipped" in found["fault[9].kind"]
+    assert "outside 0 ... 1" in found["fault[10].active"]
+    assert "unknown key" in found["fault[11].colour"]
+    assert "outside -5 ... 5" in found["fault[12].value"]
+    assert found["fault[13].span"] == "is missing"
+    assert len(found) == 12
+
+
+def test_errors_of_assembly_have_ranges():
+    found = problems(
+        definition_of("LN2", irregularity={"seed": -1, "dropper_length_sigma": [-1, "mm", SOURCE], "sigma": 1})
+    )
+    assert set(found) == {"irregularity.seed", "irregularity.dropper_length_sigma", "irregularity.sigma"}
+    line = load_line("LN2")
+    for name, value in {"seed": 2.5, "support_height_sigma": 0.6, "dropper_length_sigma": float("nan")}.items():
+        with pytest.raises(ParameterError, match=name):
+            line.with_values({f"irregularity.{name}": value})

@@ -1,0 +1,233 @@
+"""The plan of a sweep: what the user asks for, and the values of every run that follow from it.
+
+A grid (every value with every other), a sample and a table may be combined: every row of the table with every point of
+the grid with every sample.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import math
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
+from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
+from master.errors import MasterError, RequestError
+from master.system.components import System
+
+Keep = Literal["all", "thinned", "figures", "failed"]
+#: Most runs of a sweep.
+MOST_RUNS: Final = 100_000
+#: Column of a table that names its rows.
+VARIANT: Final = "variant"
+STUDY: Final = "study.toml"
+_HEAD: Final = re.compile(r"\s*(.+?)\s*(?:\[([^\]]*)\])?\s*")
+
+
+class SweepRequest(BaseModel):
+    """What a sweep is asked for: the options of the command, the table ``[sweep]`` of ``study.toml``.
+
+    Attributes
+    ----------
+    over : dict
+        Values of a grid by parameter: ``18kN,20kN``, ``200:320:10``.
+    vary : dict
+        Distributions by parameter: ``normal(20kN, 0.2kN)``.
+    samples : int
+        How many samples of the distributions.
+    seed : int
+    method : str
+        How they are drawn: ``lhs`` or ``sobol``.
+    table : Path, optional
+        CSV file with a row for each run and a column for each parameter.
+    stop : float, optional
+        Stop time of all runs [s]; it follows the speed if not given.
+    static_force, mean_force : str, optional
+        ``70 N + 0.00097 v^2``, v in km/h, or without v: the static force of every pantograph, or the mean contact force
+        that it is found for.
+    tolerance : float
+        How near to the mean force is enough [N].
+    keep : str
+        What stays of the runs beside the table: ``all``; ``thinned``, the contact force and the summary;
+        ``figures``, nothing; ``failed``, what those left that failed.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    over: dict[str, str] = Field(default_factory=dict)
+    vary: dict[str, str] = Field(default_factory=dict)
+    samples: int | None = Field(None, gt=0, le=MOST_RUNS)
+    seed: int = Field(1, ge=0)
+    method: Method = "lhs"
+    table: Path | None = None
+    stop: float | None = None
+    static_force: str | None = None
+    mean_force: str | None = None
+    tolerance: float = Field(0.2, gt=0)
+    keep: Keep = "figures"
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any], origin: str = "") -> SweepRequest:
+        """Return the request in plain data.
+
+        Raises
+        ------
+        RequestError
+            Naming the first thing that is wrong, and ``origin``.
+        """
+        try:
+            return cls.model_validate(dict(data))
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise RequestError(": ".join(filter(None, (origin, where, first["msg"])))) from error
+
+
+def stored_request(folder: Path) -> dict[str, Any]:
+    """Return the table ``[sweep]`` of the ``study.toml`` in a scenario's folder, empty if there is none.
+
+    Raises
+    ------
+    RequestError
+        If the file cannot be read.
+    """
+    path = folder / STUDY
+    if not path.is_file():
+        return {}
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8")).get("sweep", {})
+    except (OSError, ValueError, RecursionError) as error:
+        raise RequestError(f"{path} cannot be read: {error}") from error
+    if not isinstance(found, dict):
+        raise RequestError(f"{path}: sweep must be a table, [sweep]")
+    if "table" in found:
+        found["table"] = folder / str(found["table"])
+    return found
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """The values of every run of a sweep.
+
+    Attributes
+    ----------
+    parameters : tuple of SweptParameter
+        What is varied, in the order of the columns.
+    points : tuple
+        For each run a value for each parameter, None where it takes none.
+    distributions : tuple of Distribution
+        Those of the parameters that are sampled.
+    variants : tuple of str
+        Names of the points in the table, empty without a table.
+    """
+
+    parameters: tuple[SweptParameter, ...]
+    points: tuple[tuple[SweptValue | None, ...], ...]
+    distributions: tuple[Distribution, ...] = ()
+    variants: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part of a plan: some parameters and their values, a row for each point."""
+
+    parameters: tuple[SweptParameter, ...]
+    rows: Sequence[tuple[SweptValue | None, ...]]
+
+
+def make_plan(system: System, request: SweepRequest) -> SweepPlan:
+    """Return the values of every run.
+
+    Parameters
+    ----------
+    system : System
+        Of the scenario as it is.
+    request : SweepRequest
+
+    Raises
+    ------
+    RequestError
+        If something is asked for that there is not, or the parts do not go together.
+    """
+    if bool(request.vary) != (request.samples is not None):
+        missing = "--samples N: how many" if request.vary else "--vary NAME=DISTRIBUTION: of what"
+        raise RequestError(f"samples need {missing}")
+    table, names = (None, ()) if request.table is None else _read_table(system, request.table)
+    grid = [_listed(system, name, text) for name, text in request.over.items()]
+    distributions = tuple(read_distribution(ParameterReader(system, n), text) for n, text in request.vary.items())
+    sizes = [len(part.rows) for part in (table, *grid) if part is not None]
+    if (count := math.prod(sizes) * (request.samples or 1)) > MOST_RUNS:
+        raise RequestError(f"that makes {count} runs, more than {MOST_RUNS}")
+    parts = [part for part in (table, *grid) if part is not None]
+    parts += [_sample(distributions, request)] if distributions else []
+    if not parts:
+        raise RequestError("nothing is varied: give --over, --vary with --samples, or --from-csv")
+    parameters = tuple(p for part in parts for p in part.parameters)
+    _check_distinct(parameters)
+    points = tuple(tuple(itertools.chain(*rows)) for rows in itertools.product(*(part.rows for part in parts)))
+    each = len(points) // len(names) if names else 0
+    return SweepPlan(parameters, points, distributions, tuple(name for name in names for _ in range(each)))
+
+
+def _check_distinct(parameters: Sequence[SweptParameter]) -> None:
+    names = [name for p in parameters for name in (p.targets or (p.name,))]
+    for name in dict.fromkeys(names):
+        if names.count(name) > 1:
+            raise RequestError(f"'{name}' is varied twice")
+
+
+def _listed(system: System, name: str, text: str) -> _Part:
+    parameter, values = ParameterReader(system, name).listed(text)
+    return _Part((parameter,), [(value,) for value in values])
+
+
+def _sample(distributions: Sequence[Distribution], request: SweepRequest) -> _Part:
+    values = draw(distributions, request.samples or 0, request.seed, request.method)
+    return _Part(tuple(d.parameter for d in distributions), [tuple(map(float, row)) for row in values])
+
+
+def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
+    """Return the values in a CSV file and the names of its rows."""
+    try:
+        rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise MasterError(f"{path} cannot be read: {why}") from error
+    if len(rows) < 2:
+        raise RequestError(f"{path} has no row under its head")
+    heads = rows[0]
+    for line, row in enumerate(rows[1:], 2):
+        if len(row) != len(heads):
+            raise RequestError(f"{path}, row {line}: has {len(row)} cells, the head has {len(heads)}")
+    columns = {head.strip(): [cell.strip() for cell in cells] for head, *cells in zip(*rows, strict=True)}
+    if len(columns) < len(heads):
+        raise RequestError(f"{path}: a column appears more than once")
+    names = tuple(columns.pop(VARIANT, ()))
+    if not columns:
+        raise RequestError(f"{path} has no column of values")
+    try:
+        read = [_column(system, head, cells) for head, cells in columns.items()]
+    except RequestError as error:
+        raise RequestError(f"{path}: {error}") from error
+    values = list(zip(*(cells for _, cells in read), strict=True))
+    return _Part(tuple(p for p, _ in read), values), names or tuple(map(str, range(1, len(rows))))
+
+
+def _column(system: System, head: str, cells: Sequence[str]) -> tuple[SweptParameter, tuple[SweptValue | None, ...]]:
+    match = _HEAD.fullmatch(head)
+    if match is None:
+        raise RequestError("a column has no head")
+    reader = ParameterReader(system, match[1], match[2] or "")
+    found = reader.cells(cells)
+    if match[1] in OF_THE_RUN and None in found[1]:
+        raise RequestError(f"column '{head}' has an empty cell")
+    return found

@@ -1,0 +1,146 @@
+"""Sweeps from Python: many runs of a scenario with other values, and their table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from master.batch.sweep.distributions import Method
+from master.batch.sweep.engine_selection import engine_of
+from master.batch.sweep.sweep_plan import Keep, SweepRequest
+from master.batch.sweep.sweep_session import PreparedSweep, SweepOutcome
+from master.batch.sweep.sweep_session import sweep as run_sweep
+from master.batch.sweep.sweep_table import columns
+from master.errors import RequestError
+from master.interface.data_frames import table_frame
+from master.interface.results_view import Results, read_results
+from master.interface.scenario_runs import keep_apart
+from master.interface.scenario_view import Scenario, open_scenario
+from master.report.terminal_summary import Terminal
+from master.scenario import open_scenario as scenario_files
+
+if TYPE_CHECKING:
+    import pandas
+
+#: Values of a parameter from Python: a text as on the command line, or a sequence of numbers or texts.
+Values = str | Sequence[float | str]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep that was made.
+
+    Attributes
+    ----------
+    folder : Path
+        Holds the table, and the runs that were kept.
+    outcome : SweepOutcome
+        All that is known of it; no promise is kept for this attribute.
+    """
+
+    folder: Path
+    outcome: SweepOutcome
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """Why runs failed, by their numbers."""
+        return self.outcome.failures
+
+    @property
+    def table(self) -> pandas.DataFrame:
+        """Inputs and figures, a row for each run and pantograph (needs pandas)."""
+        rows = self.outcome.rows
+        heads = columns(rows)
+        return table_frame(heads, [tuple(row.get(head) for head in heads) for row in rows])
+
+    def results(self, run: int) -> Results:
+        """Return the results of a run by its number, if all of it was kept.
+
+        Raises
+        ------
+        RequestError
+            If there is no such run, or its time series were not kept.
+        """
+        found = next((r for r in self.outcome.runs if r.number == run), None)
+        if found is None:
+            raise RequestError(f"there is no run {run}; there are {len(self.outcome.runs)}")
+        folder = self.folder / "runs" / found.key
+        if self.outcome.request.keep != "all" or not folder.is_dir():
+            raise RequestError(f"the time series of run {run} were not kept; sweep with keep='all'")
+        return read_results(folder)
+
+
+def sweep(
+    scenario: Scenario | str | Path,
+    out: str | Path | None = None,
+    *,
+    over: Mapping[str, Values] | None = None,
+    vary: Mapping[str, str] | None = None,
+    samples: int | None = None,
+    seed: int = 1,
+    method: Method = "lhs",
+    table: str | Path | None = None,
+    static_force: str | None = None,
+    mean_force: str | None = None,
+    keep: Keep = "figures",
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: bool = False,
+) -> Sweep:
+    """Run a scenario over a grid, a sample or a table of values; what is in the folder already is not run again.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or Path
+        From `open_scenario`, or what it takes.
+    out : str or Path, optional
+        Folder of the sweep, ``results/sweep/NAME`` by default.
+    over : mapping, optional
+        Values of a grid by parameter: ``{"speed": "200:320:20"}``, ``{"catenary.contact_wire.tension": ["18 kN",
+        "20 kN"]}``. A name without component is that of every pantograph's parameter.
+    vary : mapping, optional
+        Distributions by parameter: ``{"catenary.contact_wire.tension": "normal(20 kN, 0.2 kN)"}``.
+    samples, seed, method
+        How many samples of the distributions, from which seed, and how: ``lhs`` or ``sobol``.
+    table : str or Path, optional
+        CSV file with a row for each run.
+    static_force, mean_force : str, optional
+        Static force over the speed, ``70 N + 0.00097 v^2`` with v in km/h; or the mean force that it is found for.
+    keep : str
+        What stays beside the table: ``all``, ``thinned``, ``figures`` or ``failed``.
+    jobs : int, optional
+        Runs at a time, each in a process; a script that gives it begins with ``if __name__ == "__main__":``.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers make the runs instead.
+    progress : bool
+        Whether what happens is printed to standard error.
+
+    Raises
+    ------
+    RequestError
+        If something impossible is asked for; nothing is run then.
+    MasterError
+        If the folder holds something else, or the workers are gone.
+    """
+    chosen = scenario if isinstance(scenario, Scenario) else open_scenario(scenario)
+    grid = {name: _listed(values) for name, values in (over or {}).items()}
+    asked = {"over": grid, "vary": dict(vary or {}), "samples": samples, "seed": seed, "method": method}
+    given = {"table": table, "static_force": static_force, "mean_force": mean_force, "keep": keep}
+    request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
+    console = Terminal(stderr=True)
+
+    def tell(text: object) -> None:
+        if progress:
+            console.print(str(text), markup=False, highlight=False)
+
+    with scenario_files.open_scenario(chosen.path, chosen.overrides) as opened:
+        folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name
+        keep_apart(folder, opened.package)
+        prepared = PreparedSweep.of(opened.system, request)
+        return Sweep(folder, run_sweep(prepared, folder, engine_of(jobs, scheduler, tell), tell, tell))
+
+
+def _listed(values: Values) -> str:
+    return values if isinstance(values, str) else ",".join(v if isinstance(v, str) else repr(float(v)) for v in values)

@@ -1,0 +1,71 @@
+"""From the design to the line as found: lengths and supports with errors and faults, and the equilibrium there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.catenary.condition.faults import active_faults, broken_droppers, slips
+from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_rest
+from models.catenary.shape.line_mesh import CatenaryMesh
+
+
+def find_condition(design: StaticState) -> StaticState:
+    """Return the line at rest as its definition's errors and faults leave it; the design itself if there are none.
+
+    Raises
+    ------
+    EquilibriumError
+        If a dropper would have no length left, or the line no equilibrium.
+    """
+    definition, mesh = design.shape.definition, design.shape.mesh
+    if not _differs(definition):
+        return design
+    raised = support_height_errors(definition.irregularity, mesh)
+    changed = replace(
+        mesh,
+        given_length=_lengths(design),
+        broken=broken_droppers(definition, mesh),
+        seat=mesh.seat + raised,
+    )
+    return find_rest(design, changed, _held(design, raised))
+
+
+def _differs(definition: CatenaryDefinition) -> bool:
+    """Return whether a line has errors or faults at all."""
+    errors = definition.irregularity
+    return bool(errors.dropper_length_sigma or errors.support_height_sigma or active_faults(definition))
+
+
+def _lengths(design: StaticState) -> FloatArray:
+    """Return the unstrained lengths as found [m], shape (n_droppers,)."""
+    definition, mesh = design.shape.definition, design.shape.mesh
+    lengths = design.unstrained_length + dropper_length_errors(definition.irregularity, mesh) + slips(definition, mesh)
+    if (lengths <= 0.0).any():
+        worst = int(lengths.argmin())
+        x = mesh.points[mesh.droppers[worst, 0], 0]
+        raise EquilibriumError(
+            f"line '{definition.name}': errors and faults leave the dropper at {x:.2f} m a length of "
+            f"{lengths[worst]:.3g} m, of {design.unstrained_length[worst]:.3g} m in the design"
+        )
+    return lengths
+
+
+def _held(design: StaticState, raised: FloatArray) -> FloatArray:
+    """Return the design's points with the supports raised: messenger wire and registration ends, shape (n, 3) [m]."""
+    mesh, points = design.shape.mesh, design.shape.points.copy()
+    rise = np.zeros(len(points))
+    rise[mesh.sprung] = raised
+    rise[mesh.arms[:, 0]] = _at_arms(mesh, raised)
+    points[:, 2] += rise[mesh.owner]
+    return points
+
+
+def _at_arms(mesh: CatenaryMesh, raised: FloatArray) -> FloatArray:
+    """Return of what belongs to supports what belongs to those of the steady arms, shape (n_arms,)."""
+    of_node = dict(zip(mesh.support_nodes.tolist(), raised.tolist(), strict=True))
+    return np.array([of_node[node] for node in mesh.arms[:, 1].tolist()])

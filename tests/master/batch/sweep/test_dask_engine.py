@@ -1,0 +1,205 @@
+"""Sweeps on Dask workers: the same table whoever makes the runs, and whoever of them dies."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+from pythonfmu.builder import FmuBuilder
+
+from master.errors import MasterError
+from tests.master.batch.sweep.conftest import GRID, ROOT, ended, journal
+from tests.master.conftest import CATENARY
+
+distributed = pytest.importorskip("distributed")
+
+from master.batch.sweep import dask_engine  # noqa: E402 (it needs distributed)
+from master.batch.sweep.dask_engine import DaskEngine  # noqa: E402
+
+SMALL = {"over": {"catenary.stiffness": "4000:6000:500"}}
+
+
+def _free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+class Cluster:
+    """A scheduler and workers, each a process of its own."""
+
+    def __init__(self, folder):
+        self.folder, self.port = folder, _free_port()
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.workers = []
+        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
+
+    def _start(self, kind, *options):
+        code = f"from distributed.cli.dask_{kind} import main; main()"
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment, "cwd": self.folder}
+        return subprocess.Popen([sys.executable, "-c", code, *options], **quiet)
+
+    def add_worker(self):
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--death-timeout", "60")
+        self.workers.append(self._start("worker", self.address, *options, "--local-directory", str(self.folder)))
+        return self.workers[-1]
+
+    def end(self):
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+
+
+@contextmanager
+def cluster_of(folder, workers=2):
+    folder.mkdir(exist_ok=True)
+    cluster = Cluster(folder)
+    try:
+        for _ in range(workers):
+            cluster.add_worker()
+        deadline = time.monotonic() + 60.0
+        while True:
+            try:
+                with distributed.Client(cluster.address, timeout=2.0) as client:
+                    client.wait_for_workers(workers, timeout=30.0)
+                break
+            except (OSError, TimeoutError):
+                assert time.monotonic() < deadline
+        yield cluster
+    finally:
+        cluster.end()
+
+
+@pytest.fixture(scope="module")
+def crew(tmp_path_factory):
+    """A scheduler with two workers that live as long as the module's tests."""
+    with cluster_of(tmp_path_factory.mktemp("cluster")) as found:
+        yield found
+
+
+def _wait_for_runs(process, folder, count):
+    deadline = time.monotonic() + 90.0
+    while len(journal(folder)) < count:
+        assert time.monotonic() < deadline
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+
+
+def test_the_same_bits_here_with_processes_and_through_a_scheduler(swept, tmp_path, crew):
+    swept("here", **SMALL)
+    swept("one", DaskEngine(jobs=1, renew_after=2), **SMALL)
+    swept("two", DaskEngine(jobs=2), **SMALL)
+    swept("cluster", DaskEngine(scheduler=crew.address), **SMALL)
+    tables = [(tmp_path / name / "sweep.csv").read_bytes() for name in ("here", "one", "two", "cluster")]
+    assert tables[0].count(b"\n") == 6
+    assert set(tables) == {tables[0]}
+    used = {name: {run["worker"] for run in journal(tmp_path / name)} for name in ("one", "two", "cluster")}
+    assert len(used["one"]) >= 2, "a process is renewed after two runs"
+    assert len(used["two"]) == 2
+    assert len(used["cluster"]) == 2
+
+
+@pytest.fixture
+def exiting_toy(toy, tmp_path):
+    """The toy scenario with a line whose FMU ends its process instead of failing."""
+    source = CATENARY.replace('raise RuntimeError("the wire broke at 100 percent load")', "import os; os._exit(3)")
+    assert source != CATENARY
+    script = tmp_path / "exiting_toy.py"
+    script.write_text(source)
+    shutil.copy(FmuBuilder.build_FMU(script, dest=tmp_path), toy / "resources" / "ToyCatenary.fmu")
+    return toy
+
+
+def test_a_run_whose_worker_always_dies_is_a_row_and_the_others_go_on(exiting_toy, command, tmp_path):
+    process = command("--over", "catenary.fail_at=0.2,9,10", "--jobs", "2", quiet=False)
+    code, error = ended(process)
+    assert code == 1
+    assert re.search(r"worker 127\S+ died in run 1; the run is made once more", error)
+    assert re.search(r"worker 127\S+ died in run 1 too; the run has failed", error)
+    data = json.loads((tmp_path / "out" / "sweep.json").read_text())
+    assert data["failures"] == {"1": "the worker's process died in this run, 2 times"}
+    assert (data["status"], data["finished"]) == ("complete", 3)
+
+
+def test_a_worker_that_is_killed_costs_its_run_one_retry(command, tmp_path, whole_table):
+    with cluster_of(tmp_path / "cluster") as cluster:
+        process = command(*GRID, "--scheduler", cluster.address, quiet=False)
+        _wait_for_runs(process, tmp_path / "out", 2)
+        cluster.workers[0].kill()
+        code, error = ended(process)
+    assert code == 0, error
+    assert len(re.findall(r"worker 127\S+ died in run \d; the run is made once more", error)) <= 1
+    assert (tmp_path / "out" / "sweep.csv").read_bytes() == whole_table
+
+
+def test_whoever_is_killed_a_second_sweep_ends_with_the_same_table(command, tmp_path, whole_table):
+    """The master, then the scheduler, and then all workers; each time the sweep goes on where it was."""
+    out = tmp_path / "out"
+    with cluster_of(tmp_path / "cluster") as cluster:
+        process = command(*GRID, "--scheduler", cluster.address)
+        _wait_for_runs(process, out, 2)
+        os.kill(process.pid, signal.SIGKILL)
+        ended(process)
+        process = command(*GRID, "--scheduler", cluster.address)
+        _wait_for_runs(process, out, 4)
+        cluster.scheduler.kill()
+        code, error = ended(process)
+        assert code == 1
+        assert "is gone; start the sweep again to go on" in error
+    before = len(journal(out))
+    assert 4 <= before < 9
+    with cluster_of(tmp_path / "other") as cluster:
+        process = command(*GRID, "--scheduler", cluster.address)
+        _wait_for_runs(process, out, before + 1)
+        for worker in cluster.workers:
+            worker.kill()
+        cluster.add_worker()
+        assert ended(process)[0] == 0
+    assert len(journal(out)) == 9
+    assert (out / "sweep.csv").read_bytes() == whole_table
+
+
+def test_an_interruption_ends_the_processes_and_leaves_what_is_finished(command, tmp_path, whole_table):
+    process = command(*GRID, "--jobs", "2")
+    _wait_for_runs(process, tmp_path / "out", 2)
+    process.send_signal(signal.SIGINT)
+    code, error = ended(process)
+    assert code == 1
+    assert re.fullmatch(r"error: interrupted. \d of 9 runs are finished and in .*\n", error)
+    data = json.loads((tmp_path / "out" / "sweep.json").read_text())
+    assert data["status"] == "interrupted"
+    assert data["finished"] >= 2
+    assert ended(command(*GRID, "--jobs", "1")) == (0, "")
+    assert (tmp_path / "out" / "sweep.csv").read_bytes() == whole_table
+
+
+def test_a_scheduler_that_does_not_answer_is_one_sentence(command, tmp_path):
+    began = time.monotonic()
+    code, error = ended(command(*GRID, "--scheduler", f"tcp://127.0.0.1:{_free_port()}"))
+    assert code == 1
+    assert re.fullmatch(r"error: no Dask scheduler answers at tcp://127.0.0.1:\d+ within 5 s; .*\n", error)
+    assert time.monotonic() - began < 30.0
+    assert not (tmp_path / "out" / "sweep.csv").exists()
+
+
+@pytest.mark.parametrize("address", ["nowhere", "tcp://", "http//x"])
+def test_an_address_that_is_none_is_one_sentence(swept, address):
+    with pytest.raises(MasterError, match="is not the address of a Dask scheduler"):
+        swept("out", DaskEngine(scheduler=address), **SMALL)
+
+
+def test_workers_with_other_versions_are_refused_before_anything_runs(swept, tmp_path, crew, monkeypatch):
+    ours = dask_engine.versions()
+    monkeypatch.setattr(dask_engine, "versions", lambda: {**ours, "numpy": "0.9"})
+    with pytest.raises(MasterError, match=r"worker 127\S+ has other versions: numpy \S+, here 0.9") as caught:
+        swept("out", DaskEngine(scheduler=crew.address), **SMALL)
+    assert "\n" not in str(caught.value)
+    assert journal(tmp_path / "out") == []

@@ -1,0 +1,83 @@
+"""Grids, samples and tables, together and apart; everything is checked before anything runs."""
+
+import pytest
+
+from master.batch.sweep.sweep_plan import SweepRequest, make_plan, stored_request
+from master.errors import RequestError
+
+
+def _plan(system, **request):
+    return make_plan(system, SweepRequest.read(request))
+
+
+def test_a_grid_has_every_value_with_every_other(toy_system):
+    plan = _plan(toy_system, over={"speed": "40,50", "catenary.stiffness": "1:3:1"})
+    assert plan.points == tuple((v, k) for v in (40.0, 50.0) for k in (1.0, 2.0, 3.0))
+
+
+def test_samples_are_repeated_at_every_point_of_the_grid(toy_system):
+    plan = _plan(toy_system, over={"speed": "40,50"}, vary={"catenary.stiffness": "normal(5000, 10)"}, samples=4)
+    assert [p[0] for p in plan.points] == [40.0] * 4 + [50.0] * 4
+    assert [p[1] for p in plan.points[:4]] == [p[1] for p in plan.points[4:]]
+    assert len({p[1] for p in plan.points}) == 4
+
+
+def test_a_table_names_its_rows_and_has_units_in_heads_or_cells(toy_system, tmp_path):
+    table = tmp_path / "t.csv"
+    table.write_text("variant,stop [ms],catenary.stiffness\nsoft,1500,4000\nhard,2 s,8000\n")
+    plan = _plan(toy_system, table=table)
+    assert [p.unit for p in plan.parameters] == ["s", ""]
+    assert plan.variants == ("soft", "hard")
+    assert plan.points == ((1.5, 4000.0), (2.0, 8000.0))
+    assert len(_plan(toy_system, table=table, over={"speed": "40,50"}).variants) == 4
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ({}, "nothing is varied"),
+        ({"vary": {"speed": "normal(1, 1)"}}, "samples need --samples"),
+        ({"samples": 3}, "samples need --vary"),
+        ({"over": {"speed": "1,2", "pantograph.speed": "1,2"}}, "'pantograph.speed' is varied twice"),
+        ({"over": {"speed": "1:1000:1", "catenary.stiffness": "1:1000:1"}}, "more than 100000"),
+        ({"over": {"speed": "1,2"}, "colour": "red"}, "colour"),
+        ({"over": {"speed": "1,2"}, "samples": 0}, "samples"),
+        ({"over": {"speed": "1,2"}, "method": "dice"}, "method"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(toy_system, request_, said):
+    with pytest.raises(RequestError) as caught:
+        _plan(toy_system, **request_)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "has no row"),
+        ("catenary.stiffness\n", "has no row"),
+        ("variant\nsoft\n", "has no column of values"),
+        ("catenary.stifness\n1\n", "did you mean 'catenary.stiffness'"),
+        ("catenary.stiffness,speed\n1\n", "row 2: has 1 cells, the head has 2"),
+        ("catenary.stiffness\nmuch\n", "'much' is not a number"),
+        ("catenary.stiffness,catenary.stiffness\n1,2\n", "more than once"),
+        ("catenary.stiffness,stop [s]\n1,\n", "has an empty cell"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_one_sentence(toy_system, tmp_path, text, said):
+    table = tmp_path / "t.csv"
+    table.write_text(text)
+    with pytest.raises(RequestError) as caught:
+        _plan(toy_system, table=table)
+    assert said in str(caught.value)
+    assert str(table) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_study_may_hold_a_sweep(toy_system, toy):
+    (toy / "study.toml").write_text('title = "t"\n[sweep]\nkeep = "failed"\n[sweep.over]\nspeed = "40,50"\n')
+    assert len(_plan(toy_system, **stored_request(toy)).points) == 2
+    (toy / "study.toml").write_text("sweep = 1\n")
+    with pytest.raises(RequestError, match="must be a table"):
+        stored_request(toy)

@@ -1,0 +1,180 @@
+"""Whole sweeps of the toy scenario: the table, runs that fail, what is kept, and what a second sweep does."""
+
+import csv
+import io
+import os
+import signal
+import time
+
+import pytest
+
+from master.batch.sweep.sweep_engines import HereEngine
+from master.batch.sweep.sweep_run import WORK
+from master.errors import InterruptedRunError, MasterError
+from tests.master.batch.sweep.conftest import GRID, ended, journal
+
+STIFFNESSES = {"over": {"catenary.stiffness": "4000,5000,6000"}}
+
+
+def table(folder):
+    return list(csv.DictReader(io.StringIO((folder / "sweep.csv").read_text())))
+
+
+class Backwards(HereEngine):
+    """Makes the last run first, and counts."""
+
+    def __init__(self):
+        self.made = []
+
+    def opened(self, base, place):
+        import contextlib
+
+        @contextlib.contextmanager
+        def ready():
+            with super(Backwards, self).opened(base, place) as make:
+
+                def made(runs):
+                    for run in reversed(runs):
+                        self.made.append(run.number)
+                        yield from make([run])
+
+                yield made
+
+        return ready()
+
+
+def test_the_table_has_inputs_and_figures_to_the_last_bit(swept, tmp_path):
+    done = swept(**STIFFNESSES)
+    rows = table(tmp_path / "out")
+    assert [float(row["catenary.stiffness"]) for row in rows] == [4000.0, 5000.0, 6000.0]
+    assert [float(row["sigma [N]"]) for row in rows] == [row["sigma [N]"] for row in done.rows]
+    assert {row["status"] for row in rows} == {"complete"}
+    assert done.status == "complete"
+
+
+def test_parquet_holds_the_same(swept, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    done = swept(**STIFFNESSES)
+    assert parquet.read_table(tmp_path / "out" / "sweep.parquet").column("mean [N]").to_pylist() == [
+        row["mean [N]"] for row in done.rows
+    ]
+
+
+def test_the_order_of_the_runs_does_not_matter(swept, tmp_path):
+    swept("one", **STIFFNESSES)
+    swept("two", Backwards(), **STIFFNESSES)
+    assert (tmp_path / "one" / "sweep.csv").read_bytes() == (tmp_path / "two" / "sweep.csv").read_bytes()
+
+
+def test_a_second_sweep_makes_only_what_is_missing(swept, tmp_path):
+    swept(**STIFFNESSES)
+    engine = Backwards()
+    swept("out", engine, over={"catenary.stiffness": "4000:6000:500"})
+    assert sorted(engine.made) == [2, 4]
+    swept("whole", over={"catenary.stiffness": "4000:6000:500"})
+    assert (tmp_path / "out" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()
+
+
+def test_a_damaged_line_of_the_journal_costs_its_run(swept, tmp_path):
+    swept(**STIFFNESSES)
+    path = tmp_path / "out" / "sweep_runs.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text(lines[0] + "{damaged\n" + lines[2][: len(lines[2]) // 2])
+    engine = Backwards()
+    swept("out", engine, **STIFFNESSES)
+    assert sorted(engine.made) == [2, 3]
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason(swept, tmp_path):
+    done = swept(over={"catenary.fail_at": "0.5,9"})
+    rows = table(tmp_path / "out")
+    assert [row["status"] for row in rows] == ["failed", "complete"]
+    assert "the wire broke at 100 percent load" in rows[0]["reason"]
+    assert str(tmp_path) not in rows[0]["reason"]
+    assert list(done.failures) == [1]
+    engine = Backwards()
+    swept("out", engine, over={"catenary.fail_at": "0.5,9"})
+    assert engine.made == []
+
+
+@pytest.mark.parametrize(
+    ("keep", "kept"),
+    [
+        ("figures", [set(), set()]),
+        ("failed", [{"summary.json", "timeseries.csv"}, set()]),
+        ("thinned", [{"summary.json", "geometry.json"}, {"summary.json", "geometry.json", "contact_force.csv"}]),
+        ("all", [{"summary.json", "timeseries.csv"}, {"summary.json", "timeseries.csv", "contact_force.csv"}]),
+    ],
+)
+def test_what_is_kept(swept, tmp_path, keep, kept):
+    done = swept(over={"catenary.fail_at": "0.5,9"}, keep=keep)
+    for run, names in zip(done.runs, kept, strict=True):
+        folder = tmp_path / "out" / "runs" / run.key
+        found = {p.name for p in folder.iterdir()} if folder.is_dir() else set()
+        assert names <= found
+        assert keep != "thinned" or "timeseries.csv" not in found
+        assert bool(names) == folder.is_dir()
+    assert list((tmp_path / "out").glob(f"runs/{WORK}*")) == []
+
+
+def test_the_static_force_is_found_for_the_mean_force(swept):
+    done = swept(over={"catenary.stiffness": "4000,8000"}, mean_force="150 N", tolerance=0.5)
+    assert [row["mean [N]"] for row in done.rows] == pytest.approx([150.0, 150.0], abs=0.5)
+    assert all(row["static force [N]"] != 140.0 for row in done.rows)
+
+
+def test_equal_runs_are_made_once(swept, tmp_path):
+    (tmp_path / "t.csv").write_text("variant,catenary.stiffness\na,4000\nb,4000\n")
+    engine = Backwards()
+    done = swept("out", engine, table=tmp_path / "t.csv")
+    assert engine.made == [1] or engine.made == [2]
+    assert [row["variant"] for row in done.rows] == ["a", "b"]
+    assert done.rows[0]["mean [N]"] == done.rows[1]["mean [N]"]
+
+
+def test_an_interruption_leaves_what_is_finished(swept, tmp_path):
+    class Impatient(Backwards):
+        def opened(self, base, place):
+            import contextlib
+
+            @contextlib.contextmanager
+            def ready():
+                with HereEngine.opened(self, base, place) as make:
+
+                    def made(runs):
+                        yield from make(runs[:1])
+                        raise InterruptedRunError("interrupted")
+
+                    yield made
+
+            return ready()
+
+    with pytest.raises(InterruptedRunError, match="1 of 3 runs are finished"):
+        swept("out", Impatient(), **STIFFNESSES)
+    assert [row["run"] for row in table(tmp_path / "out")] == ["1"]
+
+
+def test_a_folder_of_something_else_is_left_alone(swept, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.txt").write_text("mine")
+    with pytest.raises(MasterError, match="left alone"):
+        swept(**STIFFNESSES)
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_command_that_is_ended_goes_on_where_it_was(command, tmp_path, number, whole_table):
+    process = command(*GRID)
+    deadline = time.monotonic() + 60.0
+    while len(journal(tmp_path / "out")) < 3:
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.01)
+    os.kill(process.pid, number)
+    code, _ = ended(process)
+    assert code != 0
+    done = len(journal(tmp_path / "out"))
+    assert 3 <= done < 9
+    assert ended(command(*GRID)) == (0, "")
+    assert len(journal(tmp_path / "out")) == 9
+    assert (tmp_path / "out" / "sweep.csv").read_bytes() == whole_table

@@ -1,0 +1,28 @@
+"""Long counts: a thousand runs complete, and a worker does not grow over five hundred."""
+
+import pytest
+
+from tests.master.batch.sweep.conftest import journal
+
+pytest.importorskip("distributed")
+
+from master.batch.sweep.dask_engine import DaskEngine
+
+pytestmark = pytest.mark.long
+#: Growth that a process may show between its fiftieth run and its last [MB].
+GROWTH = 5.0
+
+
+def test_a_thousand_runs_complete_and_five_hundred_do_not_grow(swept, tmp_path):
+    samples = {"vary": {"catenary.stiffness": "normal(5000, 100)"}, "samples": 1000}
+    done = swept("out", DaskEngine(jobs=2, renew_after=500), **samples)
+    assert (len(done.rows), done.failures, done.status) == (1000, {}, "complete")
+    runs = journal(tmp_path / "out")
+    for worker in {run["worker"] for run in runs}:
+        memory = [run["memory"] for run in runs if run["worker"] == worker]
+        assert len(memory) <= 500
+        if len(memory) > 100:
+            assert memory[-1] - memory[49] < GROWTH
+    stiffness = [row["catenary.stiffness"] for row in done.rows]
+    mean = sum(stiffness) / 1000
+    assert abs(mean - 5000.0) < 2.576 * 100.0 / 1000**0.5

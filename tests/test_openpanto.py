@@ -179,7 +179,7 @@ sys.meta_path.insert(0, Sender())
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
 @pytest.mark.parametrize(
     ("module", "number"),
-    [("argparse", "SIGINT"), ("master.errors", "SIGHUP"), ("numpy", "SIGINT"), ("matplotlib", "SIGHUP")],
+    [("argparse", "SIGINT"), ("master.errors", "SIGHUP"), ("numpy", "SIGINT"), ("scipy.sparse", "SIGHUP")],
 )
 def test_an_interrupt_during_the_imports_is_one_sentence(module, number, tmp_path):
     path = tmp_path / "openpanto"

@@ -117,7 +117,7 @@ DATA_SCIENTIST = {
         "run toy.ssp --no-build --set static_force=120", 1, "did you mean 'pantograph.static_force'?"
     ),
     "a unit of something else": Mistake(
-        "run toy.ssp --no-build --set 'pantograph.static_force=12 kg'", 1, "give it in a unit of N"
+        "run toy.ssp --no-build --set 'pantograph.static_force=12 kg'", 1, "give it in N, daN, kN"
     ),
     "a parameter without a value": Mistake(
         "run toy.ssp --set pantograph.static_force", 2, "must be written COMPONENT.PARAMETER=VALUE"

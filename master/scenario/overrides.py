@@ -199,6 +199,8 @@ def _quantity(fmu: Fmu, variable: Variable, full: str, text: str) -> float:
         raise RequestError(f"parameter '{full}' = {text}: unit '{unit}' is not known {listed}")
     found = conversion(known[unit], known[variable.unit]) if variable.unit in known else None
     if found is None:
-        wanted = f"a unit of {variable.unit}" if variable.unit else "no unit: the FMU declares none"
+        own = known.get(variable.unit)
+        same = [name for name, other in known.items() if own is not None and conversion(other, own) is not None]
+        wanted = ", ".join(same) or variable.unit or "no unit: the FMU declares none"
         raise RequestError(f"parameter '{full}' = {text}: give it in {wanted}")
     return found(number)

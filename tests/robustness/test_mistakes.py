@@ -45,8 +45,8 @@ def refused(answer, *parts):
 #: What is set in the scenario, and what is said: the mistake and the cure.
 SET = [
     ("catenary.contact_wire.tension=12", "12 N is below its minimum 500", "write its unit"),
-    ("catenary.contact_wire.tension=12 m", "give it in a unit of N"),
-    ("catenary.contact_wire.tension=12 kg", "give it in a unit of N"),
+    ("catenary.contact_wire.tension=12 m", "give it in N, daN, kN"),
+    ("catenary.contact_wire.tension=12 kg", "give it in N, daN, kN"),
     ("catenary.contact_wire.tension=20000 kN", "is above its maximum 100000", "check its size"),
     ("catenary.messenger_wire.tension=16", "16 N is below its minimum 500", "write its unit"),
     ("catenary.contact_wire.mass=1350", "1350 kg/m is above its maximum 20", "write its unit"),

@@ -84,7 +84,7 @@ def test_the_fmu_is_loaded_as_a_run_does_in_the_runs_folder(toy_fmu, tmp_path, m
     copies = tmp_path / "copies"
     copies.mkdir()
     assert "the FMU fails: " in (text := _said(_changed(toy_fmu, copies, spoil))["missing"])
-    assert "mass: is missing" in text
+    assert "mess: unknown key" in text
 
 
 def test_a_folder_that_cannot_be_written(toy_fmu, tmp_path, monkeypatch):

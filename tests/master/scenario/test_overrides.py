@@ -79,13 +79,13 @@ def test_values_are_given_in_the_unit_of_the_fmu(name, text, value):
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("tension", "12 kg", "'a.tension' = 12 kg: give it in a unit of N"),
+        ("tension", "12 kg", "'a.tension' = 12 kg: give it in N, daN, kN"),
         ("tension", "12 kilo", "unit 'kilo' is not known (known: panto, half, 1, %"),
         ("tension", "much", "'much' is not a number, or a number with its unit ('1 N')"),
         ("tension", "1,5", "'1,5' is not a number; write a decimal point"),
         ("tension", "nan", "is not finite"),
         ("plain", "3 m", "give it in no unit: the FMU declares none"),
-        ("odd", "3 m", "give it in a unit of lost"),
+        ("odd", "3 m", "give it in lost"),
         ("count", "3 m", "'3 m' is not a whole number"),
         ("few", "2500 mm", "= 2.5 m is above its maximum 2; a value without a unit is in m: check its size"),
     ],

@@ -227,6 +227,11 @@ def stored_guid(path: Path) -> str:
 def build(path: Path, lookup: Lookup) -> None:
     """Build ``path`` from the definition that ``lookup`` finds."""
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        advice = "XDG_CACHE_HOME names the folder for FMUs of the installed library"
+        raise ValueError(f"could not be built: {path.parent} cannot be made ({error.strerror}); {advice}") from error
+    try:
         answer = _fmus("build", "--out", str(path.parent), *lookup.arguments, seconds=_BUILD_SECONDS)
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"could not be built: no answer within {_BUILD_SECONDS} s") from error

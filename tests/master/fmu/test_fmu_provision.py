@@ -235,3 +235,11 @@ def test_an_fmu_whose_archive_cannot_be_unpacked_has_no_guid(tmp_path, changes):
     assert fmu_provision.stored_guid(tmp_path / "X.fmu") == "ab"
     stored(tmp_path / "X.fmu", **changes)
     assert fmu_provision.stored_guid(tmp_path / "X.fmu") == ""
+
+
+def test_a_folder_that_cannot_be_made_is_named_with_what_to_do(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(
+        ValueError, match=r"file/fmus cannot be made \(Not a directory\); XDG_CACHE_HOME names the folder"
+    ):
+        fmu_provision.build(tmp_path / "file" / "fmus" / "Pantograph_CX.fmu", fmu_provision.Lookup("Pantograph_CX"))

@@ -148,9 +148,11 @@ def test_a_foreign_package_in_place_of_a_command_is_one_sentence(tmp_path):
     (tmp_path / "master" / "__init__.py").touch()
     command = [sys.executable, "-m", "master", "--help"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert "No module named master.__main__" in done.stderr
+    if done.returncode == 0:  # an editable installation supplies what the foreign package lacks
+        assert (done.stderr, "usage: python -m master" in done.stdout) == ("", True)
+    else:
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+        assert "No module named master.__main__" in done.stderr
 
 
 @pytest.mark.parametrize("line", [["study", "--list"], ["statics", "LN2"], ["--completion", "bash"]], ids=" ".join)
@@ -176,6 +178,12 @@ sys.meta_path.insert(0, Sender())
 """
 
 
+def not_ignored():
+    """Have the signals back that whoever started the tests in the background ignores, and their children with them."""
+    for name in ("SIGINT", "SIGHUP"):
+        signal.signal(getattr(signal, name), signal.SIG_DFL)
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
 @pytest.mark.parametrize(
     ("module", "number"),
@@ -186,7 +194,9 @@ def test_an_interrupt_during_the_imports_is_one_sentence(module, number, tmp_pat
     path.write_text(AT_IMPORT + SCRIPT)
     command = [sys.executable, "-P", path, module, number, "couple", "LN2", "CX", "--quiet"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=False, timeout=60, preexec_fn=not_ignored
+    )
     assert (done.returncode, done.stdout, done.stderr) == (1, "", "error: interrupted\n")
 
 

@@ -161,20 +161,14 @@ def test_nan_stops_the_run_with_its_name_time_and_last_good_value(toy, tmp_path)
     assert np.isfinite(left.recordings[0].values).all()
 
 
+def long_run(scenario, out):
+    """Return the command of a run that is still at work when it is interrupted."""
+    return [sys.executable, "-m", "master", str(scenario), "--stop", "1e4", "--out", str(out), "--no-build"]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_loses_nothing(toy, tmp_path, number):
-    command = [
-        sys.executable,
-        "-m",
-        "master",
-        str(toy),
-        "--stop",
-        "1e4",
-        "--out",
-        str(tmp_path / "out"),
-        "--no-build",
-    ]
-    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(long_run(toy, tmp_path / "out"), cwd=ROOT, stderr=subprocess.PIPE, text=True)
     series = tmp_path / "out" / "timeseries.csv"
     deadline = time.monotonic() + 60
     while not (series.exists() and series.stat().st_size > 50_000) and time.monotonic() < deadline:
@@ -192,18 +186,7 @@ def test_an_interrupted_run_loses_nothing(toy, tmp_path, number):
 
 
 def test_a_killed_run_is_readable_up_to_its_last_rows(toy, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "master",
-        str(toy),
-        "--stop",
-        "1e4",
-        "--out",
-        str(tmp_path / "out"),
-        "--no-build",
-    ]
-    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(long_run(toy, tmp_path / "out"), cwd=ROOT, stderr=subprocess.DEVNULL)
     series = tmp_path / "out" / "timeseries.csv"
     deadline = time.monotonic() + 60
     while not (series.exists() and series.stat().st_size > 200_000) and time.monotonic() < deadline:

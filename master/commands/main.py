@@ -20,7 +20,7 @@ from master.commands.scenario_commands import add_pack, add_validate
 from master.commands.study_command import add_study
 from master.commands.sweep_command import add_sweep
 from master.commands.verify_command import add_verify
-from master.errors import MasterError, UsageError
+from master.errors import MasterError, UsageError, said
 from master.report.terminal_summary import WIDTH, Terminal
 
 #: What declares each verb and its options, in the order of the help.
@@ -60,7 +60,7 @@ def carry_out(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return _fail(error, "interrupted", 1)
     except OSError as failure:
-        return _fail(error, f"{failure.filename or 'standard output'}: {failure.strerror or failure}", 1)
+        return _fail(error, f"{failure.filename or 'standard output'}: {said(failure)}", 1)
     return code
 
 

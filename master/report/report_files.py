@@ -17,7 +17,7 @@ from master.safety.safe_files import atomic_file, write_atomically
 #: Formats of the charts' files with their options: no date, so that equal runs leave equal files.
 FORMATS: Final[dict[str, dict[str, Any]]] = {"png": {"dpi": 130}, "svg": {"metadata": {"Date": None}}}
 #: Names within an SVG are made from its content and this, instead of at random.
-_SAME_NAMES: Final = {"svg.hashsalt": "openpanto"}
+_SAME_NAMES: Final[Any] = {"svg.hashsalt": "openpanto"}
 #: The format of a run whose user asks for none: every one costs as much as the page.
 _DEFAULT: Final = "png"
 
@@ -43,7 +43,8 @@ def write(done: Results, measured: MeasuredComparison | None = None, formats: Co
     for name, charts in figures.items():
         figure = static_figure(charts)
         # Laid out once, not for every format and each time twice.
-        figure.get_layout_engine().execute(figure)
+        layout: Any = figure.get_layout_engine()
+        layout.execute(figure)
         figure.set_layout_engine("none")
         for ending in sorted(wanted):
             with atomic_file(done.folder / f"{name}.{ending}") as temporary, rc_context(_SAME_NAMES):

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from scipy import stats
-from scipy.stats import qmc
 
 from master.arrays import FloatArray
 from master.batch.sweep.swept_parameter import ParameterReader, SweptParameter
@@ -64,17 +62,27 @@ class _Kind:
     is_bounded: bool = True
 
 
+def _normal_quantile(share: FloatArray, mean: float, sd: float) -> FloatArray:
+    from scipy import stats  # here and below: it takes longer than all else that a command imports
+
+    return stats.norm.ppf(share, mean, sd)
+
+
 def _lognormal_quantile(share: FloatArray, mean: float, sd: float) -> FloatArray:
     """Return quantiles of the lognormal distribution whose own mean and standard deviation these are."""
     variance = np.log1p((sd / mean) ** 2)
-    return np.exp(stats.norm.ppf(share, np.log(mean) - 0.5 * variance, np.sqrt(variance)))
+    return np.exp(_normal_quantile(share, np.log(mean) - 0.5 * variance, np.sqrt(variance)))
 
 
 def _truncated_quantile(share: FloatArray, mean: float, sd: float, low: float, high: float) -> FloatArray:
+    from scipy import stats
+
     return stats.truncnorm.ppf(share, (low - mean) / sd, (high - mean) / sd, mean, sd)
 
 
 def _triangular_quantile(share: FloatArray, low: float, mode: float, high: float) -> FloatArray:
+    from scipy import stats
+
     return stats.triang.ppf(share, (mode - low) / (high - low), low, high - low)
 
 
@@ -95,7 +103,7 @@ def _truncated_problem(mean: float, sd: float, low: float, high: float) -> str:
 
 
 _KINDS: Final = {
-    "normal": _Kind("mean, sd", (False, True), _width_problem, stats.norm.ppf, is_bounded=False),
+    "normal": _Kind("mean, sd", (False, True), _width_problem, _normal_quantile, is_bounded=False),
     "uniform": _Kind("low, high", (False, False), _order_problem, lambda share, low, high: low + share * (high - low)),
     "lognormal": _Kind("mean, sd", (False, True), _lognormal_problem, _lognormal_quantile, is_bounded=False),
     "truncnormal": _Kind("mean, sd, low, high", (False, True, False, False), _truncated_problem, _truncated_quantile),
@@ -149,6 +157,8 @@ def draw(distributions: Sequence[Distribution], count: int, seed: int, method: M
     RequestError
         If a Sobol sequence of this length would not be balanced.
     """
+    from scipy.stats import qmc
+
     generator = np.random.default_rng(seed)
     if method == "sobol":
         check_power_of_two(count)

@@ -49,7 +49,7 @@ class Verb(NamedTuple):
     examples: tuple[str, ...]
 
 
-_MASTER: Final = "master.commands.main:carry_out"
+_MASTER: Final = "master.commands.verb_execution:carry_out"
 _MODELS: Final = "models.commands.physics_main:carry_out"
 _FMUS: Final = "fmus.__main__:carry_out"
 

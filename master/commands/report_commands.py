@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from master.commands.command_options import add_verb, finite_number
+from master.commands.command_options import add_figures, add_verb, finite_number
 from master.errors import MasterError, UsageError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
@@ -39,6 +39,7 @@ def add_report(verbs: Any) -> None:
         help="added to the measured positions [m] or times [s]; where they fall, the track position is D less them",
     )
     parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
+    add_figures(parser)
     parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
     parser.add_argument(
         "--magnify", type=float, default=8.0, metavar="N", help="of deformations in the film, default 8"
@@ -61,7 +62,7 @@ def _report(options: argparse.Namespace) -> int:
         measured = _measured(done, options) if options.measured else None
         results_folder.write_forces(done.folder, done.signals)
         results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
-        print(report_files.write(done, measured))
+        print(report_files.write(done, measured, options.figures))
         if options.parquet:
             print(*parquet_export.write_parquet(done.folder), sep="\n")
     _warn_of_open_runs([done])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from models.arrays import FloatArray
 from models.commands.physics_files import write_csv, write_figure
-from models.commands.physics_options import add_settings, finite, new_folder, print_table, settings, warn
+from models.commands.physics_options import add_settings, check_folder, finite, new_folder, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import doubts, load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
@@ -72,8 +72,9 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
+    check_folder(arguments.out)
     definition = load_pantograph(arguments.pantograph)
-    warn([doubts("pantographs", arguments.pantograph)])
+    warn(doubts("pantographs", arguments.pantograph))
     definition = definition.with_values(settings(arguments.set, "pantograph", definition))
     result = (
         _multibody(definition, arguments)

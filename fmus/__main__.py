@@ -10,6 +10,7 @@ if __name__ == "__main__" and not sys.flags.safe_path and sys.path[0] != __file_
     del sys.path[0]
 
 import argparse
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -72,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_lookup(verb)
     verb.add_argument("name", metavar="NAME", help="as for build")
     verb.add_argument("--if-known", action="store_true", help="print nothing for a name that no FMU has")
+    verb.add_argument("--watched", action="store_true", help="list what it depends on as well, as JSON strings")
     verb.set_defaults(run=_fingerprint)
     verb = verbs.add_parser("list", help="list the FMUs that can be built")
     verb.set_defaults(run=_list)
@@ -190,14 +192,21 @@ def _recipes(names: Sequence[str], options: argparse.Namespace) -> list[Recipe]:
 
 def _fingerprint(options: argparse.Namespace) -> None:
     from fmus.builder.recipe import UnknownFmuError, fingerprint
+    from fmus.builder.watched_places import watched_places
 
+    definitions = [] if options.built_from is None else [options.built_from]
     try:
         (wanted,) = _recipes([options.name], options)
     except UnknownFmuError:
-        if options.if_known:
-            return
-        raise
-    print(fingerprint(wanted))
+        if not options.if_known:
+            raise
+    else:
+        print(fingerprint(wanted))
+        definitions.append(wanted.definition)
+    if options.watched:
+        starts = options.library or [Path()]
+        for place in watched_places(starts, search_path(*starts), definitions):
+            print(f"watched: {json.dumps(str(place))}")
 
 
 def _list(options: argparse.Namespace) -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from master.batch.batch_session import BatchFiles, BatchState, run_tasks
+from master.batch.sweep.sensitivity import SensitivityIndices, described
+from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, sensitivity_data, sensitivity_of
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
@@ -24,6 +26,8 @@ from master.system.components import System
 JSON: Final = "sweep.json"
 CSV: Final = "sweep.csv"
 PARQUET: Final = "sweep.parquet"
+SENSITIVITY_CSV: Final = "sensitivity.csv"
+SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
@@ -94,6 +98,11 @@ class SweepOutcome(BatchState):
         """The table so far."""
         return table_rows(self.runs, self.found)
 
+    @property
+    def sensitivity(self) -> tuple[SensitivityIndices, ...]:
+        """Indices of every figure that varies; none if they were not asked for, or as long as runs are missing."""
+        return sensitivity_of(self.request, self.plan, self.runs, self.found)
+
 
 def as_data(outcome: SweepOutcome) -> dict[str, Any]:
     """Return the contents of ``sweep.json``."""
@@ -162,6 +171,14 @@ class PreparedSweep:
         runs = make_runs(base, plan, request)
         return cls(base, SweepOutcome(scenario=base.name, request=request, plan=plan, runs=runs))
 
+    @property
+    def announced(self) -> str:
+        """Why there are as many runs as there are, empty if that is plain."""
+        request, plan = self.outcome.request, self.outcome.plan
+        if request.sensitivity is None:
+            return ""
+        return described(request.sensitivity, len(plan.parameters), request.samples or 0)
+
 
 def sweep(
     prepared: PreparedSweep,
@@ -214,13 +231,30 @@ def sweep(
                     found[result.key] = result  # a copy each time would be long for many runs
                     return so_far
 
+                if why := prepared.announced:
+                    tell(why)
                 with chosen.opened(prepared.base, place) as make_runs_of:
                     tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
-                    return run_tasks(state, results, finish, files, folder)
+                    ended = run_tasks(state, results, finish, files, folder)
+                _write_sensitivity(ended, folder, tell)
+                return ended
     except (InterruptedRunError, KeyboardInterrupt) as error:
         done = f"{len([r for r in state.runs if r.key in found])} of {len(state.runs)} runs are finished"
         raise InterruptedRunError(f"interrupted. {done} and in {folder}; the same command makes the others") from error
+
+
+def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], None]) -> None:
+    """Write the indices of a finished sweep; those of an earlier one are not left beside its table."""
+    found = done.sensitivity
+    if not found:
+        for name in (SENSITIVITY_CSV, SENSITIVITY_JSON):
+            (folder / name).unlink(missing_ok=True)
+    else:
+        results_folder.write_text(folder / SENSITIVITY_CSV, sensitivity_csv(found))
+        results_folder.write_json(folder / SENSITIVITY_JSON, sensitivity_data(found))
+    if text := failed_note(done.request, found, len(done.failures)):
+        tell(text)
 
 
 def _remove_leftovers(place: RunPlace) -> None:

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from master.errors import one_line
 from master.results.run_results import Results
-from master.safety.safe_files import cannot_write
+from master.safety.safe_files import write_atomically
 from master.system.components import Component
 
 #: Where our FMUs hold theirs; the slave reads the same (`fmus.slave.adapter`).
@@ -36,11 +36,7 @@ def write_definitions(folder: Path, components: Sequence[Component]) -> None:
     """
     for number, component in enumerate(components, 1):
         if data := _definition_in(component.fmu.path):
-            path = folder / PATTERN.replace("*", str(number))
-            try:
-                path.write_bytes(data)
-            except OSError as error:
-                raise cannot_write(path, error) from error
+            write_atomically(folder / PATTERN.replace("*", str(number)), data)
 
 
 def _definition_in(path: Path) -> bytes:

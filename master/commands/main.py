@@ -26,6 +26,7 @@ VERBS: Final[Mapping[str, tuple[str, str]]] = {
     "verify": ("verify_command", "add_verify"),
     "study": ("study_command", "add_study"),
     "sweep": ("sweep_command", "add_sweep"),
+    "optimise": ("optimise_command", "add_optimise"),
 }
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from master.batch.optimisation.optimisation_goal import OptimisationRequest
 from master.batch.optimisation.optimisation_page import lines, page
@@ -20,44 +19,14 @@ from master.batch.optimisation.optimisation_session import (
     optimise,
 )
 from master.batch.sweep.engine_selection import engine_of
-from master.commands.batch_options import add_engine, count, distinct, named_values, progress_lines
-from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say
+from master.commands.batch_progress import distinct, progress_lines
+from master.commands.command_options import overrides_of, say
 from master.interface.scenario_runs import keep_apart
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
 from master.scenario.open_scenario import open_scenario
 
 
-def add_optimise(verbs: Any) -> None:
-    """Declare ``optimise`` and its options."""
-    parser = add_verb(
-        verbs,
-        "optimise",
-        "find the values of a few parameters for which a figure is least or greatest",
-        _optimise,
-        scenario=True,
-    )
-    goal = parser.add_mutually_exclusive_group(required=True)
-    goal.add_argument("--minimise", metavar="FIGURE", help="the figure that shall be least, e.g. sigma")
-    goal.add_argument("--maximise", metavar="FIGURE", help="the figure that shall be greatest")
-    text = "bounds of a parameter, e.g. 3000:12000N/m; may be repeated"
-    parser.add_argument(
-        "--vary", action="append", default=[], type=named_values, metavar="NAME=LOW:HIGH", required=True, help=text
-    )
-    text = "mean=157.5N (by the static force), maximum<=350N, minimum>=0N; may be repeated"
-    parser.add_argument("--subject-to", action="append", default=[], metavar="CONSTRAINT", help=text)
-    parser.add_argument("--mean-tolerance", type=positive_number, metavar="N", help="how near is enough; default 0.2")
-    parser.add_argument("--max-runs", type=count, metavar="N", help="most points that are tried; default 60")
-    parser.add_argument("--seed", type=int, metavar="S", help="of the search; default 1")
-    add_overrides(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: results/optimise/NAME")
-    add_engine(parser)
-    parser.add_argument("--again", action="store_true", help="also make the runs again that failed")
-    parser.add_argument("--dry-run", action="store_true", help="check everything and run nothing")
-    parser.add_argument("--quiet", action="store_true", help="no progress; files and exit code only")
-    parser.add_argument("--json", action="store_true", help=f"print {JSON}")
-
-
-def _optimise(options: argparse.Namespace) -> int:
+def optimise_verb(options: argparse.Namespace) -> int:
     """Optimise; return 0 if a point was found that keeps the constraints, else 1."""
     console = Terminal(stderr=True)
     note: Callable[[str], None] = (lambda _: None) if options.quiet else partial(say, console=console)

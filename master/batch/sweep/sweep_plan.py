@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
 from master.batch.sweep.sensitivity import SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
-from master.errors import MasterError, RequestError
+from master.errors import MasterError, RequestError, said
 from master.system.components import System
 
 Keep = Literal["all", "thinned", "figures", "failed"]
@@ -228,7 +228,7 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
     try:
         rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = error.strerror if isinstance(error, OSError) else error
+        why = said(error) if isinstance(error, OSError) else error
         raise MasterError(f"{path} cannot be read: {why}") from error
     if len(rows) < 2:
         raise RequestError(f"{path} has no row under its head")

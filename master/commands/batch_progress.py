@@ -1,8 +1,7 @@
-"""Options and progress that the verbs of many runs share: ``sweep`` and ``optimise``."""
+"""What ``sweep`` and ``optimise`` share: repeated options, and progress."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -16,35 +15,6 @@ from master.errors import UsageError
 
 #: Seconds between two lines of progress where there is no terminal.
 _LINES = 30.0
-
-
-def add_engine(parser: argparse.ArgumentParser) -> None:
-    """Declare who makes the runs."""
-    parser.add_argument("--jobs", type=count, metavar="N", help="make N runs at a time, in processes of this computer")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="make the runs on the workers of this Dask scheduler")
-    parser.add_argument("--memory-limit", default="auto", metavar="SIZE", help="of each process with --jobs, e.g. 2GB")
-    parser.add_argument(
-        "--renew-after", type=count, default=200, metavar="K", help="runs after which a process is renewed"
-    )
-
-
-def named_values(text: str) -> tuple[str, str]:
-    """Return name and values of an argument NAME=VALUES."""
-    name, sign, value = text.partition("=")
-    if not (name.strip() and sign and value.strip()):
-        raise argparse.ArgumentTypeError(f"'{text}' must be written NAME=VALUES")
-    return name.strip(), value.strip()
-
-
-def count(text: str) -> int:
-    """Return an argument as a whole number above 0."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
-    return value
 
 
 def distinct(option: str, pairs: list[tuple[str, str]]) -> dict[str, str]:

@@ -19,8 +19,8 @@ from fmus import __main__ as fmus_main
 from fmus.__main__ import _parser as fmus_parser
 from fmus.builder import recipe
 from fmus.slave.model_description import _DERIVED
-from master.batch.study import study_session
 from master.batch.optimisation import optimisation_session
+from master.batch.study import study_session
 from master.batch.sweep import distributions, sensitivity, sweep_plan, sweep_session
 from master.batch.verification import verification_session
 from master.batch.verification.quantities import QUANTITIES

@@ -111,9 +111,9 @@ def show_shares(blocks: Mapping[str, Sequence[Sequence[float]]]) -> None:
 
 def run_in_turns(options: argparse.Namespace) -> None:
     """Run the scenario in the tree that is first on the path, a block for every line of the standard input."""
-    from master.run_session import run  # noqa: PLC0415: of the tree that is measured
-    from master.scenario.open_scenario import open_scenario  # noqa: PLC0415
-    from master.scenario.overrides import Overrides  # noqa: PLC0415
+    from master.run_session import run
+    from master.scenario.open_scenario import open_scenario
+    from master.scenario.overrides import Overrides
 
     overrides = Overrides(options.stop, may_stop_early=True)
     with open_scenario(Path(options.scenario), overrides) as scenario:

@@ -45,7 +45,7 @@ class StripExchange:
             extrapolation.start(time, strip)
 
     def receive(self, time: float, step: float, strips: FloatArray, end: float, out: FloatArray) -> None:
-        """Take strips for a step that begins at ``time`` and write those at ``end`` into ``out``, shape (P, 2, 2, 3)."""
+        """Take strips for a step that begins at ``time`` and write those at ``end`` into ``out``, of their shape."""
         for extrapolation, strip in zip(self._strips, strips, strict=True):
             extrapolation.receive(time, strip, step)
         self.at(end, out)

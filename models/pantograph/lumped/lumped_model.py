@@ -96,9 +96,8 @@ class LumpedModel:
         h, gamma, beta = newmark.step, newmark.gamma, newmark.beta
         known = np.eye(4 * self.size)
         motion, load = known[: 3 * self.size], known[3 * self.size :]
-        displacement, velocity, acceleration = motion[0::3], motion[1::3], motion[2::3]
-        velocity = velocity + (1.0 - gamma) * h * acceleration
-        displacement = displacement + h * motion[1::3] + (0.5 - beta) * h**2 * acceleration
+        velocity = motion[1::3] + (1.0 - gamma) * h * motion[2::3]
+        displacement = motion[0::3] + h * motion[1::3] + (0.5 - beta) * h**2 * motion[2::3]
         inertia = self.M + gamma * h * self.C + beta * h**2 * self.K
         acceleration = np.linalg.solve(inertia, load - self.C @ velocity - self.K @ displacement)
         result = np.empty((3 * self.size, 4 * self.size))

@@ -143,10 +143,10 @@ class LumpedPantographPart:
         force = self._force.at(time)
         load[-1] -= force
         self._load[:] = load
-        before = None if self._balance is None else self.state.displacement.copy()
-        self._motion[:] = self.model.transition(h).dot(self._values)
+        after = self.model.transition(h).dot(self._values)
         if self._balance is not None:
-            self._balance.add(h, self.state.displacement - before, load, force)
+            self._balance.add(h, after[0::3] - self.state.displacement, load, force)
+        self._motion[:] = after
 
     def _x(self, time: float) -> float:
         return self.definition.start_position + self.definition.speed * (time - self._start_time)

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from master.batch.sweep import sweep_session
 from master.commands.command_options import add_verb, finite_number
 from master.errors import MasterError, UsageError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
@@ -28,9 +29,9 @@ from master.safety.safe_files import write_atomically
 
 def add_report(verbs: Any) -> None:
     """Declare ``report`` and its options."""
-    text = "write plots and report of a run again, with a measurement or a film on request"
+    text = "write plots and report of a run or a sweep again, with a measurement or a film of a run on request"
     parser = add_verb(verbs, "report", text, _report)
-    parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
+    parser.add_argument("run", type=Path, metavar="RUN", help="results folder of a run or a sweep")
     parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to compare with")
     parser.add_argument(
         "--measured-offset",
@@ -52,6 +53,8 @@ def _report(options: argparse.Namespace) -> int:
         raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
     if options.film:
         check_name(options.film)
+    if results_folder.made_by(options.run / sweep_session.JSON, sweep_session.GENERATOR):
+        return _report_sweep(options)
     results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
@@ -69,6 +72,16 @@ def _report(options: argparse.Namespace) -> int:
         print(_film(done, options))
     if measured is not None:
         _say_measured(measured)
+    return 0
+
+
+def _report_sweep(options: argparse.Namespace) -> int:
+    """Write the page and the charts of a sweep again."""
+    if options.measured or options.film or options.parquet:
+        text = "--measured, --film and --parquet are of a single run"
+        raise UsageError(f"{options.run} holds a sweep; {text}")
+    with _claimed(options.run):
+        print(*sweep_session.write_report(options.run), sep="\n")
     return 0
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from master.evaluation.measured_force import MeasuredComparison
+from master.report.charts.chart import Chart
 from master.report.charts.run_charts import file_charts
 from master.report.charts.static_figure import static_figure
 from master.report.run_page import page
@@ -21,9 +23,17 @@ def write(done: Results, measured: MeasuredComparison | None = None) -> Path:
     """Write the charts' files and ``report.html`` into the run's folder, and return the report's path."""
     path = done.folder / results_folder.REPORT
     write_atomically(path, page(done, measured).encode())
-    for name, charts in file_charts(done).items():
-        figure = static_figure(charts)
-        for ending, options in _FORMATS.items():
-            with atomic_file(done.folder / f"{name}.{ending}") as temporary:
-                figure.savefig(temporary, format=ending, **options)
+    write_charts(file_charts(done), done.folder)
     return path
+
+
+def write_charts(charts: Mapping[str, Sequence[Chart]], folder: Path) -> list[Path]:
+    """Write charts as PNG and SVG, those of a file one below the other, by the file's name; return the files."""
+    written = []
+    for name, each in charts.items():
+        figure = static_figure(each)
+        for ending, options in _FORMATS.items():
+            written.append(folder / f"{name}.{ending}")
+            with atomic_file(written[-1]) as temporary:
+                figure.savefig(temporary, format=ending, **options)
+    return written

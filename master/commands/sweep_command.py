@@ -18,7 +18,7 @@ from rich.status import Status
 from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sweep_plan import Keep, SweepRequest, stored_request
-from master.batch.sweep.sweep_session import CSV, JSON, PARQUET, PreparedSweep, SweepOutcome, SweepProgress, sweep
+from master.batch.sweep.sweep_session import CSV, JSON, PAGE, PARQUET, PreparedSweep, SweepOutcome, SweepProgress, sweep
 from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say
 from master.errors import UsageError
 from master.interface.scenario_runs import keep_apart
@@ -168,5 +168,7 @@ def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> Non
         for number, reason in list(done.failures.items())[:10]:
             console.print(f"run {number} failed: {reason}", markup=False, soft_wrap=True)
         files = [str(folder / name) for name in (CSV, PARQUET) if (folder / name).is_file()]
-        text = f"{len(done.finished)} runs, {len(done.failures)} failed; table: {', '.join(files)}"
+        text = (
+            f"{len(done.finished)} runs, {len(done.failures)} failed; page: {folder / PAGE}; table: {', '.join(files)}"
+        )
         console.print(text, markup=False, soft_wrap=True)

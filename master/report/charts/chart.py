@@ -227,15 +227,19 @@ def _scale_colour(share: float) -> str:
 
 
 def ink_on(colour: str) -> str:
-    """Return black or white, whichever can be read on a colour.
+    """Return black or white, whichever has the higher contrast to a colour (WCAG 2.1, relative luminance).
 
     Examples
     --------
     >>> ink_on("#fff7cd"), ink_on("#252d64")
     ('#000000', '#ffffff')
     """
-    red, green, blue = bytes.fromhex(colour[1:])
-    return "#000000" if 0.299 * red + 0.587 * green + 0.114 * blue > 140.0 else "#ffffff"
+    linear = (
+        v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4
+        for v in np.array([*bytes.fromhex(colour[1:])]) / 255
+    )
+    luminance = sum(w * v for w, v in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+    return "#000000" if (luminance + 0.05) ** 2 > 1.05 * 0.05 else "#ffffff"
 
 
 @dataclass(frozen=True)

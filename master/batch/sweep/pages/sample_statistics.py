@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from scipy import stats
 
-from master.arrays import BoolArray, FloatArray
+from master.arrays import BoolArray, FloatArray, IntArray
 
 #: Level of all confidence intervals.
 LEVEL: Final = 0.95
@@ -40,17 +40,24 @@ def share(count: int, total: int) -> Estimate:
     """
     if total == 0:
         return Estimate(math.nan, 0.0, 1.0)
+    low, high = _exact(np.array([count]), np.array([total]))
+    return Estimate(count / total, float(low[0]), float(high[0]))
+
+
+def _exact(count: IntArray, total: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of the exact intervals of shares."""
     tail = 0.5 * (1.0 - LEVEL)
-    low = float(stats.beta.ppf(tail, count, total - count + 1)) if count else 0.0
-    high = float(stats.beta.ppf(1.0 - tail, count + 1, total - count)) if count < total else 1.0
-    return Estimate(count / total, low, high)
+    low, high = np.zeros(len(count)), np.ones(len(count))
+    some, few = count > 0, count < total
+    low[some] = stats.beta.ppf(tail, count[some], (total - count + 1)[some])
+    high[few] = stats.beta.ppf(1.0 - tail, (count + 1)[few], (total - count)[few])
+    return low, high
 
 
 def running_share(happened: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the share after 1, 2, 3 ... samples and its interval's ends, each of shape (n,)."""
-    found = [share(int(k), n) for n, k in enumerate(np.cumsum(happened), 1)]
-    columns = np.array([(e.value, e.low, e.high) for e in found]).reshape(-1, 3)
-    return columns[:, 0], columns[:, 1], columns[:, 2]
+    count, total = np.cumsum(happened, dtype=np.intp), np.arange(1, len(happened) + 1)
+    return count / total, *_exact(count, total)
 
 
 def mean(values: FloatArray) -> Estimate:
@@ -67,10 +74,15 @@ def _half_width(count: int, deviation: float) -> float:
 
 
 def running_mean(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the mean after 1, 2, 3 ... samples and its interval's ends, each of shape (n,)."""
-    found = [mean(values[:n]) for n in range(1, len(values) + 1)]
-    columns = np.array([(e.value, e.low, e.high) for e in found]).reshape(-1, 3)
-    return columns[:, 0], columns[:, 1], columns[:, 2]
+    """Return the mean after 1, 2, 3 ... finite samples and its interval's ends (NaN for one), each of shape (n,)."""
+    count = np.arange(1.0, len(values) + 1.0)
+    shifted = values - values[:1]  # their squares then lose no digits
+    centre = np.cumsum(shifted) / count
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = np.maximum(np.cumsum(shifted**2) - count * centre**2, 0.0) / (count - 1.0)
+        half = stats.t.ppf(0.5 + 0.5 * LEVEL, count - 1.0) * np.sqrt(variance / count)
+    whole = centre + values[:1]
+    return whole, whole - half, whole + half
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from master.batch.sweep.pages import criticality, grid_charts, run_charts, sample_charts, sensitivity_charts
+from master.batch.sweep.pages import criticality, grid_charts, sample_charts, sensitivity_charts, variant_charts
 from master.batch.sweep.pages.force_bands import force_band
 from master.batch.sweep.pages.sweep_view import SweepView, SweptColumn, is_judged, level_text, levels
 from master.batch.sweep.sweep_run import Row
@@ -119,7 +119,7 @@ def _chapters(view: SweepView, pantograph: str, number: int) -> Iterator[Chapter
         if charts := grid_charts.curve_charts(view, rows, parameters, f"curve_{number}"):
             yield Chapter("curves", f"Over {view.short_names[parameters[0].title]}", (), tuple(charts))
     elif listed and not view.of_kind("sampled"):
-        yield Chapter("runs", "Run by run", (), tuple(run_charts.run_charts(view, rows, f"run_{number}")))
+        yield Chapter("runs", "Run by run", (), tuple(variant_charts.variant_charts(view, rows, f"run_{number}")))
     if view.of_kind("sampled"):
         yield from _samples(view, rows, others, (pantograph, number))
 
@@ -167,7 +167,7 @@ def _samples(
     yield Chapter("distributions", "Distribution of the figures", text, tuple(charts))
     if bands := _bands(view, {g: groups[g] for g in drawn}, name, number):
         yield Chapter("bands", "Contact force over the track", (), tuple(bands))
-    sampled = view.of_kind("sampled")
+    sampled = [p for p in view.of_kind("sampled") if not p.is_seed]
     found = {g: sensitivity_charts.effects_of(view, groups[g], sampled) for g in drawn}
     effects = [(g, f, e) for g, each in found.items() for f, e in each if e is not None]
     if effects:

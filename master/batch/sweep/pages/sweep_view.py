@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -37,8 +37,12 @@ _JUDGED_BY: Final = {
     "share of loss": "NQ (estimate)",
     "uplift": "uplift at supports",
 }
+_SEEDS: Final = "seed of random numbers"
 _DECIMALS: Final = {name: decimals for name, _, _, decimals in FIGURES}
 _TITLE: Final = re.compile(r"(.*?)(?: \[([^\]]*)\])?", re.DOTALL)
+
+#: A table has few speeds and many rows.
+_limits_at: Final = lru_cache(maxsize=1024)(limits_at)
 
 Kind = Literal["grid", "sampled", "listed"]
 
@@ -56,7 +60,7 @@ class SweptColumn:
     targets : tuple of str
         The parameters, ``component.parameter``, that take its values.
     distribution : str
-        As a user would write it, if it is sampled.
+        As a user would write it, if it is sampled; a seed is a sample however its values are listed.
     """
 
     title: str
@@ -68,6 +72,11 @@ class SweptColumn:
     def name(self) -> str:
         """Its name without the unit."""
         return split_title(self.title)[0]
+
+    @property
+    def is_seed(self) -> bool:
+        """Whether it is the seed of random numbers."""
+        return self.distribution == _SEEDS
 
 
 @dataclass(frozen=True)
@@ -203,7 +212,7 @@ class SweepView:
         speed = self._speed(row)
         if self.limits is None or speed is None:
             return -math.inf, math.inf
-        at = limits_at(speed / 3.6, self.limits)
+        at = _limits_at(speed / 3.6, self.limits)
         mean = row.get("mean [N]")
         sigma = at.sigma_share.value * mean if isinstance(mean, float) else math.nan
         return {
@@ -300,6 +309,8 @@ def view_of(data: Mapping[str, Any], rows: Sequence[Row], folder: Path | None = 
 
 def _column(data: Mapping[str, Any], request: Mapping[str, Any]) -> SweptColumn:
     sampled = data.get("sampled") or ""
+    if not sampled and str(data["name"]).rpartition(".")[2] == "seed":
+        sampled = _SEEDS  # what follows from a seed is random, whoever counts the seeds
     kind: Kind = "sampled" if sampled else "grid" if data["name"] in request.get("over", {}) else "listed"
     return SweptColumn(str(data["column"]), kind, tuple(data.get("targets", ())), sampled)
 

@@ -50,7 +50,7 @@ def view(rows, parameters, over=(), folder=None, status="complete", **more):
         "status": status,
         "date": "2026-01-01",
         "parameters": described,
-        "request": {"over": {name: "" for name in over}},
+        "request": {"over": dict.fromkeys(over, "")},
         "runs": runs,
         "finished": runs,
         "failures": failures,

@@ -10,7 +10,13 @@ from master.batch.sweep.pages.sample_statistics import linear_effects, mean, run
 
 #: Exact 95 % limits, in percent: tables of the binomial distribution by C. Lentner (ed.), Geigy Scientific Tables 2
 #: (1982), as many textbooks print them.
-TABLES = [(0, 10, 0.00, 30.85), (1, 10, 0.25, 44.50), (5, 10, 18.71, 81.29), (10, 10, 69.15, 100.0), (8, 100, 3.52, 15.16)]
+TABLES = [
+    (0, 10, 0.00, 30.85),
+    (1, 10, 0.25, 44.50),
+    (5, 10, 18.71, 81.29),
+    (10, 10, 69.15, 100.0),
+    (8, 100, 3.52, 15.16),
+]
 
 
 @pytest.mark.parametrize(("count", "total", "low", "high"), TABLES)

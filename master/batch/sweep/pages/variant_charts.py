@@ -16,7 +16,7 @@ from master.report.charts.chart import COLOURS, Axis, Chart, Part, Points
 _MOST_NAMES: Final = 12
 
 
-def run_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart]:
+def variant_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart]:
     """Return a chart for each figure, with a point for each run."""
     numbers = values_of(rows, "run")
     names = [str(row.get("variant") or level_text(row.get("run"))) for row in rows]

@@ -49,7 +49,7 @@ class Verb(NamedTuple):
     examples: tuple[str, ...]
 
 
-_MASTER: Final = "master.commands.main:carry_out"
+_MASTER: Final = "master.commands.verb_execution:carry_out"
 _MODELS: Final = "models.commands.physics_main:carry_out"
 _FMUS: Final = "fmus.__main__:carry_out"
 
@@ -277,6 +277,8 @@ def _worked(given: Sequence[str]) -> int:
         return 2
     if not verb.startswith("-") and verb not in VERBS:
         parser.error(f"there is no verb '{verb}'{_wanted_run(verb) or hint(verb, VERBS)}")
+    if (empty := _empty(given)) is not None:
+        parser.error(f"what comes after '{empty}' is empty: write it out, or set the shell variable that stands there")
     options, unknown = parser.parse_known_args(given)
     if unknown:
         options.parser.unknown(unknown)
@@ -284,6 +286,16 @@ def _worked(given: Sequence[str]) -> int:
     # The master says itself what it is at; of the physics, a factorisation may never come back to Python.
     with nullcontext() if execution == _MASTER else phase("computing"):
         return int(_named(execution)(options))
+
+
+def _empty(given: Sequence[str]) -> str | None:
+    """Return what stands before the first argument that is empty; None if none is."""
+    for before, text in zip(("openpanto", *given), given, strict=False):
+        if not text.strip():
+            return before
+        if re.fullmatch(r"--[a-z-]+=\s*", text):
+            return text
+    return None
 
 
 def _wanted_run(name: str) -> str:
@@ -452,7 +464,8 @@ def _original(kind: Any, given: str, load: Callable[[str], Any]) -> tuple[Path, 
 
     try:
         path = (catalogue.line_path if kind == "lines" else catalogue.pantograph_path)(given)
-        return path, path.read_text(encoding="utf-8"), load(str(path))
+        definition = load(str(path))  # says what is wrong with the file, if anything is
+        return path, path.read_text(encoding="utf-8"), definition
     except (catalogue.UnknownNameError, DefinitionError) as error:
         raise RequestError(str(error)) from error
     except UnicodeDecodeError as error:

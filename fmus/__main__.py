@@ -28,7 +28,7 @@ from fmus.builder.recipe import (
 from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
 from fmus.loader import doctor
 from fmus.loader.runtime import Runtime
-from models.definition_files.message_text import printable
+from models.definition_files.message_text import printable, said
 from models.library.search_path import search_path
 
 DEFAULT_FOLDER = Path("build/fmus")
@@ -51,7 +51,7 @@ def carry_out(options: argparse.Namespace) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        return _fail(f"{error.filename or 'standard output'}: {said(error)}")
     except MemoryError:
         return _fail("there is not enough memory; close other programs, or raise the limit (ulimit -v)")
     except KeyboardInterrupt:
@@ -171,11 +171,13 @@ def _examine(options: argparse.Namespace) -> int:
 
 def _recipes(names: Sequence[str], options: argparse.Namespace) -> list[Recipe]:
     # All names are looked up before anything is built: a typing mistake must not cost a build.
+    for folder in options.library or ():
+        if not folder.is_dir():
+            raise BuildError(f"--library {folder}: there is no such folder; check the name")
     folders = search_path(*(options.library or ()))
     found = [recipe(name, options.pantographs, folders, options.built_from) for name in names]
-    for text in dict.fromkeys(doubts(name, folders) for name in names):
-        if text:
-            print(f"note: {printable(text)}", file=sys.stderr)
+    for text in dict.fromkeys(text for name in names for text in doubts(name, folders)):
+        print(f"note: {printable(text)}", file=sys.stderr)
     return found
 
 

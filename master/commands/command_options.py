@@ -14,6 +14,7 @@ from rich.console import Console
 from master.batch.batch_session import Runner
 from master.errors import MasterError
 from master.report.progress import progress_shown
+from master.report.report_files import FORMATS
 from master.report.terminal_summary import Terminal
 from master.scenario.overrides import Overrides
 from master.ssp.run_settings import SCHEMES
@@ -49,6 +50,12 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
         metavar="COMPONENT.PARAMETER=VALUE",
         help="change a parameter",
     )
+
+
+def add_figures(parser: argparse.ArgumentParser) -> None:
+    """Declare the formats of the charts' files."""
+    text = "charts as png (the default) or svg; once for each format"
+    parser.add_argument("--figures", action="append", default=[], choices=tuple(FORMATS), help=text)
 
 
 def finite_number(text: str) -> float:

@@ -10,8 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from master.batch.sweep import sweep_session
-from master.commands.command_options import add_verb, finite_number
+from master.commands.command_options import add_figures, add_verb, finite_number
 from master.errors import MasterError, UsageError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
@@ -40,6 +39,7 @@ def add_report(verbs: Any) -> None:
         help="added to the measured positions [m] or times [s]; where they fall, the track position is D less them",
     )
     parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
+    add_figures(parser)
     parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
     parser.add_argument(
         "--magnify", type=float, default=8.0, metavar="N", help="of deformations in the film, default 8"
@@ -53,7 +53,7 @@ def _report(options: argparse.Namespace) -> int:
         raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
     if options.film:
         check_name(options.film)
-    if results_folder.made_by(options.run / sweep_session.JSON, sweep_session.GENERATOR):
+    if results_folder.made_by(options.run / "sweep.json", "openpanto sweep"):
         return _report_sweep(options)
     results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
@@ -64,7 +64,7 @@ def _report(options: argparse.Namespace) -> int:
         measured = _measured(done, options) if options.measured else None
         results_folder.write_forces(done.folder, done.signals)
         results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
-        print(report_files.write(done, measured))
+        print(report_files.write(done, measured, options.figures))
         if options.parquet:
             print(*parquet_export.write_parquet(done.folder), sep="\n")
     _warn_of_open_runs([done])
@@ -77,11 +77,13 @@ def _report(options: argparse.Namespace) -> int:
 
 def _report_sweep(options: argparse.Namespace) -> int:
     """Write the page and the charts of a sweep again."""
+    from master.batch.sweep import sweep_session  # takes longer than all that the report of a run needs
+
     if options.measured or options.film or options.parquet:
         text = "--measured, --film and --parquet are of a single run"
         raise UsageError(f"{options.run} holds a sweep; {text}")
     with _claimed(options.run):
-        print(*sweep_session.write_report(options.run), sep="\n")
+        print(*sweep_session.write_report(options.run, options.figures), sep="\n")
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from master.commands import report_commands
 from master.commands.command_options import (
+    add_figures,
     add_overrides,
     add_tolerance,
     add_verb,
@@ -47,6 +48,7 @@ def add_run(verbs: Any) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="results folder, default: results/NAME")
     parser.add_argument("--quiet", action="store_true", help="no progress bar, no tables")
     parser.add_argument("--no-report", action="store_true", help="no plots, no report.html")
+    add_figures(parser)
     parser.add_argument("--json", action="store_true", help="print summary.json instead of tables")
     parser.add_argument("--checkpoint", type=finite_number, metavar="T", help="write the whole state at time T to DIR")
     parser.add_argument(
@@ -93,6 +95,8 @@ def _run_overrides(options: argparse.Namespace) -> Overrides:
 
 def _run(options: argparse.Namespace) -> int:
     note = (lambda _: None) if options.quiet else say
+    if options.figures and options.no_report:
+        raise UsageError("--figures says how charts are written, which --no-report leaves out: omit one of them")
     run_options = _run_options(options)
     with open_scenario(options.scenario, _run_overrides(options), note, not options.no_build) as scenario:
         folder = _folder(options, scenario.system)
@@ -111,7 +115,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _show_results(done: Results, options: argparse.Namespace) -> None:
     if not options.no_report:
-        report_files.write(done)
+        report_files.write(done, formats=options.figures)
     if options.parquet:
         parquet_export.write_parquet(done.folder)
     if options.json:

@@ -17,8 +17,19 @@ from rich.status import Status
 
 from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
+from master.batch.sweep.sensitivity import SensitivityMethod
 from master.batch.sweep.sweep_plan import Keep, SweepRequest, stored_request
-from master.batch.sweep.sweep_session import CSV, JSON, PAGE, PARQUET, PreparedSweep, SweepOutcome, SweepProgress, sweep
+from master.batch.sweep.sweep_session import (
+    CSV,
+    JSON,
+    PAGE,
+    PARQUET,
+    SENSITIVITY_CSV,
+    PreparedSweep,
+    SweepOutcome,
+    SweepProgress,
+    sweep,
+)
 from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say
 from master.errors import UsageError
 from master.interface.scenario_runs import keep_apart
@@ -62,6 +73,8 @@ def _add_values(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=_count, metavar="N", help="number of samples of what varies")
     parser.add_argument("--seed", type=int, metavar="S", help="of the samples; default 1")
     parser.add_argument("--method", choices=get_args(Method), help="Latin hypercube (default) or Sobol sequence")
+    text = "which parameters matter: blocks of runs for Sobol indices, or Morris' trajectories; --samples says how many"
+    parser.add_argument("--sensitivity", choices=get_args(SensitivityMethod), help=text)
     parser.add_argument("--from-csv", type=Path, metavar="FILE", help="a row for each run, a column for each parameter")
     parser.add_argument("--static-force", metavar="'F0 N + c v^2'", help="static force over the speed v in km/h")
     parser.add_argument("--mean-force", metavar="'F0 N + c v^2'", help="mean force that the static force is found for")
@@ -94,6 +107,8 @@ def _sweep(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedSweep.of(scenario.system, request)
         if options.dry_run:
+            if text := prepared.announced:
+                note(text)
             Terminal(width=WIDTH).print(f"{len(prepared.outcome.runs)} run(s), all can be made", markup=False)
             return 0
         folder = options.out or Path("results") / "sweep" / scenario.system.name
@@ -113,6 +128,7 @@ def _request(options: argparse.Namespace) -> SweepRequest:
         "samples": options.samples,
         "seed": options.seed,
         "method": options.method,
+        "sensitivity": options.sensitivity,
         "table": options.from_csv,
         "stop": options.stop,
         "static_force": options.static_force,
@@ -167,8 +183,7 @@ def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> Non
         console = Terminal(width=WIDTH, highlight=False)
         for number, reason in list(done.failures.items())[:10]:
             console.print(f"run {number} failed: {reason}", markup=False, soft_wrap=True)
-        files = [str(folder / name) for name in (CSV, PARQUET) if (folder / name).is_file()]
-        text = (
-            f"{len(done.finished)} runs, {len(done.failures)} failed; page: {folder / PAGE}; table: {', '.join(files)}"
-        )
+        files = [str(folder / name) for name in (CSV, PARQUET, SENSITIVITY_CSV) if (folder / name).is_file()]
+        count = f"{len(done.finished)} runs, {len(done.failures)} failed"
+        text = f"{count}; page: {folder / PAGE}; table: {', '.join(files)}"
         console.print(text, markup=False, soft_wrap=True)

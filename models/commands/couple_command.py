@@ -19,6 +19,7 @@ from models.commands.physics_files import write_csv
 from models.commands.physics_options import (
     add_filter,
     add_settings,
+    check_folder,
     chosen_filter,
     finite,
     new_folder,
@@ -63,10 +64,11 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Run and print the contact-force figures."""
+    check_folder(arguments.out)
     check_step(arguments.step)
     chosen = chosen_filter(arguments)
     definition = load_line(arguments.line)
-    warn([doubts("lines", arguments.line), doubts("pantographs", arguments.pantograph)])
+    warn([*doubts("lines", arguments.line), *doubts("pantographs", arguments.pantograph)])
     definition = definition.with_values(settings(arguments.set, "line", definition))
     line = CatenaryModel(definition)
     way, speed = travelled(line, arguments.start, arguments.end), arguments.speed / 3.6

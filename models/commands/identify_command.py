@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.commands.physics_files import write_figure
+from models.commands.physics_files import check_figure, write_figure
 from models.commands.physics_options import print_table
 from models.definition_files.parameter import ParameterError
 from models.pantograph.identification import (
@@ -45,6 +45,8 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify and print the values with their standard deviations."""
+    if arguments.plot is not None:
+        check_figure(arguments.plot)
     response = read_response(arguments.response, arguments.kind)
     try:
         model = identify(response, arguments.stages, _all_fixed(arguments.fix))

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
 from models.commands import couple_command, identify_command, pantograph_command, statics_command
-from models.definition_files.message_text import printable
+from models.definition_files.message_text import printable, said
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import UnknownNameError
@@ -45,7 +45,7 @@ def carry_out(options: argparse.Namespace) -> int:
         if sys.stdout is not None:  # closed by the caller
             sys.stdout.flush()  # here, where an error can still be reported
     except OSError as error:
-        text = f"{error.filename or 'standard output'}: {error.strerror or error}"
+        text = f"{error.filename or 'standard output'}: {said(error)}"
         print(f"error: {printable(text)}", file=sys.stderr)
         return 1
     except _USER_ERRORS as error:

@@ -131,7 +131,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
 
 def warn(texts: Iterable[str]) -> None:
     """Print what deserves a second look; the command continues."""
-    for text in filter(None, texts):
+    for text in dict.fromkeys(filter(None, texts)):
         print(f"warning: {printable(text)}", file=sys.stderr)
 
 
@@ -139,3 +139,18 @@ def new_folder(path: Path) -> Path:
     """Create a folder for results (an existing one is used) and return it."""
     path.mkdir(parents=True, exist_ok=True)
     return path
+
+
+def check_folder(path: Path | None) -> None:
+    """Refuse, before anything is computed, a folder for results that cannot be made.
+
+    Raises
+    ------
+    ParameterError
+        If a file is in its way.
+    """
+    if path is None:
+        return
+    there = next(place for place in (path, *path.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise ParameterError(f"--out {path}: {there} is a file; name a folder, a new one or one of results")

@@ -11,7 +11,15 @@ import numpy as np
 from models.catenary.statics import rest_profile
 from models.commands import statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
-from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
+from models.commands.physics_options import (
+    add_settings,
+    check_folder,
+    new_folder,
+    positive,
+    print_table,
+    settings,
+    warn,
+)
 from models.interface.line_statics import LineStatics, at_rest
 from models.library.catalogue import doubts, load_line
 
@@ -31,6 +39,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
+    check_folder(arguments.out)
     result = analyse(arguments)
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
     print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
@@ -50,7 +59,7 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
         If the line has no such section or span.
     """
     definition = load_line(arguments.line)
-    warn([doubts("lines", arguments.line)])
+    warn(doubts("lines", arguments.line))
     definition = definition.with_values(settings(arguments.set, "line", definition))
     found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
     warn(found.warnings)

@@ -5,15 +5,18 @@ from __future__ import annotations
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 from master.batch.batch_session import BatchFiles, BatchState, run_tasks
 from master.batch.sweep.pages import sweep_page
 from master.batch.sweep.pages.sweep_view import read_view, view_of
+from master.batch.sweep.sensitivity import SensitivityIndices, described
+from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, sensitivity_data, sensitivity_of
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
@@ -31,6 +34,8 @@ CSV: Final = "sweep.csv"
 PARQUET: Final = "sweep.parquet"
 PAGE: Final = "sweep.html"
 GENERATOR: Final = "openpanto sweep"
+SENSITIVITY_CSV: Final = "sensitivity.csv"
+SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
@@ -104,6 +109,11 @@ class SweepOutcome(BatchState):
         """The table so far."""
         return table_rows(self.runs, self.found)
 
+    @cached_property
+    def sensitivity(self) -> tuple[SensitivityIndices, ...]:
+        """Indices of every figure that varies; none if they were not asked for, or as long as runs are missing."""
+        return sensitivity_of(self.request, self.plan, self.runs, self.found)
+
 
 def as_data(outcome: SweepOutcome) -> dict[str, Any]:
     """Return the contents of ``sweep.json``."""
@@ -142,7 +152,8 @@ class SweepFiles(BatchFiles[SweepOutcome]):
         if has_parquet() and state.found:
             write_parquet(state.rows, folder / PARQUET)
         if state.status != "running":
-            view = view_of(as_data(state), state.rows, folder)
+            indices = sensitivity_data(state.sensitivity)["indices"]
+            view = view_of(as_data(state), state.rows, folder, indices)
             results_folder.write_text(folder / PAGE, sweep_page.page(view))
         now = time.monotonic()
         self.__dict__["_due"] = now + max(_LEAST_PAUSE, (now - began) / _SHARE)
@@ -175,6 +186,14 @@ class PreparedSweep:
         plan = make_plan(base, request)
         runs = make_runs(base, plan, request)
         return cls(base, SweepOutcome(base.name, request, plan, runs, setting=scenario_setting(base, plan)))
+
+    @property
+    def announced(self) -> str:
+        """Why there are as many runs as there are, empty if that is plain."""
+        request, plan = self.outcome.request, self.outcome.plan
+        if request.sensitivity is None:
+            return ""
+        return described(request.sensitivity, len(plan.parameters), request.samples or 0)
 
 
 def sweep(
@@ -228,26 +247,43 @@ def sweep(
                     found[result.key] = result  # a copy each time would be long for many runs
                     return so_far
 
+                if why := prepared.announced:
+                    tell(why)
                 with chosen.opened(prepared.base, place) as make_runs_of:
                     tell(_announcement(prepared.base, missing, len(state.runs), chosen.width))
                     results = _shown(make_runs_of, missing, state, chosen, show)
-                    return run_tasks(state, results, finish, files, folder)
+                    ended = run_tasks(state, results, finish, files, folder)
+                _write_sensitivity(ended, folder, tell)
+                return ended
     except (InterruptedRunError, KeyboardInterrupt) as error:
         done = f"{len([r for r in state.runs if r.key in found])} of {len(state.runs)} runs are finished"
         raise InterruptedRunError(f"interrupted. {done} and in {folder}; the same command makes the others") from error
 
 
-def write_report(folder: Path) -> list[Path]:
-    """Write the page of the sweep in a folder again, and its charts as files; return their paths.
+def write_report(folder: Path, formats: Collection[str] = ()) -> list[Path]:
+    """Write the page of the sweep in a folder again, and its charts as files in some formats; return their paths.
 
     Raises
     ------
     MasterError
         If its files cannot be read.
     """
-    view = read_view(folder / JSON, folder / CSV)
+    view = read_view(folder / JSON, folder / CSV, folder / SENSITIVITY_JSON)
     results_folder.write_text(folder / PAGE, sweep_page.page(view))
-    return [folder / PAGE, *write_charts(sweep_page.file_charts(view), folder)]
+    return [folder / PAGE, *write_charts(sweep_page.file_charts(view), folder, formats)]
+
+
+def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], None]) -> None:
+    """Write the indices of a finished sweep; those of an earlier one are not left beside its table."""
+    found = done.sensitivity
+    if not found:
+        for name in (SENSITIVITY_CSV, SENSITIVITY_JSON):
+            (folder / name).unlink(missing_ok=True)
+    else:
+        results_folder.write_text(folder / SENSITIVITY_CSV, sensitivity_csv(found))
+        results_folder.write_json(folder / SENSITIVITY_JSON, sensitivity_data(found))
+    if text := failed_note(done.request, found, len(done.failures)):
+        tell(text)
 
 
 def _remove_leftovers(place: RunPlace) -> None:

@@ -97,7 +97,8 @@ def index_chart(data: Mapping[str, Any], key: str) -> Chart:
     more = f" {len(order)} of {len(names)} parameters." if len(names) > len(order) else ""
     axis = Axis("elementary effects" if is_morris else "share of variance", unit if is_morris else "")
     title = f"{str(data['method']).capitalize()} indices of {data['figure']}"
-    text = f"{note} Lines: bootstrap intervals.{more}"
+    left_out = f", {data['left_out']} left out" if data.get("left_out") else ""
+    text = f"{note} Lines: 95 % bootstrap intervals; {data.get('blocks', 0)} blocks{left_out}.{more}"
     height = _height(len(order), 46)
     return Chart(key, title, axis, _names([names[k] for k in order]), tuple(parts), text, height=height)
 

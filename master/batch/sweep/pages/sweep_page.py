@@ -34,6 +34,10 @@ _EFFECTS: Final = (
     "Change of the figure when a parameter goes from its 5 % to its 95 % quantile and the others stay, from a linear "
     "regression of the samples, with its 95 % interval; beside it Spearman's rank correlation."
 )
+_DESIGN: Final = (
+    "The runs are a design for these indices and no independent samples: they have no shares, and no distributions."
+)
+_NO_INDICES: Final = "None: runs are missing, no figure varies, or too few blocks of runs are complete."
 _FAULTS: Final = (
     "Each fault by itself, against the line without any; ranked by the change of the maximum. Combinations of faults "
     "are in the table of runs alone."
@@ -95,11 +99,20 @@ def chapters(view: SweepView) -> list[Chapter]:
         found += [
             Chapter(f"{c.key}{key}", f"{c.title}{name}", c.text, c.charts) for c in _chapters(view, pantograph, number)
         ]
+    if view.request.get("sensitivity") and not view.indices:
+        return [*found, Chapter("indices", "Indices of sensitivity", (f"<p class='note'>{_NO_INDICES}</p>",))]
     charts = tuple(
         sensitivity_charts.index_chart(data, f"indices_{k}")
         for k, data in enumerate(view.indices[: sensitivity_charts.MOST_INDICES])
     )
-    return [*found, *([Chapter("indices", "Indices of sensitivity", (), charts)] if charts else [])]
+    return [
+        *found,
+        *(
+            [Chapter("indices", "Indices of sensitivity", (f"<p class='note'>{_DESIGN}</p>",), charts)]
+            if charts
+            else []
+        ),
+    ]
 
 
 def _chapters(view: SweepView, pantograph: str, number: int) -> Iterator[Chapter]:
@@ -120,7 +133,7 @@ def _chapters(view: SweepView, pantograph: str, number: int) -> Iterator[Chapter
             yield Chapter("curves", f"Over {view.short_names[parameters[0].title]}", (), tuple(charts))
     elif listed and not view.of_kind("sampled"):
         yield Chapter("runs", "Run by run", (), tuple(variant_charts.variant_charts(view, rows, f"run_{number}")))
-    if view.of_kind("sampled"):
+    if view.of_kind("sampled") and not view.request.get("sensitivity"):
         yield from _samples(view, rows, others, (pantograph, number))
 
 
@@ -226,7 +239,12 @@ def _parameter_rows(view: SweepView) -> Iterator[tuple[str, str]]:
         yield p.title, f"{p.distribution}: {len(found)} values" if p.distribution else text
     names = {"samples": "samples", "seed": "seed", "method": "method of sampling", "static_force": "static force"}
     is_sampled = any(p.distribution for p in view.parameters)
-    for key, name in {**names, "mean_force": "mean force wanted", "stop": "stop time [s]"}.items():
+    for key, name in {
+        **names,
+        "sensitivity": "sensitivity",
+        "mean_force": "mean force wanted",
+        "stop": "stop time [s]",
+    }.items():
         if view.request.get(key) is not None and (is_sampled or key not in ("seed", "method")):
             yield name, str(view.request[key])
     if view.limits is not None:

@@ -141,7 +141,7 @@ class SweepView:
     folder : Path, optional
         Holds the runs that were kept.
     indices : tuple of dict
-        Indices of sensitivity, as in ``sweep.json``.
+        Indices of sensitivity, as in ``sensitivity.json``.
     """
 
     scenario: str
@@ -282,8 +282,13 @@ def _figure(title: str) -> Figure:
     return Figure(title, name, "" if unit == "1" else unit, _DECIMALS.get(name, 4))
 
 
-def view_of(data: Mapping[str, Any], rows: Sequence[Row], folder: Path | None = None) -> SweepView:
-    """Return the view of a sweep from the contents of its ``sweep.json`` and its table."""
+def view_of(
+    data: Mapping[str, Any],
+    rows: Sequence[Row],
+    folder: Path | None = None,
+    indices: Sequence[Mapping[str, Any]] = (),
+) -> SweepView:
+    """Return the view of a sweep from the contents of ``sweep.json``, its table, and its indices of sensitivity."""
     request, setting = data.get("request", {}), data.get("setting", {})
     limits = setting.get("limits")
     interval = setting.get("interval") or (None, None)
@@ -303,7 +308,7 @@ def view_of(data: Mapping[str, Any], rows: Sequence[Row], folder: Path | None = 
         contacts=setting.get("contacts", {}),
         places=setting.get("places", {}),
         folder=folder,
-        indices=tuple(data.get("sensitivity", ())),
+        indices=tuple(indices),
     )
 
 
@@ -315,7 +320,7 @@ def _column(data: Mapping[str, Any], request: Mapping[str, Any]) -> SweptColumn:
     return SweptColumn(str(data["column"]), kind, tuple(data.get("targets", ())), sampled)
 
 
-def read_view(json_file: Path, csv_file: Path) -> SweepView:
+def read_view(json_file: Path, csv_file: Path, indices_file: Path) -> SweepView:
     """Return the view of a sweep from its files.
 
     Raises
@@ -327,7 +332,10 @@ def read_view(json_file: Path, csv_file: Path) -> SweepView:
         data = json.loads(json_file.read_text(encoding="utf-8"))
         titles = [str(p["column"]) for p in data["parameters"]]
         rows = _read_rows(csv_file, titles) if csv_file.is_file() else []
-        return view_of(data, rows, json_file.parent)
+        is_whole = data["status"] == "complete" and data.get("request", {}).get("sensitivity")
+        has_indices = is_whole and indices_file.is_file()
+        indices = json.loads(indices_file.read_text(encoding="utf-8"))["indices"] if has_indices else []
+        return view_of(data, rows, json_file.parent, indices)
     except OSError as error:
         raise MasterError(f"{error.filename} cannot be read: {error.strerror}") from error
     except (ValueError, LookupError, TypeError, AttributeError, csv.Error, RecursionError) as error:

@@ -1,6 +1,8 @@
 """Long counts: a thousand runs complete, and a worker does not grow over five hundred."""
 
+import numpy as np
 import pytest
+from scipy import stats
 
 from tests.master.batch.sweep.conftest import journal
 
@@ -26,3 +28,25 @@ def test_a_thousand_runs_complete_and_five_hundred_do_not_grow(swept, tmp_path):
     stiffness = [row["catenary.stiffness"] for row in done.rows]
     mean = sum(stiffness) / 1000
     assert abs(mean - 5000.0) < 2.576 * 100.0 / 1000**0.5
+
+
+def test_the_published_indices_of_the_ishigami_function_by_workers(ishigami_swept):
+    angles = {f"f.x{k}": "uniform(-3.141592653589793, 3.141592653589793)" for k in (1, 2, 3)}
+    done = ishigami_swept("out", DaskEngine(jobs=2), vary=angles, samples=128, sensitivity="sobol")
+    assert (len(done.rows), done.failures) == (640, {})
+    (found,) = [i for i in done.sensitivity if i.figure == "f.y end"]
+    published = {"first": (0.3139, 0.4424, 0.0), "total": (0.5576, 0.4424, 0.2437)}
+    for kind, values in published.items():
+        for value, (low, high) in zip(values, getattr(found, f"{kind}_interval"), strict=True):
+            assert low <= value <= high
+            assert high - low < 0.8
+
+
+def test_a_normal_sample_comes_back_through_workers(swept):
+    """99 % intervals of the mean and of the standard deviation, from the table of runs that workers made."""
+    n, sd = 256, 100.0
+    samples = {"vary": {"catenary.stiffness": f"normal(5000, {sd})"}, "samples": n, "seed": 11}
+    values = np.array([row["catenary.stiffness"] for row in swept("out", DaskEngine(jobs=2), **samples).rows])
+    assert abs(values.mean() - 5000.0) < 2.576 * sd / n**0.5
+    low, high = stats.chi2.ppf([0.005, 0.995], n - 1)
+    assert low < (n - 1) * values.var(ddof=1) / sd**2 < high

@@ -37,7 +37,7 @@ def failure(run, inputs, reason):
     return {"run": float(run), **inputs, "stop time [s]": 7.0, "key": f"k{run}", "status": "failed", "reason": reason}
 
 
-def view(rows, parameters, over=(), folder=None, status="complete", **more):
+def view(rows, parameters, over=(), folder=None, status="complete", indices=(), **more):
     """The view of a table; parameters by title: the distribution, or an empty text."""
     described = [
         {"name": t.split(" [")[0], "column": t, "targets": [f"front.{t.split(' [')[0]}"], "sampled": d or None}
@@ -57,7 +57,7 @@ def view(rows, parameters, over=(), folder=None, status="complete", **more):
         "setting": SETTING,
         **more,
     }
-    return view_of(data, rows, folder)
+    return view_of(data, rows, folder, indices)
 
 
 def grid_rows(speeds, tensions):

@@ -113,7 +113,7 @@ def test_names_cannot_act_on_the_page():
 
 
 def test_five_hundred_runs_are_a_page_of_bounded_size():
-    many = view(sample_rows(5000), SAMPLED, sensitivity=[indices(30)] * 40)
+    many = view(sample_rows(5000), SAMPLED, indices=[indices(30)] * 40)
     html = page(many)
     assert f"The first {MOST_ROWS} of 5000 rows; sweep.csv has all." in html
     assert html.count("<tr>") < MOST_ROWS + 100
@@ -125,6 +125,6 @@ def test_five_hundred_runs_are_a_page_of_bounded_size():
 
 
 def test_indices_have_a_chapter_of_their_own(grid):
-    found = view(grid.rows, {}, sensitivity=[indices(), indices(method="morris")])
+    found = view(grid.rows, {}, indices=[indices(), indices(method="morris")])
     (chapter,) = (c for c in chapters(found) if c.key == "indices")
     assert [c.title for c in chapter.charts] == ["Sobol indices of sigma", "Morris indices of sigma"]

@@ -15,8 +15,21 @@ from tests.master.batch.sweep.pages.conftest import failure, row, view
 def test_files_give_the_same_view_as_the_sweep(swept, tmp_path):
     done = swept(over={"catenary.stiffness": "4000,5000"}, vary={"speed": "uniform(40, 60)"}, samples=2)
     folder = tmp_path / "out"
-    assert page(read_view(folder / "sweep.json", folder / "sweep.csv")) == (folder / "sweep.html").read_text()
+    assert (
+        page(read_view(folder / "sweep.json", folder / "sweep.csv", folder / "sensitivity.json"))
+        == (folder / "sweep.html").read_text()
+    )
     assert page(view_of(as_data(done), done.rows, folder)) == (folder / "sweep.html").read_text()
+
+
+def test_indices_are_on_the_page_of_the_sweep_and_of_its_files(swept, tmp_path):
+    vary = {"catenary.stiffness": "uniform(4000, 6000)", "static_force": "uniform(100, 160)"}
+    swept(vary=vary, samples=4, sensitivity="morris")
+    folder = tmp_path / "out"
+    html = (folder / "sweep.html").read_text()
+    assert "Morris indices of mean" in html
+    assert "How many samples fail a limit" not in html
+    assert page(read_view(folder / "sweep.json", folder / "sweep.csv", folder / "sensitivity.json")) == html
 
 
 def test_the_setting_names_speeds_contacts_and_the_interval(swept, toy_system):
@@ -30,7 +43,7 @@ def test_the_setting_names_speeds_contacts_and_the_interval(swept, toy_system):
 def test_damaged_files_are_a_sentence(tmp_path, text):
     (tmp_path / "sweep.json").write_text(text)
     with pytest.raises(MasterError, match="holds no sweep that can be read"):
-        read_view(tmp_path / "sweep.json", tmp_path / "sweep.csv")
+        read_view(tmp_path / "sweep.json", tmp_path / "sweep.csv", tmp_path / "s.json")
 
 
 def test_a_damaged_table_is_a_sentence(swept, tmp_path):
@@ -38,7 +51,7 @@ def test_a_damaged_table_is_a_sentence(swept, tmp_path):
     table = tmp_path / "out" / "sweep.csv"
     table.write_text(table.read_text() + "3,4\n")
     with pytest.raises(MasterError, match="holds no sweep that can be read"):
-        read_view(tmp_path / "out" / "sweep.json", table)
+        read_view(tmp_path / "out" / "sweep.json", table, table)
 
 
 def test_whole_numbers_are_numbers_and_words_are_texts():
@@ -83,7 +96,7 @@ def test_a_setting_of_own_limits_is_read(tmp_path):
     data = {"scenario": "x", "status": "complete", "date": "", "parameters": [], "runs": 1, "finished": 1}
     data["setting"] = {"limits": {"supply": "DC3", "own": {"maximum": 222.0}}, "speeds": {"front": 100.0}}
     (tmp_path / "sweep.json").write_text(json.dumps(data))
-    found = read_view(tmp_path / "sweep.json", tmp_path / "sweep.csv")
+    found = read_view(tmp_path / "sweep.json", tmp_path / "sweep.csv", tmp_path / "s.json")
     assert found.limits.supply == "DC3"
     assert found.limits.own.maximum == 222.0
     assert found.rows == ()

@@ -35,6 +35,7 @@ WHOLE = {
     "master/results/parquet_export.py": {"_write"},
     "master/batch/sweep/sweep_table.py": {"write_parquet"},
     "master/report/film_file.py": {"write_film"},
+    "master/fmu/kept_fingerprints.py": {"keep_answer"},
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_atomically", "write_csv", "write_figure"},
     "models/numerics/kernel_cache.py": None,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -23,10 +22,9 @@ from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
 from master.batch.sweep.sweep_run import WORK, Row, RunPlace, SweepResult
 from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
-from master.errors import InterruptedRunError, MasterError
+from master.errors import InterruptedRunError
 from master.report.report_files import write_charts
 from master.results import results_folder
-from master.run_session import run as run_system
 from master.system.components import System
 
 JSON: Final = "sweep.json"
@@ -250,7 +248,7 @@ def sweep(
                 if why := prepared.announced:
                     tell(why)
                 with chosen.opened(prepared.base, place) as make_runs_of:
-                    tell(_announcement(prepared.base, missing, len(state.runs), chosen.width))
+                    tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     ended = run_tasks(state, results, finish, files, folder)
                 _write_sensitivity(ended, folder, tell)
@@ -315,36 +313,28 @@ def _shown(
         show(SweepProgress(done, failed, min(engine.width, open_runs), total, left))
 
 
-def _announcement(base: System, missing: Sequence[SweepRun], total: int, width: int) -> str:
+def _announcement(make: MakeRuns, start: float, missing: Sequence[SweepRun], total: int, engine: SweepEngine) -> str:
     """Return how many runs there are to make, and how long that may take."""
     if not missing:
         return f"{total} runs, all finished"
     begun = f"{total} runs" if len(missing) == total else f"{total} runs, {len(missing)} of them missing"
     if any(r.target is not None for r in missing):
         return f"{begun}; the static force of each is found in several trials"
-    try:
-        each = _rehearsed(base, missing)
-    except InterruptedRunError:
-        raise
-    except MasterError:  # the run itself will say so
+    each = _rehearsed(make, start, missing)
+    if each is None:  # the runs themselves will say why
         return begun
-    about = duration(each * -(-len(missing) // width))
-    return f"{begun}, {min(width, len(missing))} at a time, about {about}"
+    about = duration(each * -(-len(missing) // engine.width))
+    return f"{begun}, {min(engine.width, len(missing))} at a time, about {about}"
 
 
-def _rehearsed(base: System, missing: Sequence[SweepRun]) -> float:
-    """Return about how long a run takes on average [s]: from the first steps of the middle one."""
-    middle = missing[len(missing) // 2]
-    system = middle.system(base)
-    steps = min(system.step_count, _REHEARSED)
-    short = replace(system, stop=system.start + steps * system.step, may_stop_early=True)
-    with tempfile.TemporaryDirectory(prefix="sweep-") as name:
-        began = time.perf_counter()
-        done = run_system(short, Path(name) / "rehearsal")
-        whole = time.perf_counter() - began
-    stepping = float(done.summary["performance"]["wall_time"])
-    mean = sum((r.stop - base.start) / r.step for r in missing) / len(missing)
-    return whole - stepping + stepping / steps * mean
+def _rehearsed(make: MakeRuns, start: float, missing: Sequence[SweepRun]) -> float | None:
+    """Return about how long a run takes on average [s], from the first steps of the middle one; None if they fail."""
+    short = missing[len(missing) // 2].rehearsal(start, _REHEARSED)
+    done = next(iter(make([short])))
+    if not done.stepping:
+        return None
+    mean = sum((r.stop - start) / r.step for r in missing) / len(missing)
+    return done.seconds - done.stepping + done.stepping * mean * short.step / (short.stop - start)
 
 
 def duration(seconds: float) -> str:

@@ -18,7 +18,7 @@ from master.batch.sweep.sweep_session import PreparedSweep, sweep
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from tests.foreign_fmus import component, connector, ssd, system
-from tests.master.conftest import SSV, ssd_text
+from tests.master.conftest import CATENARY, SSV, ssd_text
 
 ROOT = Path(__file__).parents[4]
 GRID = ("--over", "speed=40,50,60", "--over", "catenary.stiffness=4000:6000:1000")
@@ -86,6 +86,27 @@ def command(toy, tmp_path):
         if process.poll() is None:
             process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def ending_toy(toy, tmp_path):
+    """Function that gives the toy scenario a line that does something instead of failing; returns the scenario."""
+
+    def made(instead):
+        source = CATENARY.replace('raise RuntimeError("the wire broke at 100 percent load")', instead)
+        assert source != CATENARY
+        script = tmp_path / "ending_toy.py"
+        script.write_text(source)
+        shutil.copy(FmuBuilder.build_FMU(script, dest=tmp_path), toy / "resources" / "ToyCatenary.fmu")
+        return toy
+
+    return made
+
+
+@pytest.fixture
+def exiting_toy(ending_toy):
+    """The toy scenario with a line whose FMU ends its process instead of failing."""
+    return ending_toy("import os; os._exit(3)")
 
 
 def ended(process, seconds=120):

@@ -119,6 +119,12 @@ VERBS: Final[Mapping[str, Verb]] = {
             "sweep demo --samples 200 --vary 'catenary.contact_wire.tension=normal(20kN, 0.2kN)' --jobs 4",
         ),
     ),
+    "optimise": Verb(
+        "find the values of a few parameters for which a figure is least or greatest",
+        "master.commands.verb_options:add_optimise",
+        _MASTER,
+        ("optimise cx_ln2 --minimise sigma --vary 'pantograph.stage[3].stiffness=2:12kN/m' --subject-to mean=157N",),
+    ),
     "compare": Verb(
         "show two or more runs side by side",
         "master.commands.verb_options:add_compare",

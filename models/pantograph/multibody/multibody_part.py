@@ -13,7 +13,7 @@ from models.numerics.extrapolation import ForceExtrapolation, lead_of
 from models.pantograph.multibody.analysis.mechanism_statics import equilibrium, settle_springs
 from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_advice import working_height_warning
+from models.pantograph.multibody.mechanism_advice import mechanism_warning, working_height_warning
 from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
@@ -150,6 +150,11 @@ class MultibodyPantographPart:
         """Say so if the wire above the start, at (x, z) [m], is higher than the lifting value is for."""
         built = self._ready()
         return working_height_warning(built.mechanism, built.standing, x, z)
+
+    def mechanism_warning(self) -> str:
+        """Say so if the mechanism has motions too many, or some that grow."""
+        built = self._ready()
+        return mechanism_warning(built.mechanism, built.standing)
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""

@@ -60,7 +60,7 @@ class ForceElements:
     numbers : dict
         Body name -> number.
     orientations : ndarray, shape (n, 3, 3)
-        Orientations as written: where a bushing is untwisted.
+        Orientations as written: where a bushing is untwisted until ``untwist`` is told those as assembled.
     pool : VectorPool
         Takes the vectors of the elements; to be closed before ``compile``.
 
@@ -99,6 +99,12 @@ class ForceElements:
         """Work out where everything comes from."""
         for elements in (self.lines, self._moments, self._slides):
             elements.compile(pool)
+
+    def untwist(self, orientations: FloatArray) -> None:
+        """Take the bodies' orientations, shape (n, 3, 3), as those in which no bushing is twisted."""
+        for element in self._others:
+            if isinstance(element, _Bushing):
+                element.untwist(orientations)
 
     def loads(self, kinematics: Kinematics, vectors: MovingVectors, w: FloatArray, lift: float) -> FloatArray:
         """Return the loads of all elements.
@@ -330,9 +336,13 @@ class _Bushing:
     def __init__(self, force: Bushing, numbers: dict[str, int], orientations: FloatArray) -> None:
         self._i, self._j = numbers[force.body_i], numbers[force.body_j]
         self._s_i, self._s_j = np.array(force.point_i), np.array(force.point_j)
-        self._rest = orientations[self._i].T @ orientations[self._j]
+        self.untwist(orientations)
         self._k, self._c = np.array(force.translation_stiffness), np.array(force.translation_damping)
         self._kr, self._cr = np.array(force.rotation_stiffness), np.array(force.rotation_damping)
+
+    def untwist(self, orientations: FloatArray) -> None:
+        """Take the relative orientation in which the bushing carries no moment."""
+        self._rest = orientations[self._i].T @ orientations[self._j]
 
     def loads(self, kinematics: Kinematics, w: FloatArray) -> FloatArray:
         frames, origins = kinematics.frames, kinematics.origins

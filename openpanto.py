@@ -132,7 +132,7 @@ VERBS: Final[Mapping[str, Verb]] = {
         ("compare results/demo results/20kN", "compare results/demo results/20kN --report compare.html"),
     ),
     "report": Verb(
-        "write plots and report of a run again, with a measurement or a film on request",
+        "write plots and report of a run or a sweep again, with a measurement or a film of a run on request",
         "master.commands.verb_options:add_report",
         _MASTER,
         ("report results/demo", "report results/demo --measured force.csv --film run.mp4"),

@@ -32,6 +32,8 @@ def report_verb(options: argparse.Namespace) -> int:
         raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
     if options.film:
         check_name(options.film)
+    if results_folder.made_by(options.run / "sweep.json", "openpanto sweep"):
+        return _report_sweep(options)
     results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
@@ -49,6 +51,18 @@ def report_verb(options: argparse.Namespace) -> int:
         print(_film(done, options))
     if measured is not None:
         _say_measured(measured)
+    return 0
+
+
+def _report_sweep(options: argparse.Namespace) -> int:
+    """Write the page and the charts of a sweep again."""
+    from master.batch.sweep import sweep_session  # takes longer than all that the report of a run needs
+
+    if options.measured or options.film or options.parquet:
+        text = "--measured, --film and --parquet are of a single run"
+        raise UsageError(f"{options.run} holds a sweep; {text}")
+    with _claimed(options.run):
+        print(*sweep_session.write_report(options.run, options.figures), sep="\n")
     return 0
 
 

@@ -80,6 +80,7 @@ ONLY_IN = {
     "pythonfmu": lambda name: name.startswith("fmus."),
     "dask": lambda name: name == "master.batch.sweep.dask_engine",
     "distributed": lambda name: name == "master.batch.sweep.dask_engine",
+    "SALib": lambda name: name == "master.batch.sweep.sensitivity",
     "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.", "master.interface.")),
     "pandas": lambda name: name.startswith(("models.interface.", "master.interface.")),
 }

@@ -82,7 +82,7 @@ def test_copies_of_definitions_lie_in_the_project_and_are_found_there(call, tmp_
             "new d --line LN2 --pantograph DSA --speed 250",
             "no pantograph 'DSA' in the library; .* did you mean 'DSA380'?",
         ),
-        ("new d --line nix.toml --pantograph CX --speed 250", "nix.toml: No such file or directory"),
+        ("new d --line nix.toml --pantograph CX --speed 250", "nix.toml: there is no such file; .*"),
         ("new d --line LN2 --pantograph nix.fmu --speed 250", "nix.fmu: there is no such FMU"),
         ("new d --line bad.toml --pantograph CX --speed 250", r"bad.toml: type: is missing(\nbad.toml: .*)+"),
         ("new d --line binary.toml --pantograph CX --speed 250", "binary.toml.*"),

@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from master.commands.command_options import add_figures, add_verb, finite_number
 from master.errors import MasterError, UsageError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
@@ -26,28 +25,7 @@ from master.safety import folder_lock
 from master.safety.safe_files import write_atomically
 
 
-def add_report(verbs: Any) -> None:
-    """Declare ``report`` and its options."""
-    text = "write plots and report of a run again, with a measurement or a film on request"
-    parser = add_verb(verbs, "report", text, _report)
-    parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
-    parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to compare with")
-    parser.add_argument(
-        "--measured-offset",
-        type=finite_number,
-        metavar="D",
-        help="added to the measured positions [m] or times [s]; where they fall, the track position is D less them",
-    )
-    parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
-    add_figures(parser)
-    parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
-    parser.add_argument(
-        "--magnify", type=float, default=8.0, metavar="N", help="of deformations in the film, default 8"
-    )
-    parser.add_argument("--parquet", action="store_true", help="also write the time series as Parquet")
-
-
-def _report(options: argparse.Namespace) -> int:
+def report_verb(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is asked for."""
     if options.measured_offset is not None and not options.measured:
         raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
@@ -129,16 +107,7 @@ def _film(done: Results, options: argparse.Namespace) -> Path:
     return write_film(movie, options.film, FilmOptions(options.magnify, start=start, end=end))
 
 
-def add_compare(verbs: Any) -> None:
-    """Declare ``compare`` and its options."""
-    parser = add_verb(verbs, "compare", "show two or more runs side by side", _compare)
-    parser.add_argument("first", type=Path, metavar="RUN", help="results folder")
-    parser.add_argument("others", type=Path, metavar="RUN", nargs="+", help="results folders")
-    parser.add_argument("--report", type=Path, metavar="FILE", help="write a report in HTML")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-
-
-def _compare(options: argparse.Namespace) -> int:
+def compare_verb(options: argparse.Namespace) -> int:
     """Compare runs with the first one."""
     runs = [run_results.read(folder) for folder in (options.first, *options.others)]
     _warn_of_open_runs(runs)

@@ -10,16 +10,23 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
 
 from rich.console import Console
 from rich.status import Status
 
-from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
-from master.batch.sweep.sweep_plan import Keep, SweepRequest, stored_request
-from master.batch.sweep.sweep_session import CSV, JSON, PARQUET, PreparedSweep, SweepOutcome, SweepProgress, sweep
-from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say
+from master.batch.sweep.sweep_plan import SweepRequest, stored_request
+from master.batch.sweep.sweep_session import (
+    CSV,
+    JSON,
+    PARQUET,
+    SENSITIVITY_CSV,
+    PreparedSweep,
+    SweepOutcome,
+    SweepProgress,
+    sweep,
+)
+from master.commands.command_options import overrides_of, say
 from master.errors import UsageError
 from master.interface.scenario_runs import keep_apart
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
@@ -30,62 +37,7 @@ from master.scenario.scenario_place import located
 _LINES = 30.0
 
 
-def add_sweep(verbs: Any) -> None:
-    """Declare ``sweep`` and its options."""
-    parser = add_verb(
-        verbs, "sweep", "run a scenario over a grid, a sample or a table of values", _sweep, scenario=True
-    )
-    _add_values(parser)
-    add_overrides(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: results/sweep/NAME")
-    parser.add_argument(
-        "--keep", choices=get_args(Keep), help="what stays of the runs beside the table; default: figures"
-    )
-    parser.add_argument("--jobs", type=_count, metavar="N", help="make N runs at a time, in processes of this computer")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="make the runs on the workers of this Dask scheduler")
-    parser.add_argument("--memory-limit", default="auto", metavar="SIZE", help="of each process with --jobs, e.g. 2GB")
-    parser.add_argument(
-        "--renew-after", type=_count, default=200, metavar="K", help="runs after which a process is renewed"
-    )
-    parser.add_argument("--again", action="store_true", help="also make the runs again that failed")
-    parser.add_argument("--dry-run", action="store_true", help="check everything and say how many runs there are")
-    parser.add_argument("--quiet", action="store_true", help="no progress; files and exit code only")
-    parser.add_argument("--json", action="store_true", help=f"print {JSON}")
-
-
-def _add_values(parser: argparse.ArgumentParser) -> None:
-    def assigned(option: str, values: str, text: str) -> None:
-        parser.add_argument(option, action="append", default=[], type=_assignment, metavar=f"NAME={values}", help=text)
-
-    assigned("--over", "A,B,..|FIRST:LAST:STEP", "values of a grid; may be repeated")
-    assigned("--vary", "DISTRIBUTION", "e.g. normal(20kN, 0.2kN), uniform(a, b); needs --samples; may be repeated")
-    parser.add_argument("--samples", type=_count, metavar="N", help="number of samples of what varies")
-    parser.add_argument("--seed", type=int, metavar="S", help="of the samples; default 1")
-    parser.add_argument("--method", choices=get_args(Method), help="Latin hypercube (default) or Sobol sequence")
-    parser.add_argument("--from-csv", type=Path, metavar="FILE", help="a row for each run, a column for each parameter")
-    parser.add_argument("--static-force", metavar="'F0 N + c v^2'", help="static force over the speed v in km/h")
-    parser.add_argument("--mean-force", metavar="'F0 N + c v^2'", help="mean force that the static force is found for")
-    parser.add_argument("--mean-tolerance", type=positive_number, metavar="N", help="how near is enough; default 0.2")
-
-
-def _assignment(text: str) -> tuple[str, str]:
-    name, sign, value = text.partition("=")
-    if not (name.strip() and sign and value.strip()):
-        raise argparse.ArgumentTypeError(f"'{text}' must be written NAME=VALUES")
-    return name.strip(), value.strip()
-
-
-def _count(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
-    return value
-
-
-def _sweep(options: argparse.Namespace) -> int:
+def sweep_verb(options: argparse.Namespace) -> int:
     """Make a sweep; return 0 if every run was made, 1 if one failed."""
     console = Terminal(stderr=True)
     note: Callable[[str], None] = (lambda _: None) if options.quiet else partial(say, console=console)
@@ -94,6 +46,8 @@ def _sweep(options: argparse.Namespace) -> int:
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedSweep.of(scenario.system, request)
         if options.dry_run:
+            if text := prepared.announced:
+                note(text)
             Terminal(width=WIDTH).print(f"{len(prepared.outcome.runs)} run(s), all can be made", markup=False)
             return 0
         folder = options.out or Path("results") / "sweep" / scenario.system.name
@@ -113,6 +67,7 @@ def _request(options: argparse.Namespace) -> SweepRequest:
         "samples": options.samples,
         "seed": options.seed,
         "method": options.method,
+        "sensitivity": options.sensitivity,
         "table": options.from_csv,
         "stop": options.stop,
         "static_force": options.static_force,
@@ -167,6 +122,6 @@ def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> Non
         console = Terminal(width=WIDTH, highlight=False)
         for number, reason in list(done.failures.items())[:10]:
             console.print(f"run {number} failed: {reason}", markup=False, soft_wrap=True)
-        files = [str(folder / name) for name in (CSV, PARQUET) if (folder / name).is_file()]
+        files = [str(folder / name) for name in (CSV, PARQUET, SENSITIVITY_CSV) if (folder / name).is_file()]
         text = f"{len(done.finished)} runs, {len(done.failures)} failed; table: {', '.join(files)}"
         console.print(text, markup=False, soft_wrap=True)

@@ -7,7 +7,7 @@ import sys
 
 from rich.console import Console
 
-from master.errors import MasterError, UsageError
+from master.errors import MasterError, UsageError, said
 from master.report.terminal_summary import WIDTH, Terminal
 
 
@@ -26,7 +26,7 @@ def carry_out(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return _fail(error, "interrupted", 1)
     except OSError as failure:
-        return _fail(error, f"{failure.filename or 'standard output'}: {failure.strerror or failure}", 1)
+        return _fail(error, f"{failure.filename or 'standard output'}: {said(failure)}", 1)
     return code
 
 

@@ -143,11 +143,25 @@ def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator
     MasterError
         If it exists and is no ``kind`` of this tool, or cannot be made.
     """
-    if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
-        raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
+    check_free(folder, marker, generator, kind)
     with _alone_in(folder, "folder"):
         _remove(folder, _PARTS)
         yield
+
+
+def check_free(folder: Path, marker: str, generator: str, kind: str) -> None:
+    """Refuse a folder that `taken_over` would, but for one that cannot be made.
+
+    Raises
+    ------
+    MasterError
+        If it exists and is no ``kind`` of this tool.
+    """
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise MasterError(f"the folder {folder} cannot be made: {there} is a file; choose another with --out")
+    if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
+        raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
 
 
 @contextmanager

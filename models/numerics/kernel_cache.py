@@ -21,12 +21,13 @@ import logging
 import os
 import pickle
 import shutil
-import stat
 import sys
 import tempfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
+
+from models.numerics.user_cache import cache_folder, check_owner
 
 #: Environment variable that chooses between compiled kernels and NumPy.
 SWITCH: Final = "OPENPANTO_KERNEL"
@@ -87,11 +88,11 @@ def _kept_source(source: bytes, folder: str) -> Path:
         If neither can be written to.
     """
     try:
-        home = _cache_folder()
+        home = cache_folder()
         copy = home / "openpanto" / folder / "kernels.py"
         copy.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         for place in (home / "openpanto", copy.parent, copy.parent / "__pycache__"):
-            _check_owner(place)
+            check_owner(place)
         _write(copy, source)
     except (OSError, RuntimeError) as error:  # RuntimeError: a user without a home
         _warn(f"compiled kernels are not kept, and have to be compiled in every run: {error}")
@@ -120,37 +121,6 @@ def _write(copy: Path, source: bytes) -> None:
         raise
 
 
-def _cache_folder() -> Path:
-    """Return the folder for data of this user's programs that can be regenerated.
-
-    A relative XDG_CACHE_HOME is to be ignored (XDG Base Directory Specification).
-    """
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
-    chosen = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return chosen if chosen.is_absolute() else Path("~/.cache").expanduser()
-
-
-def _check_owner(folder: Path) -> None:
-    """Reject a folder to which somebody else can write; one that does not exist yet is accepted.
-
-    Raises
-    ------
-    PermissionError
-        If it belongs to another user, or its mode lets others write. On Windows a user's folders are private.
-    """
-    if sys.platform == "win32":
-        return
-    try:
-        found = folder.stat()
-    except FileNotFoundError:
-        return
-    if found.st_uid != os.geteuid():
-        raise PermissionError(f"{folder} belongs to another user")
-    if stat.S_IMODE(found.st_mode) & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PermissionError(f"{folder} can be written by others; chmod go-w it")
-
-
 def _warn(text: str) -> None:
     """Log a warning once per process."""
     if text not in _named:
@@ -170,7 +140,7 @@ def _guard(module: ModuleType, folder: Path) -> None:
 def _leave_out_if_foreign(cache: Any) -> None:
     """Disable a cache where others may write; numba has further places, and an environment variable for more."""
     try:
-        _check_owner(Path(cache.cache_path))
+        check_owner(Path(cache.cache_path))
     except OSError as error:
         _warn(f"compiled kernels are not kept, and have to be compiled in every run: {error}")
         cache.disable()

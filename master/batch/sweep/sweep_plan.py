@@ -20,8 +20,9 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
+from master.batch.sweep.sensitivity import SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
-from master.errors import MasterError, RequestError
+from master.errors import MasterError, RequestError, said
 from master.system.components import System
 
 Keep = Literal["all", "thinned", "figures", "failed"]
@@ -47,6 +48,9 @@ class SweepRequest(BaseModel):
     seed : int
     method : str
         How they are drawn: ``lhs`` or ``sobol``.
+    sensitivity : str, optional
+        ``sobol`` or ``morris``: ``samples`` is the number of blocks of runs (`sensitivity`) from which it is found how
+        every figure depends on every parameter.
     table : Path, optional
         CSV file with a row for each run and a column for each parameter.
     stop : float, optional
@@ -68,6 +72,7 @@ class SweepRequest(BaseModel):
     samples: int | None = Field(None, gt=0, le=MOST_RUNS)
     seed: int = Field(1, ge=0)
     method: Method = "lhs"
+    sensitivity: SensitivityMethod | None = None
     table: Path | None = None
     stop: float | None = None
     static_force: str | None = None
@@ -161,11 +166,13 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     if bool(request.vary) != (request.samples is not None):
         missing = "--samples N: how many" if request.vary else "--vary NAME=DISTRIBUTION: of what"
         raise RequestError(f"samples need {missing}")
+    _check_sensitivity(request)
     table, names = (None, ()) if request.table is None else _read_table(system, request.table)
     grid = [_listed(system, name, text) for name, text in request.over.items()]
     distributions = tuple(read_distribution(ParameterReader(system, n), text) for n, text in request.vary.items())
     sizes = [len(part.rows) for part in (table, *grid) if part is not None]
-    if (count := math.prod(sizes) * (request.samples or 1)) > MOST_RUNS:
+    each_sample = block_size(request.sensitivity, len(distributions)) if request.sensitivity else 1
+    if (count := math.prod(sizes) * (request.samples or 1) * each_sample) > MOST_RUNS:
         raise RequestError(f"that makes {count} runs, more than {MOST_RUNS}")
     parts = [part for part in (table, *grid) if part is not None]
     parts += [_sample(distributions, request)] if distributions else []
@@ -176,6 +183,18 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     points = tuple(tuple(itertools.chain(*rows)) for rows in itertools.product(*(part.rows for part in parts)))
     each = len(points) // len(names) if names else 0
     return SweepPlan(parameters, points, distributions, tuple(name for name in names for _ in range(each)))
+
+
+def _check_sensitivity(request: SweepRequest) -> None:
+    """Refuse what does not go together with a design for sensitivity indices."""
+    if request.sensitivity is None:
+        return
+    if not request.vary:
+        raise RequestError("--sensitivity needs --vary NAME=DISTRIBUTION, of what, and --samples N, how many blocks")
+    if request.over or request.table is not None:
+        raise RequestError("--sensitivity looks at what --vary samples, alone: leave out --over and --from-csv")
+    if "method" in request.model_fields_set:
+        raise RequestError("--sensitivity has samples of its own: leave out --method")
 
 
 def _check_distinct(parameters: Sequence[SweptParameter]) -> None:
@@ -191,7 +210,11 @@ def _listed(system: System, name: str, text: str) -> _Part:
 
 
 def _sample(distributions: Sequence[Distribution], request: SweepRequest) -> _Part:
-    values = draw(distributions, request.samples or 0, request.seed, request.method)
+    count, seed = request.samples or 0, request.seed
+    if request.sensitivity is not None:
+        values = designed(distributions, count, seed, request.sensitivity)
+    else:
+        values = draw(distributions, count, seed, request.method)
     return _Part(tuple(d.parameter for d in distributions), [tuple(map(float, row)) for row in values])
 
 
@@ -200,7 +223,7 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
     try:
         rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = error.strerror if isinstance(error, OSError) else error
+        why = said(error) if isinstance(error, OSError) else error
         raise MasterError(f"{path} cannot be read: {why}") from error
     if len(rows) < 2:
         raise RequestError(f"{path} has no row under its head")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -12,20 +11,23 @@ from pathlib import Path
 from typing import Any, Final
 
 from master.batch.batch_session import BatchFiles, BatchState, run_tasks
+from master.batch.sweep.sensitivity import SensitivityIndices, described
+from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, sensitivity_data, sensitivity_of
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
 from master.batch.sweep.sweep_run import WORK, Row, RunPlace, SweepResult
 from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs
-from master.errors import InterruptedRunError, MasterError
+from master.errors import InterruptedRunError
 from master.results import results_folder
-from master.run_session import run as run_system
 from master.system.components import System
 
 JSON: Final = "sweep.json"
 CSV: Final = "sweep.csv"
 PARQUET: Final = "sweep.parquet"
+SENSITIVITY_CSV: Final = "sensitivity.csv"
+SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
@@ -96,6 +98,11 @@ class SweepOutcome(BatchState):
         """The table so far."""
         return table_rows(self.runs, self.found)
 
+    @property
+    def sensitivity(self) -> tuple[SensitivityIndices, ...]:
+        """Indices of every figure that varies; none if they were not asked for, or as long as runs are missing."""
+        return sensitivity_of(self.request, self.plan, self.runs, self.found)
+
 
 def as_data(outcome: SweepOutcome) -> dict[str, Any]:
     """Return the contents of ``sweep.json``."""
@@ -164,6 +171,14 @@ class PreparedSweep:
         runs = make_runs(base, plan, request)
         return cls(base, SweepOutcome(scenario=base.name, request=request, plan=plan, runs=runs))
 
+    @property
+    def announced(self) -> str:
+        """Why there are as many runs as there are, empty if that is plain."""
+        request, plan = self.outcome.request, self.outcome.plan
+        if request.sensitivity is None:
+            return ""
+        return described(request.sensitivity, len(plan.parameters), request.samples or 0)
+
 
 def sweep(
     prepared: PreparedSweep,
@@ -216,13 +231,30 @@ def sweep(
                     found[result.key] = result  # a copy each time would be long for many runs
                     return so_far
 
+                if why := prepared.announced:
+                    tell(why)
                 with chosen.opened(prepared.base, place) as make_runs_of:
-                    tell(_announcement(prepared.base, missing, len(state.runs), chosen.width))
+                    tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
-                    return run_tasks(state, results, finish, files, folder)
+                    ended = run_tasks(state, results, finish, files, folder)
+                _write_sensitivity(ended, folder, tell)
+                return ended
     except (InterruptedRunError, KeyboardInterrupt) as error:
         done = f"{len([r for r in state.runs if r.key in found])} of {len(state.runs)} runs are finished"
         raise InterruptedRunError(f"interrupted. {done} and in {folder}; the same command makes the others") from error
+
+
+def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], None]) -> None:
+    """Write the indices of a finished sweep; those of an earlier one are not left beside its table."""
+    found = done.sensitivity
+    if not found:
+        for name in (SENSITIVITY_CSV, SENSITIVITY_JSON):
+            (folder / name).unlink(missing_ok=True)
+    else:
+        results_folder.write_text(folder / SENSITIVITY_CSV, sensitivity_csv(found))
+        results_folder.write_json(folder / SENSITIVITY_JSON, sensitivity_data(found))
+    if text := failed_note(done.request, found, len(done.failures)):
+        tell(text)
 
 
 def _remove_leftovers(place: RunPlace) -> None:
@@ -254,36 +286,28 @@ def _shown(
         show(SweepProgress(done, failed, min(engine.width, open_runs), total, left))
 
 
-def _announcement(base: System, missing: Sequence[SweepRun], total: int, width: int) -> str:
+def _announcement(make: MakeRuns, start: float, missing: Sequence[SweepRun], total: int, engine: SweepEngine) -> str:
     """Return how many runs there are to make, and how long that may take."""
     if not missing:
         return f"{total} runs, all finished"
     begun = f"{total} runs" if len(missing) == total else f"{total} runs, {len(missing)} of them missing"
     if any(r.target is not None for r in missing):
         return f"{begun}; the static force of each is found in several trials"
-    try:
-        each = _rehearsed(base, missing)
-    except InterruptedRunError:
-        raise
-    except MasterError:  # the run itself will say so
+    each = _rehearsed(make, start, missing)
+    if each is None:  # the runs themselves will say why
         return begun
-    about = duration(each * -(-len(missing) // width))
-    return f"{begun}, {min(width, len(missing))} at a time, about {about}"
+    about = duration(each * -(-len(missing) // engine.width))
+    return f"{begun}, {min(engine.width, len(missing))} at a time, about {about}"
 
 
-def _rehearsed(base: System, missing: Sequence[SweepRun]) -> float:
-    """Return about how long a run takes on average [s]: from the first steps of the middle one."""
-    middle = missing[len(missing) // 2]
-    system = middle.system(base)
-    steps = min(system.step_count, _REHEARSED)
-    short = replace(system, stop=system.start + steps * system.step, may_stop_early=True)
-    with tempfile.TemporaryDirectory(prefix="sweep-") as name:
-        began = time.perf_counter()
-        done = run_system(short, Path(name) / "rehearsal")
-        whole = time.perf_counter() - began
-    stepping = float(done.summary["performance"]["wall_time"])
-    mean = sum((r.stop - base.start) / r.step for r in missing) / len(missing)
-    return whole - stepping + stepping / steps * mean
+def _rehearsed(make: MakeRuns, start: float, missing: Sequence[SweepRun]) -> float | None:
+    """Return about how long a run takes on average [s], from the first steps of the middle one; None if they fail."""
+    short = missing[len(missing) // 2].rehearsal(start, _REHEARSED)
+    done = next(iter(make([short])))
+    if not done.stepping:
+        return None
+    mean = sum((r.stop - start) / r.step for r in missing) / len(missing)
+    return done.seconds - done.stepping + done.stepping * mean * short.step / (short.stop - start)
 
 
 def duration(seconds: float) -> str:

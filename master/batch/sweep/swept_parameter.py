@@ -84,16 +84,31 @@ class ParameterReader:
         """
         parts = [part.strip() for part in text.split(",")]
         if not self._is_real:
-            return self.parameter(""), tuple(parts)
+            values = [v for part in parts for v in (self._whole_numbers(part) if self._is_whole else [part])]
+            self._check_distinct(values, text)
+            return self.parameter(""), tuple(values)
         pieces = [[self._number(piece) for piece in part.split(":")] for part in parts]
         unit = self._common_unit([quantity for part in pieces for quantity in part], text)
-        values: list[float] = []
+        numbers_found: list[float] = []
         for part, written in zip(pieces, parts, strict=True):
             numbers = [self._converted(*quantity, unit) for quantity in part]
-            values += numbers if len(numbers) == 1 else _range(numbers, f"{self.name}={written}")
+            numbers_found += numbers if len(numbers) == 1 else _range(numbers, f"{self.name}={written}")
+        self._check_distinct(numbers_found, text)
+        return self.parameter(unit), tuple(numbers_found)
+
+    def _whole_numbers(self, part: str) -> list[SweptValue]:
+        """Return the values of FIRST:LAST:STEP in whole numbers; any other text as it is."""
+        try:
+            numbers = [int(piece) for piece in part.split(":")]
+        except ValueError:
+            return [part]
+        if len(numbers) == 1:
+            return [part]
+        return [str(int(v)) for v in _range(numbers, f"{self.name}={part}")]
+
+    def _check_distinct(self, values: Sequence[SweptValue], text: str) -> None:
         if len(set(values)) < len(values):
             raise RequestError(f"{self.name}={text}: a value appears more than once")
-        return self.parameter(unit), tuple(values)
 
     def cells(self, texts: Sequence[str]) -> tuple[SweptParameter, tuple[SweptValue | None, ...]]:
         """Return the values in a table's column, None where a cell is empty."""
@@ -122,6 +137,10 @@ class ParameterReader:
     @property
     def _is_real(self) -> bool:
         return all(variable.type == "Real" for _, variable, _ in self._found)
+
+    @property
+    def _is_whole(self) -> bool:
+        return all(variable.type == "Integer" for _, variable, _ in self._found) and bool(self._found)
 
     @property
     def _declared(self) -> str:

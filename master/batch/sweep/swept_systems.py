@@ -88,6 +88,8 @@ class SweepRun:
         The swept values by the titles of their columns.
     variant : str
         Name of its row, if the values come from a table.
+    is_rehearsal : bool
+        Whether it is only to show how long others take: it may stop before it can be judged.
     """
 
     number: int
@@ -100,12 +102,19 @@ class SweepRun:
     tolerance: float = 0.2
     inputs: Mapping[str, SweptValue | None] = field(default_factory=dict)
     variant: str = ""
+    is_rehearsal: bool = False
 
     def system(self, base: System) -> System:
         """Return the system of the run, from the scenario's own."""
         changed = tuple(replace(c, parameters=dict(self.parameters.get(c.name, c.parameters))) for c in base.components)
         whole = replace(base, name=f"{base.name}: run {self.number}", components=changed, stop=self.stop)
-        return without(replace(whole, step=self.step), self.absent)
+        changed_whole = replace(whole, step=self.step, may_stop_early=whole.may_stop_early or self.is_rehearsal)
+        return without(changed_whole, self.absent)
+
+    def rehearsal(self, start: float, steps: int) -> SweepRun:
+        """Return its first steps, as a run of its own that nothing is found for."""
+        stop = min(self.stop, start + steps * self.step)
+        return replace(self, key=f"rehearsal-{self.key}", stop=stop, target=None, is_rehearsal=True)
 
 
 def make_runs(base: System, plan: SweepPlan, request: SweepRequest) -> tuple[SweepRun, ...]:

@@ -157,8 +157,9 @@ def check_folder(folder: Path) -> None:
     """Refuse a folder that a project cannot be written into."""
     if folder.is_symlink() and not folder.exists():  # to itself, too
         raise RequestError(f"{folder} is a link that leads nowhere: name a new folder")
-    if folder.exists() and not folder.is_dir():
-        raise RequestError(f"{folder} is a file: name a new folder")
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise RequestError(f"{there if there == folder else folder.parent} is a file: name a new folder")
     if folder.is_dir() and any(folder.iterdir()):
         raise RequestError(f"{folder} exists and is not empty: name a new folder, or empty it")
 

@@ -35,7 +35,8 @@ class Backwards(HereEngine):
 
                 def made(runs):
                     for run in reversed(runs):
-                        self.made.append(run.number)
+                        if not run.is_rehearsal:
+                            self.made.append(run.number)
                         yield from make([run])
 
                 yield made

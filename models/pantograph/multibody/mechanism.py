@@ -409,7 +409,8 @@ class Mechanism:
         free = slice(self.driven, None)
         weight = self.definition.gravity * (self.mass[free] @ self.split(y).r[free, 2])
         kinematics = self.kinematics(y)
-        return float(self.kinetic(y) + weight + self.forces.energy(kinematics, self.pool.evaluate(kinematics)))
+        stored = self.forces.energy(self.pool.evaluate(kinematics)) + self.forces.stops.energy(kinematics.frames)
+        return float(self.kinetic(y) + weight + stored)
 
     def kinetic(self, y: FloatArray) -> float:
         """Return the kinetic energy of the bodies that the base does not drive [J]."""

@@ -158,9 +158,9 @@ class ForceElements:
             return lift
         return self.cam.value(self.lift_place.at(kinematics), lift)
 
-    def energy(self, kinematics: Kinematics, vectors: MovingVectors) -> float:
-        """Return the potential energy of springs and stops [J]."""
-        return self.lines.energy(vectors) + self.stops.energy(kinematics.frames)
+    def energy(self, vectors: MovingVectors) -> float:
+        """Return the potential energy of springs and bump stops [J]; that of angle stops is with ``stops``."""
+        return self.lines.energy(vectors)
 
 
 class Lengths(NamedTuple):

@@ -119,6 +119,12 @@ VERBS: Final[Mapping[str, Verb]] = {
             "sweep demo --samples 200 --vary 'catenary.contact_wire.tension=normal(20kN, 0.2kN)' --jobs 4",
         ),
     ),
+    "optimise": Verb(
+        "find the values of a few parameters for which a figure is least or greatest",
+        "master.commands.verb_options:add_optimise",
+        _MASTER,
+        ("optimise cx_ln2 --minimise sigma --vary 'pantograph.stage[3].stiffness=2:12kN/m' --subject-to mean=157N",),
+    ),
     "compare": Verb(
         "show two or more runs side by side",
         "master.commands.verb_options:add_compare",
@@ -126,7 +132,7 @@ VERBS: Final[Mapping[str, Verb]] = {
         ("compare results/demo results/20kN", "compare results/demo results/20kN --report compare.html"),
     ),
     "report": Verb(
-        "write plots and report of a run again, with a measurement or a film on request",
+        "write plots and report of a run or a sweep again, with a measurement or a film of a run on request",
         "master.commands.verb_options:add_report",
         _MASTER,
         ("report results/demo", "report results/demo --measured force.csv --film run.mp4"),

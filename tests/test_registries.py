@@ -19,6 +19,7 @@ from fmus import __main__ as fmus_main
 from fmus.__main__ import _parser as fmus_parser
 from fmus.builder import recipe
 from fmus.slave.model_description import _DERIVED
+from master.batch.optimisation import optimisation_session
 from master.batch.study import study_session
 from master.batch.sweep import distributions, sensitivity, sweep_plan, sweep_session
 from master.batch.verification import verification_session
@@ -355,6 +356,7 @@ def test_the_defaults_in_the_help_are_those_that_are_taken():
     for verb, name in (
         ("study", study_session.JSON),
         ("sweep", sweep_session.JSON),
+        ("optimise", optimisation_session.JSON),
         ("verify", verification_session.JSON),
     ):
         assert f"print {name}" in said[verb]

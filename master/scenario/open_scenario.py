@@ -108,7 +108,9 @@ def load_system(
         components, settings = with_energy(components, settings)
     warnings = tuple(str(w) for w in _sorted(reader.warnings))
     may_stop, title = overrides.may_stop_early, structure.title
-    system = System(package.name, components, connections, *times, settings, warnings, may_stop, title)
+    system = System(
+        package.name, components, connections, *times, settings, warnings, may_stop, title, overrides.parameters
+    )
     text = value_checks.empty_cells(system, overrides.empty)
     if text := text or value_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)

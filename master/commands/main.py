@@ -25,6 +25,7 @@ VERBS: Final[Mapping[str, Callable[[Any], None]]] = {
     "verify": verb_options.add_verify,
     "study": verb_options.add_study,
     "sweep": verb_options.add_sweep,
+    "optimise": verb_options.add_optimise,
 }
 
 

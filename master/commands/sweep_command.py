@@ -3,38 +3,29 @@
 from __future__ import annotations
 
 import argparse
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-
-from rich.console import Console
-from rich.status import Status
 
 from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sweep_plan import SweepRequest, stored_request
 from master.batch.sweep.sweep_session import (
     CSV,
     JSON,
+    PAGE,
     PARQUET,
     SENSITIVITY_CSV,
     PreparedSweep,
     SweepOutcome,
-    SweepProgress,
     sweep,
 )
+from master.commands.batch_progress import distinct, progress_lines
 from master.commands.command_options import overrides_of, say
-from master.errors import UsageError
 from master.interface.scenario_runs import keep_apart
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
 from master.scenario.open_scenario import open_scenario
 from master.scenario.scenario_place import located
-
-#: Seconds between two lines of progress where there is no terminal.
-_LINES = 30.0
 
 
 def sweep_verb(options: argparse.Namespace) -> int:
@@ -53,7 +44,7 @@ def sweep_verb(options: argparse.Namespace) -> int:
         folder = options.out or Path("results") / "sweep" / scenario.system.name
         keep_apart(folder, scenario.package)
         engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after)
-        with _progress(console, options.quiet) as show:
+        with progress_lines(console, options.quiet) as show:
             done = sweep(prepared, folder, engine, note, show, options.again)
     _print(options, folder, done)
     return 1 if done.failures else 0
@@ -62,8 +53,8 @@ def sweep_verb(options: argparse.Namespace) -> int:
 def _request(options: argparse.Namespace) -> SweepRequest:
     """Return what is asked for: the options, or the scenario's stored sweep with these changes."""
     given = {
-        "over": _distinct("--over", options.over),
-        "vary": _distinct("--vary", options.vary),
+        "over": distinct("--over", options.over),
+        "vary": distinct("--vary", options.vary),
         "samples": options.samples,
         "seed": options.seed,
         "method": options.method,
@@ -82,39 +73,6 @@ def _request(options: argparse.Namespace) -> SweepRequest:
     return SweepRequest.read({**stored, **asked}, "" if is_own else "study.toml, [sweep]" if stored else "")
 
 
-def _distinct(option: str, pairs: list[tuple[str, str]]) -> dict[str, str]:
-    names = [name for name, _ in pairs]
-    for name in names:
-        if names.count(name) > 1:
-            raise UsageError(f"{option} {name} is given twice")
-    return dict(pairs)
-
-
-@contextmanager
-def _progress(console: Console, quiet: bool) -> Iterator[Callable[[SweepProgress], None]]:
-    """Yield what shows the progress: one line that changes in a terminal, lines now and then elsewhere."""
-    if quiet:
-        yield lambda _: None
-    elif sys.stderr.isatty():
-        with Status("", console=console) as status:
-            yield lambda progress: status.update(str(progress))
-    else:
-        yield _Lines(console)
-
-
-class _Lines:
-    """Prints the progress, but not more often than one cares to read."""
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._due = 0.0
-
-    def __call__(self, progress: SweepProgress) -> None:
-        if time.monotonic() >= self._due or progress.done == progress.total:
-            self._due = time.monotonic() + _LINES
-            say(str(progress), self._console)
-
-
 def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> None:
     if options.json:
         print(printable_json((folder / JSON).read_text(encoding="utf-8")), end="")
@@ -123,5 +81,6 @@ def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> Non
         for number, reason in list(done.failures.items())[:10]:
             console.print(f"run {number} failed: {reason}", markup=False, soft_wrap=True)
         files = [str(folder / name) for name in (CSV, PARQUET, SENSITIVITY_CSV) if (folder / name).is_file()]
-        text = f"{len(done.finished)} runs, {len(done.failures)} failed; table: {', '.join(files)}"
+        count = f"{len(done.finished)} runs, {len(done.failures)} failed"
+        text = f"{count}; page: {folder / PAGE}; table: {', '.join(files)}"
         console.print(text, markup=False, soft_wrap=True)

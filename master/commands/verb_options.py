@@ -159,16 +159,50 @@ def add_sweep(verbs: Any) -> None:
     add_overrides(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: results/sweep/NAME")
     parser.add_argument("--keep", choices=KEPT, help="what stays of the runs beside the table; default: figures")
+    _add_engine(parser)
+    parser.add_argument("--again", action="store_true", help="also make the runs again that failed")
+    parser.add_argument("--dry-run", action="store_true", help="check everything and say how many runs there are")
+    parser.add_argument("--quiet", action="store_true", help="no progress; files and exit code only")
+    parser.add_argument("--json", action="store_true", help="print sweep.json")
+
+
+def add_optimise(verbs: Any) -> None:
+    """Declare ``optimise`` and its options."""
+    parser = add_verb(
+        verbs,
+        "optimise",
+        "find the values of a few parameters for which a figure is least or greatest",
+        _later("optimise_command", "optimise_verb"),
+        scenario=True,
+    )
+    goal = parser.add_mutually_exclusive_group(required=True)
+    goal.add_argument("--minimise", metavar="FIGURE", help="the figure that shall be least, e.g. sigma")
+    goal.add_argument("--maximise", metavar="FIGURE", help="the figure that shall be greatest")
+    bounds: dict[str, Any] = {"action": "append", "default": [], "type": _assignment, "required": True}
+    text = "bounds of a parameter, e.g. 2:12kN/m; may be repeated"
+    parser.add_argument("--vary", metavar="NAME=LOW:HIGH", help=text, **bounds)
+    text = "mean=157.5N (by the static force), maximum<=350N, minimum>=0N; may be repeated"
+    parser.add_argument("--subject-to", action="append", default=[], metavar="CONSTRAINT", help=text)
+    parser.add_argument("--mean-tolerance", type=positive_number, metavar="N", help="how near is enough; default 0.2")
+    parser.add_argument("--max-runs", type=_count, metavar="N", help="most points that are tried; default 60")
+    parser.add_argument("--seed", type=int, metavar="S", help="of the search; default 1")
+    add_overrides(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="default: results/optimise/NAME")
+    _add_engine(parser)
+    parser.add_argument("--again", action="store_true", help="also make the runs again that failed")
+    parser.add_argument("--dry-run", action="store_true", help="check everything and run nothing")
+    parser.add_argument("--quiet", action="store_true", help="no progress; files and exit code only")
+    parser.add_argument("--json", action="store_true", help="print optimise.json")
+
+
+def _add_engine(parser: argparse.ArgumentParser) -> None:
+    """Declare who makes the runs."""
     parser.add_argument("--jobs", type=_count, metavar="N", help="make N runs at a time, in processes of this computer")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="make the runs on the workers of this Dask scheduler")
     parser.add_argument("--memory-limit", default="auto", metavar="SIZE", help="of each process with --jobs, e.g. 2GB")
     parser.add_argument(
         "--renew-after", type=_count, default=200, metavar="K", help="runs after which a process is renewed"
     )
-    parser.add_argument("--again", action="store_true", help="also make the runs again that failed")
-    parser.add_argument("--dry-run", action="store_true", help="check everything and say how many runs there are")
-    parser.add_argument("--quiet", action="store_true", help="no progress; files and exit code only")
-    parser.add_argument("--json", action="store_true", help="print sweep.json")
 
 
 def _add_values(parser: argparse.ArgumentParser) -> None:
@@ -216,9 +250,9 @@ def add_compare(verbs: Any) -> None:
 
 def add_report(verbs: Any) -> None:
     """Declare ``report`` and its options."""
-    text = "write plots and report of a run again, with a measurement or a film on request"
+    text = "write plots and report of a run or a sweep again, with a measurement or a film of a run on request"
     parser = add_verb(verbs, "report", text, _later("report_commands", "report_verb"))
-    parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
+    parser.add_argument("run", type=Path, metavar="RUN", help="results folder of a run or a sweep")
     parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to compare with")
     parser.add_argument(
         "--measured-offset",

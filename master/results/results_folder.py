@@ -33,7 +33,7 @@ GEOMETRY: Final = "geometry.json"
 FORCES: Final = "contact_force.csv"
 REPORT: Final = "report.html"
 _TABLES: Final = ("timeseries*.csv", "timeseries*.parquet", FORCES, "contact_force.parquet")
-_OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
+_OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg", "definition_*.toml")
 #: What a run, a study or a verification may leave half written if it is killed, and what is no result.
 _PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT)), f".*{PART}")
 _LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)

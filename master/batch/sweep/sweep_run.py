@@ -35,6 +35,8 @@ from master.system.pantograph_motion import pantographs, parameter_value
 #: What is in a cell of the table.
 Cell = float | str | None
 Row = Mapping[str, Cell]
+#: Figures of a recorded output, in runs without a pantograph.
+OUTPUT_KINDS: Final = ("end", "minimum", "maximum", "mean")
 #: Files of a run that stay if it is thinned.
 _THINNED: Final = (SUMMARY, GEOMETRY, FORCES)
 #: How often a run is made whose process dies.
@@ -212,8 +214,7 @@ def _rows(done: Results, system: System) -> Iterator[Row]:
         yield _row(found[contact], system)
     if not done.contacts:
         figures = output_figures(done.recordings)
-        kinds = ("end", "minimum", "maximum", "mean")
-        yield {f"{f.name} {kind} [{f.unit or '1'}]": float(getattr(f, kind)) for f in figures for kind in kinds}
+        yield {f"{f.name} {kind} [{f.unit or '1'}]": float(getattr(f, kind)) for f in figures for kind in OUTPUT_KINDS}
     elif not found:
         yield {"verdict": done.not_judged or "nothing to judge"}
 

@@ -41,13 +41,6 @@ def whole_table(toy_fmus, tmp_path_factory):
 
 
 @pytest.fixture
-def toy_system(toy):
-    """The toy scenario's system."""
-    with open_scenario(toy, Overrides(), build=False) as found:
-        yield found.system
-
-
-@pytest.fixture
 def swept(toy_system, tmp_path):
     """Function that makes a sweep of the toy scenario in a folder; returns the outcome."""
 

@@ -93,7 +93,7 @@ def model_phases(spans: int) -> dict[str, float]:
         path = str(_file(spans, Path(folder)))
         definition = phases.run("model: definition", lambda: load_line(path))
     clocks = Clocks()
-    with clocks.running({"model: mesh": (line, ("build_mesh",)), "model: form finding": (line, ("find_form",))}):
+    with clocks.running({"model: mesh": (line, ("build_mesh",)), "model: form finding": (line, ("kept_form",))}):
         model = phases.run("model: matrices", lambda: line.CatenaryModel(definition))
     phases.durations["model: matrices"] -= sum(clocks.spent.values())
     phases.durations |= clocks.spent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -11,6 +12,15 @@ from typing import Final
 #: Longest value or text that is shown in full [characters], and most problems that are listed at once.
 _LONGEST: Final = 400
 _MOST: Final = 100
+#: What the system says of a file, in words, with what to do.
+_SAID: Final = {
+    errno.ENOENT: "there is no such file or folder: check the name",
+    errno.ENOTDIR: "a part of the path is a file, where a folder is needed: name another place",
+    errno.EISDIR: "it is a folder, where a file is needed: name the file",
+    errno.EEXIST: "it is a file, where a folder is needed: name another place",
+    errno.EACCES: "its permissions do not allow it: change them, or name another place",
+    errno.EROFS: "the disk is read-only: name another place",
+}
 
 
 def one_line(text: str) -> str:
@@ -29,6 +39,17 @@ def one_line(text: str) -> str:
         half = _LONGEST // 2
         text = f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
     return "".join(map(_shown, text))
+
+
+def said(error: OSError) -> str:
+    """Return why a file could not be used, and what to do, in words.
+
+    Examples
+    --------
+    >>> said(FileNotFoundError(errno.ENOENT, "No such file or directory"))
+    'there is no such file or folder: check the name'
+    """
+    return _SAID.get(error.errno or 0) or error.strerror or str(error)
 
 
 def hint(name: str, known: Iterable[str], most: int = 1) -> str:

@@ -35,7 +35,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"shape"},
         {"linear_motion", "condition"},
         {"contact_and_slack", "line_state"},
-        {"step"},
+        {"step", "exchange"},
         {"line_model"},
         {"statics", "line_energy", "strip_checks"},
         {"line_part", "line_advice"},
@@ -81,6 +81,7 @@ ONLY_IN = {
     "pythonfmu": lambda name: name.startswith("fmus."),
     "dask": lambda name: name == "master.batch.sweep.dask_engine",
     "distributed": lambda name: name == "master.batch.sweep.dask_engine",
+    "SALib": lambda name: name == "master.batch.sweep.sensitivity",
     "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.", "master.interface.")),
     "pandas": lambda name: name.startswith(("models.interface.", "master.interface.")),
 }

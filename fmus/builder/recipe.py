@@ -14,8 +14,9 @@ import pythonfmu
 from fmus.builder.source_bundle import BundleError, Module, collect
 from fmus.loader.loader_build import sources
 from fmus.loader.pythonfmu_repair import repaired
-from models.definition_files.message_text import hint
-from models.library.search_path import Kind, definition_files, doubles
+from models.definition_files.message_text import hint, said
+from models.library import search_path
+from models.library.search_path import Kind, definition_files
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARY = REPOSITORY / "models" / "library"
@@ -148,7 +149,7 @@ def recipe(
         return found
     if built_from is not None:
         if not built_from.is_file():
-            raise UnknownFmuError(f"{built_from}, which {name} was built from, is missing")
+            raise UnknownFmuError(f"{built_from}, which {name} was built from, is missing; check the name")
         return _own_recipe(built_from, pantographs or 1)
     path = next(iter(definition_files(kind, stem, [LIBRARY])), None) if kind is not None else None
     if path is not None and kind == "lines":
@@ -160,10 +161,12 @@ def recipe(
     raise UnknownFmuError(text + (hint(name, known) or "."))
 
 
-def doubts(name: str, folders: Iterable[Path]) -> str:
-    """Return which of several definitions of an FMU's name is used, empty if there is one; see `recipe`."""
+def doubts(name: str, folders: Iterable[Path]) -> list[str]:
+    """Return what deserves a second look in the definition of an FMU's name, a sentence each; see `recipe`."""
+    if name.lower().endswith(".toml"):
+        return [text for text in (search_path.named_otherwise(Path(name)),) if text]
     kind, stem, _ = _place(name, None)
-    return doubles(definition_files(kind, stem, [*folders, LIBRARY])) if kind is not None else ""
+    return search_path.doubts(kind, stem, [*folders, LIBRARY]) if kind is not None else []
 
 
 def _place(name: str, pantographs: int | None) -> tuple[Kind | None, str, int]:
@@ -191,7 +194,7 @@ def _own_recipe(path: Path, ports: int) -> Recipe:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise BuildError(f"{path} cannot be read ({error.strerror})") from error
+        raise BuildError(f"{path} cannot be read ({said(error)})") from error
     except ValueError as error:
         raise BuildError(f"{path} is not a TOML file ({error})") from error
     if not (path.stem.isascii() and path.stem.replace("_", "a").isalnum()):
@@ -251,7 +254,7 @@ def gather(wanted: Recipe) -> FmuSources:
     except (BundleError, SyntaxError) as error:
         raise BuildError(f"{wanted.name}: {error}") from error
     except OSError as error:
-        raise BuildError(f"{wanted.name}: {error.filename} cannot be read ({error.strerror})") from error
+        raise BuildError(f"{wanted.name}: {error.filename} cannot be read ({said(error)})") from error
     icon, binaries, licenses = _icon(wanted.name), platform_libraries(wanted.name), _licenses()
     pieces = {f"module/{n}": m.source.encode() for n, m in modules.items()} | binaries | licenses
     pieces |= {"definition": definition, "icon": icon, "recipe": _recipe_bytes(wanted)}

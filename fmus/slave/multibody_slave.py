@@ -41,6 +41,7 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
 
     def _start_warnings(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
+        yield part.mechanism_warning()
 
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:
         part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6])

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
+from master.batch.sweep.sensitivity import SensitivityMethod
+from master.batch.sweep.sensitivity_table import sensitivity_heads, sensitivity_rows
 from master.batch.sweep.sweep_plan import Keep, SweepRequest
-from master.batch.sweep.sweep_session import PreparedSweep, SweepOutcome
+from master.batch.sweep.sweep_session import PAGE, PreparedSweep, SweepOutcome
 from master.batch.sweep.sweep_session import sweep as run_sweep
 from master.batch.sweep.sweep_table import columns
 from master.errors import RequestError
@@ -49,11 +51,24 @@ class Sweep:
         return self.outcome.failures
 
     @property
+    def page(self) -> Path:
+        """The page of its charts, a single HTML file."""
+        return self.folder / PAGE
+
+    @property
     def table(self) -> pandas.DataFrame:
         """Inputs and figures, a row for each run and pantograph (needs pandas)."""
         rows = self.outcome.rows
         heads = columns(rows)
         return table_frame(heads, [tuple(row.get(head) for head in heads) for row in rows])
+
+    @property
+    def sensitivity(self) -> pandas.DataFrame:
+        """Indices of every figure with their intervals, a row for each figure and parameter (needs pandas).
+
+        It has no rows if none were asked for, or no figure varies.
+        """
+        return table_frame(sensitivity_heads(), sensitivity_rows(self.outcome.sensitivity))
 
     def results(self, run: int) -> Results:
         """Return the results of a run by its number, if all of it was kept.
@@ -80,7 +95,8 @@ def sweep(
     vary: Mapping[str, str] | None = None,
     samples: int | None = None,
     seed: int = 1,
-    method: Method = "lhs",
+    method: Method | None = None,
+    sensitivity: SensitivityMethod | None = None,
     table: str | Path | None = None,
     static_force: str | None = None,
     mean_force: str | None = None,
@@ -103,7 +119,9 @@ def sweep(
     vary : mapping, optional
         Distributions by parameter: ``{"catenary.contact_wire.tension": "normal(20 kN, 0.2 kN)"}``.
     samples, seed, method
-        How many samples of the distributions, from which seed, and how: ``lhs`` or ``sobol``.
+        How many samples of the distributions, from which seed, and how: ``lhs`` (default) or ``sobol``.
+    sensitivity : str, optional
+        ``sobol`` or ``morris``: as many blocks of runs as ``samples`` says, for indices of what matters.
     table : str or Path, optional
         CSV file with a row for each run.
     static_force, mean_force : str, optional
@@ -126,8 +144,15 @@ def sweep(
     """
     chosen = scenario if isinstance(scenario, Scenario) else open_scenario(scenario)
     grid = {name: _listed(values) for name, values in (over or {}).items()}
-    asked = {"over": grid, "vary": dict(vary or {}), "samples": samples, "seed": seed, "method": method}
-    given = {"table": table, "static_force": static_force, "mean_force": mean_force, "keep": keep}
+    asked: dict[str, object] = {"over": grid, "vary": dict(vary or {}), "samples": samples, "seed": seed}
+    asked |= {} if method is None else {"method": method}
+    given = {
+        "sensitivity": sensitivity,
+        "table": table,
+        "static_force": static_force,
+        "mean_force": mean_force,
+        "keep": keep,
+    }
     request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
     console = Terminal(stderr=True)
 

@@ -19,7 +19,8 @@ from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.mode_finding import line_modes
 from models.catenary.linear_motion.sparse_products import inner
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_form
+from models.catenary.shape.form_finding import EquilibriumError, StaticState
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.shape.wire_intervals import (
     Interval,
@@ -58,7 +59,7 @@ class CatenaryModel:
 
     def __init__(self, definition: CatenaryDefinition) -> None:
         self.definition = definition
-        self.static: StaticState = find_condition(find_form(definition, build_mesh(definition)))
+        self.static: StaticState = find_condition(kept_form(definition, build_mesh(definition)))
         self.mesh: CatenaryMesh = self.static.shape.mesh
         attached = attachments(self.mesh)
         by_wire = [intervals(chain, attached) for chain in self.mesh.chains]

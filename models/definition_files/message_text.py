@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import reprlib
 from collections.abc import Iterable
 from functools import partial
@@ -10,6 +11,15 @@ from typing import Final
 
 #: Longest message shown in full [characters], as a value may be megabytes of nested lists.
 _LONGEST: Final = 400
+#: What the system says of a file, in words, with what to do.
+_SAID: Final = {
+    errno.ENOENT: "there is no such file or folder: check the name",
+    errno.ENOTDIR: "a part of the path is a file, where a folder is needed: name another place",
+    errno.EISDIR: "it is a folder, where a file is needed: name the file",
+    errno.EEXIST: "it is a file, where a folder is needed: name another place",
+    errno.EACCES: "its permissions do not allow it: change them, or name another place",
+    errno.EROFS: "the disk is read-only: name another place",
+}
 
 
 class _Shown(reprlib.Repr):
@@ -27,6 +37,17 @@ class _Shown(reprlib.Repr):
 
 #: Return a value as shown in messages.
 shown_value = _Shown().repr
+
+
+def said(error: OSError) -> str:
+    """Return why a file could not be used, and what to do, in words.
+
+    Examples
+    --------
+    >>> said(FileNotFoundError(errno.ENOENT, "No such file or directory"))
+    'there is no such file or folder: check the name'
+    """
+    return _SAID.get(error.errno or 0) or error.strerror or str(error)
 
 
 def hint(name: str, known: Iterable[str], most: int = 1) -> str:

@@ -15,13 +15,14 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
+from master.batch.sweep.sensitivity import SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
-from master.errors import MasterError, RequestError
+from master.errors import MasterError, RequestError, said
 from master.system.components import System
 
 Keep = Literal["all", "thinned", "figures", "failed"]
@@ -33,7 +34,29 @@ STUDY: Final = "study.toml"
 _HEAD: Final = re.compile(r"\s*(.+?)\s*(?:\[([^\]]*)\])?\s*")
 
 
-class SweepRequest(BaseModel):
+class PlainRequest(BaseModel):
+    """What a batch is asked for, read from plain data; unknown names and impossible values are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any], origin: str = "") -> Self:
+        """Return the request in plain data.
+
+        Raises
+        ------
+        RequestError
+            Naming the first thing that is wrong, and ``origin``.
+        """
+        try:
+            return cls.model_validate(dict(data))
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise RequestError(": ".join(filter(None, (origin, where, first["msg"])))) from error
+
+
+class SweepRequest(PlainRequest):
     """What a sweep is asked for: the options of the command, the table ``[sweep]`` of ``study.toml``.
 
     Attributes
@@ -47,6 +70,9 @@ class SweepRequest(BaseModel):
     seed : int
     method : str
         How they are drawn: ``lhs`` or ``sobol``.
+    sensitivity : str, optional
+        ``sobol`` or ``morris``: ``samples`` is the number of blocks of runs (`sensitivity`) from which it is found how
+        every figure depends on every parameter.
     table : Path, optional
         CSV file with a row for each run and a column for each parameter.
     stop : float, optional
@@ -61,35 +87,18 @@ class SweepRequest(BaseModel):
         ``figures``, nothing; ``failed``, what those left that failed.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     over: dict[str, str] = Field(default_factory=dict)
     vary: dict[str, str] = Field(default_factory=dict)
     samples: int | None = Field(None, gt=0, le=MOST_RUNS)
     seed: int = Field(1, ge=0)
     method: Method = "lhs"
+    sensitivity: SensitivityMethod | None = None
     table: Path | None = None
     stop: float | None = None
     static_force: str | None = None
     mean_force: str | None = None
     tolerance: float = Field(0.2, gt=0)
     keep: Keep = "figures"
-
-    @classmethod
-    def read(cls, data: Mapping[str, Any], origin: str = "") -> SweepRequest:
-        """Return the request in plain data.
-
-        Raises
-        ------
-        RequestError
-            Naming the first thing that is wrong, and ``origin``.
-        """
-        try:
-            return cls.model_validate(dict(data))
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise RequestError(": ".join(filter(None, (origin, where, first["msg"])))) from error
 
 
 def stored_request(folder: Path) -> dict[str, Any]:
@@ -161,24 +170,39 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     if bool(request.vary) != (request.samples is not None):
         missing = "--samples N: how many" if request.vary else "--vary NAME=DISTRIBUTION: of what"
         raise RequestError(f"samples need {missing}")
+    _check_sensitivity(request)
     table, names = (None, ()) if request.table is None else _read_table(system, request.table)
     grid = [_listed(system, name, text) for name, text in request.over.items()]
     distributions = tuple(read_distribution(ParameterReader(system, n), text) for n, text in request.vary.items())
     sizes = [len(part.rows) for part in (table, *grid) if part is not None]
-    if (count := math.prod(sizes) * (request.samples or 1)) > MOST_RUNS:
+    each_sample = block_size(request.sensitivity, len(distributions)) if request.sensitivity else 1
+    if (count := math.prod(sizes) * (request.samples or 1) * each_sample) > MOST_RUNS:
         raise RequestError(f"that makes {count} runs, more than {MOST_RUNS}")
     parts = [part for part in (table, *grid) if part is not None]
     parts += [_sample(distributions, request)] if distributions else []
     if not parts:
         raise RequestError("nothing is varied: give --over, --vary with --samples, or --from-csv")
     parameters = tuple(p for part in parts for p in part.parameters)
-    _check_distinct(parameters)
+    check_distinct(parameters)
     points = tuple(tuple(itertools.chain(*rows)) for rows in itertools.product(*(part.rows for part in parts)))
     each = len(points) // len(names) if names else 0
     return SweepPlan(parameters, points, distributions, tuple(name for name in names for _ in range(each)))
 
 
-def _check_distinct(parameters: Sequence[SweptParameter]) -> None:
+def _check_sensitivity(request: SweepRequest) -> None:
+    """Refuse what does not go together with a design for sensitivity indices."""
+    if request.sensitivity is None:
+        return
+    if not request.vary:
+        raise RequestError("--sensitivity needs --vary NAME=DISTRIBUTION, of what, and --samples N, how many blocks")
+    if request.over or request.table is not None:
+        raise RequestError("--sensitivity looks at what --vary samples, alone: leave out --over and --from-csv")
+    if "method" in request.model_fields_set:
+        raise RequestError("--sensitivity has samples of its own: leave out --method")
+
+
+def check_distinct(parameters: Sequence[SweptParameter]) -> None:
+    """Raise a `RequestError` if a parameter is varied twice."""
     names = [name for p in parameters for name in (p.targets or (p.name,))]
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
@@ -191,7 +215,11 @@ def _listed(system: System, name: str, text: str) -> _Part:
 
 
 def _sample(distributions: Sequence[Distribution], request: SweepRequest) -> _Part:
-    values = draw(distributions, request.samples or 0, request.seed, request.method)
+    count, seed = request.samples or 0, request.seed
+    if request.sensitivity is not None:
+        values = designed(distributions, count, seed, request.sensitivity)
+    else:
+        values = draw(distributions, count, seed, request.method)
     return _Part(tuple(d.parameter for d in distributions), [tuple(map(float, row)) for row in values])
 
 
@@ -200,7 +228,7 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
     try:
         rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = error.strerror if isinstance(error, OSError) else error
+        why = said(error) if isinstance(error, OSError) else error
         raise MasterError(f"{path} cannot be read: {why}") from error
     if len(rows) < 2:
         raise RequestError(f"{path} has no row under its head")

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from models.catenary.linear_motion.step_matrices import StepMatrices
-from models.catenary.step.compiled_step import CompiledStep, UnsuitedError
+from models.catenary.step.compiled_line_step import CompiledLineStep, UnsuitedError
 from models.catenary.step.plain_step import PlainStep
 from models.catenary.step.step_engine import StepEngine, SteppedLine
 from models.numerics.kernel_cache import SWITCH, KernelError, joined, load_kernels
@@ -56,7 +56,7 @@ def make_engine(line: SteppedLine, newmark: Newmark) -> StepEngine:
     if wanted == "numpy":
         return PlainStep(line, matrices)
     try:
-        return CompiledStep(line, matrices, kernels())
+        return CompiledLineStep(line, matrices, kernels())
     except (ImportError, UnsuitedError) as error:
         if wanted == "numba":
             raise KernelError(f"{SWITCH} is 'numba', but {error}") from error

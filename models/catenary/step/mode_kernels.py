@@ -1,6 +1,6 @@
 """The modes' part of a step, for numba: they follow the attachments, and what they do in the next step is prepared.
 
-The same arithmetic as `models.catenary.step.numpy_engine`, in one pass: nothing is read twice and no intermediate array
+The same arithmetic as `models.catenary.step.linear_step`, in one pass: nothing is read twice and no intermediate array
 is written, because how much is read and written sets the pace.
 """
 

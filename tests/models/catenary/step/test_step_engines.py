@@ -8,7 +8,7 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import StripMotion
 from models.catenary.linear_motion.interval_modes import slower_than
 from models.catenary.linear_motion.step_matrices import StepMatrices
-from models.catenary.step.compiled_step import CompiledStep
+from models.catenary.step.compiled_line_step import CompiledLineStep
 from models.catenary.step.engine_choice import kernels, make_engine
 from models.catenary.step.linear_step import _by_blocks
 from models.catenary.step.plain_step import PlainStep
@@ -98,7 +98,7 @@ def test_a_step_that_was_prepared_is_forgotten_when_the_step_size_changes(model,
     """Back and forth between step sizes, against the plain engine."""
     engines = [
         [kind(model._line, StepMatrices(model.modes, Newmark(h)), *more) for h in (1e-3, 0.5e-3)]
-        for kind, more in ((PlainStep, ()), (CompiledStep, (compiled_kernels,)))
+        for kind, more in ((PlainStep, ()), (CompiledLineStep, (compiled_kernels,)))
     ]
     states = [_moving(model, 7)[0] for _ in engines]
     for n in range(20):
@@ -111,7 +111,7 @@ def test_a_step_that_was_prepared_is_forgotten_when_the_step_size_changes(model,
 def test_a_compiled_step_goes_on_from_a_snapshot_bit_for_bit(model, compiled_kernels, monkeypatch):
     monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
     fresh = CatenaryModel(model.definition)
-    assert isinstance(fresh._engine(1e-3), CompiledStep)
+    assert isinstance(fresh._engine(1e-3), CompiledLineStep)
     state, _ = _moving(fresh, 8)
     for _ in range(5):
         fresh.step(state, 1e-3, _far())

@@ -33,7 +33,7 @@ class UnsuitedError(Exception):
     """A line that the kernels are not made for."""
 
 
-class CompiledStep:
+class CompiledLineStep:
     """Steps of one size in compiled kernels; see `StepEngine`.
 
     Parameters

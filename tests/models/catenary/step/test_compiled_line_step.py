@@ -53,7 +53,7 @@ def strips(model, places, n, lift=0.03, speed=80.0, beat=0.0):
         at = first + (x - first) % model.wires[0].period if model.wires[0].period else x
         z = np.interp(at, wire[:, 0], wire[:, 2]) + lift + beat * np.sin(2.0 * np.pi * (n / 20.0 + k / 3.0))
         tilt = 0.002 * k
-        result.append([[[x, y, z + y * tilt], [speed, 0.0, 0.1 * k]] for y in (0.7, -0.7)])
+        result.append([[[x, y, z + y * tilt], [speed, 0.0, 0.1 * (k + 1)]] for y in (0.7, -0.7)])
     return StripMotion(np.array(result), np.linspace(0.0, 2e-5, len(places)))
 
 

@@ -13,26 +13,18 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
-from fmus.builder.fmu_build import build, why_no_loader
-from fmus.builder.recipe import (
-    MAX_PORTS,
-    BuildError,
-    Recipe,
-    UnknownFmuError,
-    doubts,
-    fingerprint,
-    known_names,
-    recipe,
-)
-from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
-from fmus.builder.watched_places import watched_places
-from fmus.loader import doctor
-from fmus.loader.runtime import Runtime
 from models.definition_files.message_text import printable, said
 from models.library.search_path import search_path
 
+# What builds is imported where it is used: help and a mistyped option are answered without NumPy.
+if TYPE_CHECKING:
+    from fmus.builder.recipe import Recipe
+    from fmus.loader.runtime import Runtime
+
+#: Pantograph ports that a line may have, as in `fmus.builder.recipe`.
+_MAX_PORTS: Final = 16
 DEFAULT_FOLDER = Path("build/fmus")
 
 
@@ -43,6 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def carry_out(options: argparse.Namespace) -> int:
     """Carry out a verb that was understood and return the exit code; what a user can cause is one message."""
+    from fmus.builder.recipe import BuildError, UnknownFmuError
+
     try:
         code: int | None = options.run(options)
         if sys.stdout is not None:  # closed by the caller
@@ -126,12 +120,15 @@ def add_doctor(verbs: Any) -> None:
 
 
 def _count(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and len(text) <= 2 and 1 <= int(text) <= MAX_PORTS):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of pantographs, 1 to {MAX_PORTS}")
+    if not (text.isascii() and text.isdigit() and len(text) <= 2 and 1 <= int(text) <= _MAX_PORTS):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of pantographs, 1 to {_MAX_PORTS}")
     return int(text)
 
 
 def _build(options: argparse.Namespace) -> None:
+    from fmus.builder.fmu_build import build, why_no_loader
+    from fmus.builder.recipe import BuildError, known_names
+
     if options.runtime is not None and options.standalone is False:
         raise BuildError("--runtime is for standalone FMUs, which --no-standalone excludes")
     for wanted in _recipes(options.names or known_names(), options):
@@ -143,6 +140,9 @@ def _build(options: argparse.Namespace) -> None:
 
 def _runtime(options: argparse.Namespace, replaced: Path) -> Runtime | None:
     """Return the Python that an FMU is to bring along, if it is asked for or the FMU that it replaces brings one."""
+    from fmus.builder.recipe import BuildError
+    from fmus.builder.standalone_fmu import bundled_platform, runtime_of
+
     if options.standalone or options.runtime is not None:
         return _noted(runtime_of(options.runtime))
     there = bundled_platform(replaced) if options.standalone is None else ""
@@ -165,14 +165,20 @@ def _noted(runtime: Runtime) -> Runtime:
 
 
 def _write_runtime(options: argparse.Namespace) -> None:
+    from fmus.builder.standalone_fmu import runtime_of, write_runtime
+
     print(write_runtime(_noted(runtime_of(options.runtime)), options.out))
 
 
 def _examine(options: argparse.Namespace) -> int:
+    from fmus.loader import doctor
+
     return doctor.main(options.fmu)
 
 
 def _recipes(names: Sequence[str], options: argparse.Namespace) -> list[Recipe]:
+    from fmus.builder.recipe import BuildError, doubts, recipe
+
     # All names are looked up before anything is built: a typing mistake must not cost a build.
     for folder in options.library or ():
         if not folder.is_dir():
@@ -185,6 +191,9 @@ def _recipes(names: Sequence[str], options: argparse.Namespace) -> list[Recipe]:
 
 
 def _fingerprint(options: argparse.Namespace) -> None:
+    from fmus.builder.recipe import UnknownFmuError, fingerprint
+    from fmus.builder.watched_places import watched_places
+
     definitions = [] if options.built_from is None else [options.built_from]
     try:
         (wanted,) = _recipes([options.name], options)
@@ -201,6 +210,8 @@ def _fingerprint(options: argparse.Namespace) -> None:
 
 
 def _list(options: argparse.Namespace) -> None:
+    from fmus.builder.recipe import known_names
+
     for name in known_names():
         print(name)
 

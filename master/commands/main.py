@@ -7,25 +7,25 @@ Exit codes: 0 done; 1 failed, invalid or incomplete (scenario, definition, FMU, 
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
-from collections.abc import Collection, Mapping, Sequence
-from typing import Final
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, Final
 
+from master.commands import verb_options
 from master.commands.verb_execution import carry_out
 
-#: Module and function that declare each verb and its options, in the order of the help. A module is imported when its
-#: verb is asked for: sweeps need ten times as many modules as a run.
-VERBS: Final[Mapping[str, tuple[str, str]]] = {
-    "run": ("run_command", "add_run"),
-    "validate": ("scenario_commands", "add_validate"),
-    "pack": ("scenario_commands", "add_pack"),
-    "compare": ("report_commands", "add_compare"),
-    "report": ("report_commands", "add_report"),
-    "calibrate": ("calibrate_command", "add_calibrate"),
-    "verify": ("verify_command", "add_verify"),
-    "study": ("study_command", "add_study"),
-    "sweep": ("sweep_command", "add_sweep"),
+#: What declares each verb and its options, in the order of the help.
+VERBS: Final[Mapping[str, Callable[[Any], None]]] = {
+    "run": verb_options.add_run,
+    "validate": verb_options.add_validate,
+    "pack": verb_options.add_pack,
+    "compare": verb_options.add_compare,
+    "report": verb_options.add_report,
+    "calibrate": verb_options.add_calibrate,
+    "verify": verb_options.add_verify,
+    "study": verb_options.add_study,
+    "sweep": verb_options.add_sweep,
+    "optimise": verb_options.add_optimise,
 }
 
 
@@ -46,6 +46,5 @@ def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     for name in wanted:
-        module, declare = VERBS[name]
-        getattr(importlib.import_module(f"master.commands.{module}"), declare)(verbs)
+        VERBS[name](verbs)
     return parser

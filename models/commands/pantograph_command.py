@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from models.arrays import FloatArray
 from models.commands.physics_files import write_csv, write_figure
-from models.commands.physics_options import add_settings, check_folder, finite, new_folder, print_table, settings, warn
+from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import doubts, load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
@@ -54,20 +54,6 @@ class Characteristics:
     frequency: FloatArray
     apparent_mass: npt.NDArray[np.complex128]
     freedom: int = 0
-
-
-def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Register the verb."""
-    parser = subparsers.add_parser("pantograph", help="statics over height, modes, apparent mass of a pantograph")
-    parser.add_argument("pantograph", help="name in the library, or a definition file")
-    parser.add_argument("--force", type=finite, default=157.5, help="contact force of the working point [N]")
-    parser.add_argument(
-        "--heights", type=finite, nargs=2, default=None, metavar=("FROM", "TO"), help="strip heights above rail [m]"
-    )
-    parser.add_argument("--height", type=finite, default=None, help="strip height of the working point [m]")
-    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
-    add_settings(parser)
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

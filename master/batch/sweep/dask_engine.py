@@ -29,7 +29,7 @@ import dask.utils
 from distributed import Client, Future, LocalCluster, WorkerPlugin, get_worker, wait
 
 from master.batch.sweep.sweep_engines import MakeRuns
-from master.batch.sweep.sweep_run import RunPlace, SweepResult, carry_out
+from master.batch.sweep.sweep_run import ATTEMPTS, DIED, RunPlace, SweepResult, carry_out
 from master.batch.sweep.swept_systems import SweepRun
 from master.errors import MasterError
 from master.system.components import System
@@ -45,8 +45,6 @@ _ALONE: Final = 10.0
 _SETTINGS: Final = {"distributed.worker.daemon": True, "distributed.deploy.lost-worker-timeout": "120s"}
 #: Packages whose versions workers must share with the master: what computes a figure, and what carries it.
 _PACKAGES: Final = ("openpanto", "numpy", "scipy", "numba", "fmpy", "pythonfmu", "distributed")
-#: How often a run is made whose worker dies.
-_ATTEMPTS: Final = 2
 _ADDRESS: Final = re.compile(r"(?:[a-z]+://)?(?:\[[0-9a-f:]+\]|[^\s/:\[\]]+):\d+")
 #: What cuts a connection.
 _GONE: Final = (OSError, TimeoutError, RuntimeError, AttributeError, CancelledError)
@@ -343,12 +341,12 @@ class _Crew:
         run, worker = errand.run, errand.worker.removeprefix("tcp://")
         del self._errands[run.key]
         self._deaths[run.key] += 1
-        if self._deaths[run.key] < _ATTEMPTS:
+        if self._deaths[run.key] < ATTEMPTS:
             self._engine.tell(f"worker {worker} died in run {run.number}; the run is made once more")
             waiting.append(run)
             return
         self._engine.tell(f"worker {worker} died in run {run.number} too; the run has failed")
-        yield SweepResult(run.key, reason=f"the worker's process died in this run, {_ATTEMPTS} times", worker=worker)
+        yield SweepResult(run.key, reason=DIED, worker=worker)
 
     def _arrived(self, waiting: list[SweepRun]) -> Iterator[SweepResult]:
         """Wait a little and yield what has come."""

@@ -1,9 +1,10 @@
-"""Which engine makes the runs of a sweep: this process, or the workers of Dask if they are asked for."""
+"""Which engine makes the runs of a sweep: one process beside this one, or the workers of Dask if they are asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from master.batch.sweep.child_engine import ChildEngine, can_start_processes
 from master.batch.sweep.sweep_engines import HereEngine, SweepEngine
 from master.errors import MasterError, UsageError
 
@@ -36,7 +37,7 @@ def engine_of(
         If Dask is not installed.
     """
     if jobs is None and scheduler is None:
-        return HereEngine()
+        return ChildEngine(tell, renew_after) if can_start_processes() else HereEngine()
     if jobs is not None and scheduler is not None:
         raise UsageError("--jobs starts processes of this computer, --scheduler uses those of a cluster: give one")
     try:

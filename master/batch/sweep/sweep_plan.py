@@ -15,7 +15,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -34,7 +34,29 @@ STUDY: Final = "study.toml"
 _HEAD: Final = re.compile(r"\s*(.+?)\s*(?:\[([^\]]*)\])?\s*")
 
 
-class SweepRequest(BaseModel):
+class PlainRequest(BaseModel):
+    """What a batch is asked for, read from plain data; unknown names and impossible values are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any], origin: str = "") -> Self:
+        """Return the request in plain data.
+
+        Raises
+        ------
+        RequestError
+            Naming the first thing that is wrong, and ``origin``.
+        """
+        try:
+            return cls.model_validate(dict(data))
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise RequestError(": ".join(filter(None, (origin, where, first["msg"])))) from error
+
+
+class SweepRequest(PlainRequest):
     """What a sweep is asked for: the options of the command, the table ``[sweep]`` of ``study.toml``.
 
     Attributes
@@ -65,8 +87,6 @@ class SweepRequest(BaseModel):
         ``figures``, nothing; ``failed``, what those left that failed.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     over: dict[str, str] = Field(default_factory=dict)
     vary: dict[str, str] = Field(default_factory=dict)
     samples: int | None = Field(None, gt=0, le=MOST_RUNS)
@@ -79,22 +99,6 @@ class SweepRequest(BaseModel):
     mean_force: str | None = None
     tolerance: float = Field(0.2, gt=0)
     keep: Keep = "figures"
-
-    @classmethod
-    def read(cls, data: Mapping[str, Any], origin: str = "") -> SweepRequest:
-        """Return the request in plain data.
-
-        Raises
-        ------
-        RequestError
-            Naming the first thing that is wrong, and ``origin``.
-        """
-        try:
-            return cls.model_validate(dict(data))
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise RequestError(": ".join(filter(None, (origin, where, first["msg"])))) from error
 
 
 def stored_request(folder: Path) -> dict[str, Any]:
@@ -179,7 +183,7 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     if not parts:
         raise RequestError("nothing is varied: give --over, --vary with --samples, or --from-csv")
     parameters = tuple(p for part in parts for p in part.parameters)
-    _check_distinct(parameters)
+    check_distinct(parameters)
     points = tuple(tuple(itertools.chain(*rows)) for rows in itertools.product(*(part.rows for part in parts)))
     each = len(points) // len(names) if names else 0
     return SweepPlan(parameters, points, distributions, tuple(name for name in names for _ in range(each)))
@@ -197,7 +201,8 @@ def _check_sensitivity(request: SweepRequest) -> None:
         raise RequestError("--sensitivity has samples of its own: leave out --method")
 
 
-def _check_distinct(parameters: Sequence[SweptParameter]) -> None:
+def check_distinct(parameters: Sequence[SweptParameter]) -> None:
+    """Raise a `RequestError` if a parameter is varied twice."""
     names = [name for p in parameters for name in (p.targets or (p.name,))]
     for name in dict.fromkeys(names):
         if names.count(name) > 1:

@@ -18,7 +18,7 @@ from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from tests import forked_commands
 from tests.foreign_fmus import component, connector, ssd, system
-from tests.master.conftest import SSV, ssd_text
+from tests.master.conftest import CATENARY, SSV, ssd_text
 
 ROOT = Path(__file__).parents[4]
 GRID = ("--over", "speed=40,50,60", "--over", "catenary.stiffness=4000:6000:1000")
@@ -38,13 +38,6 @@ def whole_table(toy_fmus, tmp_path_factory):
     with open_scenario(scenario, Overrides(), build=False) as found:
         sweep(PreparedSweep.of(found.system, SweepRequest.read(GRID_REQUEST)), folder / "out")
     return (folder / "out" / "sweep.csv").read_bytes()
-
-
-@pytest.fixture
-def toy_system(toy):
-    """The toy scenario's system."""
-    with open_scenario(toy, Overrides(), build=False) as found:
-        yield found.system
 
 
 @pytest.fixture
@@ -75,6 +68,27 @@ def command(toy, tmp_path):
         if process.poll() is None:
             process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def ending_toy(toy, tmp_path):
+    """Function that gives the toy scenario a line that does something instead of failing; returns the scenario."""
+
+    def made(instead):
+        source = CATENARY.replace('raise RuntimeError("the wire broke at 100 percent load")', instead)
+        assert source != CATENARY
+        script = tmp_path / "ending_toy.py"
+        script.write_text(source)
+        shutil.copy(FmuBuilder.build_FMU(script, dest=tmp_path), toy / "resources" / "ToyCatenary.fmu")
+        return toy
+
+    return made
+
+
+@pytest.fixture
+def exiting_toy(ending_toy):
+    """The toy scenario with a line whose FMU ends its process instead of failing."""
+    return ending_toy("import os; os._exit(3)")
 
 
 def ended(process, seconds=120):

@@ -3,19 +3,16 @@
 import json
 import os
 import re
-import shutil
 import signal
 import socket
 import time
 from contextlib import contextmanager
 
 import pytest
-from pythonfmu.builder import FmuBuilder
 
 from master.errors import MasterError
 from tests import forked_commands
 from tests.master.batch.sweep.conftest import GRID, ROOT, ended, journal
-from tests.master.conftest import CATENARY
 
 distributed = pytest.importorskip("distributed")
 
@@ -103,17 +100,6 @@ def test_the_same_bits_here_with_processes_and_through_a_scheduler(swept, tmp_pa
     assert len(used["one"]) >= 2, "a process is renewed after two runs"
     assert len(used["two"]) == 2
     assert len(used["cluster"]) == 2
-
-
-@pytest.fixture
-def exiting_toy(toy, tmp_path):
-    """The toy scenario with a line whose FMU ends its process instead of failing."""
-    source = CATENARY.replace('raise RuntimeError("the wire broke at 100 percent load")', "import os; os._exit(3)")
-    assert source != CATENARY
-    script = tmp_path / "exiting_toy.py"
-    script.write_text(source)
-    shutil.copy(FmuBuilder.build_FMU(script, dest=tmp_path), toy / "resources" / "ToyCatenary.fmu")
-    return toy
 
 
 def test_a_run_whose_worker_always_dies_is_a_row_and_the_others_go_on(exiting_toy, command, tmp_path):

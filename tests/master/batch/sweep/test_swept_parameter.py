@@ -45,6 +45,7 @@ def line_and_pantograph(tmp_path):
         ("stop", "2,3", "s", (2.0, 3.0)),
         ("line.law", "soft,hard", "", ("soft", "hard")),
         ("train.count", "1,2", "", ("1", "2")),
+        ("train.count", "1:7:3,9", "", ("1", "4", "7", "9")),
     ],
 )
 def test_values(line_and_pantograph, name, text, unit, values):
@@ -73,6 +74,9 @@ def test_a_name_without_component_is_that_of_every_pantograph(line_and_pantograp
         ("line.tension", "1:2:0N", "never lead from 1 to 2"),
         ("line.tension", "0:1:1e-9N", "more than 100000"),
         ("line.tension", "1N,1N", "appears more than once"),
+        ("train.count", "1:3:1,2", "appears more than once"),
+        ("train.count", "1:3", "a range is written FIRST:LAST:STEP"),
+        ("train.count", "0:1000000:1", "more than 100000"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(line_and_pantograph, name, text, said):

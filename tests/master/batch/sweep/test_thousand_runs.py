@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from pythonfmu.builder import FmuBuilder
 from scipy import stats
 
 from tests.master.batch.sweep.conftest import journal
+from tests.master.conftest import CATENARY, PANTOGRAPH
 
 pytest.importorskip("distributed")
 
@@ -13,9 +15,25 @@ from master.batch.sweep.dask_engine import DaskEngine
 pytestmark = pytest.mark.long
 #: Growth that a process may show between its fiftieth run and its last [MB].
 GROWTH = 5.0
+#: What the scripts of this project's FMUs end with: pythonfmu keeps the class that a script makes for every instance.
+LASTING = """
+import ctypes
+
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+{name} = globals().setdefault("first", {name})
+"""
 
 
-def test_a_thousand_runs_complete_and_five_hundred_do_not_grow(swept, tmp_path):
+@pytest.fixture
+def lasting_toy(toy, tmp_path):
+    """The toy scenario with FMUs that leave nothing in the process, as this project's do."""
+    for name, source in (("ToyCatenary", CATENARY), ("ToyPantograph", PANTOGRAPH)):
+        script = tmp_path / f"lasting_{name.lower()}.py"
+        script.write_text(source + LASTING.format(name=name))
+        FmuBuilder.build_FMU(script, dest=toy / "resources")
+
+
+def test_a_thousand_runs_complete_and_five_hundred_do_not_grow(lasting_toy, swept, tmp_path):
     samples = {"vary": {"catenary.stiffness": "normal(5000, 100)"}, "samples": 1000}
     done = swept("out", DaskEngine(jobs=2, renew_after=500), **samples)
     assert (len(done.rows), done.failures, done.status) == (1000, {}, "complete")

@@ -36,6 +36,7 @@ from master.recording.recording import Recording
 from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
 from master.recording.static_geometry import GeometryObserver
 from master.results import run_summary
+from master.results.kept_definitions import write_definitions
 from master.results.results_folder import RunFolder, claimed_for_run, write_forces
 from master.results.run_results import Results
 from master.safety.interruption import interruptible
@@ -110,6 +111,7 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), option
     with claimed_for_run(folder, options.continuation) as own, unfinished(own.summary_file, own.run):
         description = run_summary.describe(system, own.run)
         own.write_summary({**description, "status": "running"})
+        write_definitions(own.path, system.components)
         troubles: dict[str, str] = {}
         with (
             interruptible() as stop_wanted,

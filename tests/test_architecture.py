@@ -35,7 +35,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"shape"},
         {"linear_motion", "condition"},
         {"contact_and_slack", "line_state"},
-        {"step"},
+        {"step", "exchange"},
         {"line_model"},
         {"statics", "line_energy", "strip_checks"},
         {"line_part", "line_advice"},

@@ -31,7 +31,7 @@ WHOLE = {
     "master/safety/folder_lock.py": {"_sign"},
     "master/results/results_folder.py": {"write_forces"},
     "master/safety/safe_files.py": {"write_atomically"},
-    "master/report/report_files.py": {"write"},
+    "master/report/report_files.py": {"write_charts"},
     "master/results/parquet_export.py": {"_write"},
     "master/batch/sweep/sweep_table.py": {"write_parquet"},
     "master/report/film_file.py": {"write_film"},

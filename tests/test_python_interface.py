@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import dataclasses
 import json
 import os
 import pickle
@@ -195,6 +196,39 @@ def test_frames_have_units_in_their_titles(toy_run):
     assert "uplift [m]" in results.uplifts
     assert "duration [s]" in results.events
     assert "mean [N]" in results.spans
+
+
+def test_variables_are_found_by_their_unit_and_others_are_answered_by_their_likes(toy_run):
+    pytest.importorskip("pandas")
+    recording = toy_run[1].stored.recordings[0]
+    units = tuple("N" if n.endswith(".force") else "m" for n in recording.names)
+    stored = dataclasses.replace(toy_run[1].stored, recordings=(dataclasses.replace(recording, units=units),))
+    results = master.Results(stored)
+    forces = [name for name in recording.names if name.endswith(".force")]
+    assert forces
+    assert list(results.frame("*[N]")) == list(results.frame("*[N]", "nothing")) == [f"{name} [N]" for name in forces]
+    assert list(results.frame("*contact.force [N]")) == [f"{n} [N]" for n in forces if n.endswith("contact.force")]
+    with pytest.raises(master.MasterError, match=r"units are \[N\], \[m\].* lists them all"):
+        results.frame("*[kN]")
+    with pytest.raises(master.MasterError, match=r"did you mean .*contact\.force"):
+        results.frame("catenary.pantograph[1].contact.forse")
+
+
+def test_what_is_no_scenario_and_no_value_is_one_sentence(toy_run):
+    with pytest.raises(master.MasterError, match=r"^open_scenario\(None\): give the path"):
+        master.open_scenario(None)
+    with pytest.raises(master.MasterError, match=r"^open_scenario\(''\): give the path"):
+        master.open_scenario("")
+    with pytest.raises(master.MasterError, match=r"^set\('static_force=120'\) says no parameter with its value: write"):
+        toy_run[0].set("static_force=120")
+
+
+def test_a_report_names_what_was_changed_of_its_scenario(toy_run, tmp_path):
+    changed = master.run(toy_run[0].set(static_force="160"), tmp_path / "changed")
+    changed.write_report()
+    head = (tmp_path / "changed" / "report.html").read_text(encoding="utf-8").split("</h1>")[1].split("</p>")[0]
+    assert "with pantograph.static_force = 160" in head
+    assert "changes" not in toy_run[1].stored.summary
 
 
 def test_scenario_and_results_travel_between_processes(toy_run):

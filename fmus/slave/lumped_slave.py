@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from operator import attrgetter, methodcaller
 from pathlib import Path
 from typing import Any, ClassVar
@@ -39,7 +40,9 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
         return LumpedPantographPart(definition)
 
     def _make_ports(self, part: LumpedPantographPart) -> Ports:
-        return pantograph_ports(part)
+        ports = pantograph_ports(part)
+        signals = tuple(signal for port in ports.outputs for signal in port.signals)
+        return replace(ports, outputs=(Port(signals, attrgetter("outputs")),))  # read in one piece
 
     def _start_warnings(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))

@@ -20,6 +20,7 @@ from master.report.moving_picture import MOST_LAPS, make_movie
 from master.report.run_inputs import differing_inputs
 from master.report.terminal_summary import WIDTH, Terminal
 from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
+from master.results.kept_definitions import differing_definitions
 from master.results.run_results import Results
 from master.safety import folder_lock
 from master.safety.safe_files import write_atomically
@@ -31,6 +32,8 @@ def report_verb(options: argparse.Namespace) -> int:
         raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
     if options.film:
         check_name(options.film)
+    if results_folder.made_by(options.run / "sweep.json", "openpanto sweep"):
+        return _report_sweep(options)
     results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
@@ -48,6 +51,18 @@ def report_verb(options: argparse.Namespace) -> int:
         print(_film(done, options))
     if measured is not None:
         _say_measured(measured)
+    return 0
+
+
+def _report_sweep(options: argparse.Namespace) -> int:
+    """Write the page and the charts of a sweep again."""
+    from master.batch.sweep import sweep_session  # takes longer than all that the report of a run needs
+
+    if options.measured or options.film or options.parquet:
+        text = "--measured, --film and --parquet are of a single run"
+        raise UsageError(f"{options.run} holds a sweep; {text}")
+    with _claimed(options.run):
+        print(*sweep_session.write_report(options.run, options.figures), sep="\n")
     return 0
 
 
@@ -144,7 +159,7 @@ def _show(
 
 def _show_inputs(console: Terminal, runs: Sequence[Results]) -> None:
     """Print what differs in the inputs of runs."""
-    rows = differing_inputs([run.summary for run in runs])
+    rows = [*differing_definitions(runs), *differing_inputs([run.summary for run in runs])]
     if not rows:
         console.print("the inputs are the same")
         return
@@ -163,5 +178,6 @@ def _as_json(c: run_difference.RunDifference, first: Results, other: Results) ->
     notes = list(run_difference.setting_notes([first, other]))
     forces = {"rms": c.rms, "largest": c.largest, "apart": c.apart}
     known = {"notes": notes, "contact": one.contact, "difference": difference, **forces}
-    inputs = {name: values for name, *values in differing_inputs([first.summary, other.summary])}
+    rows = [*differing_definitions([first, other]), *differing_inputs([first.summary, other.summary])]
+    inputs = {name: values for name, *values in rows}
     return {**known, "filters": filters, "same_filter": same, "inputs": inputs}

@@ -13,6 +13,7 @@ from master.batch.sweep.sweep_plan import SweepRequest, stored_request
 from master.batch.sweep.sweep_session import (
     CSV,
     JSON,
+    PAGE,
     PARQUET,
     SENSITIVITY_CSV,
     PreparedSweep,
@@ -80,5 +81,6 @@ def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> Non
         for number, reason in list(done.failures.items())[:10]:
             console.print(f"run {number} failed: {reason}", markup=False, soft_wrap=True)
         files = [str(folder / name) for name in (CSV, PARQUET, SENSITIVITY_CSV) if (folder / name).is_file()]
-        text = f"{len(done.finished)} runs, {len(done.failures)} failed; table: {', '.join(files)}"
+        count = f"{len(done.finished)} runs, {len(done.failures)} failed"
+        text = f"{count}; page: {folder / PAGE}; table: {', '.join(files)}"
         console.print(text, markup=False, soft_wrap=True)

@@ -250,9 +250,9 @@ def add_compare(verbs: Any) -> None:
 
 def add_report(verbs: Any) -> None:
     """Declare ``report`` and its options."""
-    text = "write plots and report of a run again, with a measurement or a film on request"
+    text = "write plots and report of a run or a sweep again, with a measurement or a film of a run on request"
     parser = add_verb(verbs, "report", text, _later("report_commands", "report_verb"))
-    parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
+    parser.add_argument("run", type=Path, metavar="RUN", help="results folder of a run or a sweep")
     parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to compare with")
     parser.add_argument(
         "--measured-offset",

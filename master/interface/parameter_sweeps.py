@@ -12,7 +12,7 @@ from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sensitivity import SensitivityMethod
 from master.batch.sweep.sensitivity_table import sensitivity_heads, sensitivity_rows
 from master.batch.sweep.sweep_plan import Keep, SweepRequest
-from master.batch.sweep.sweep_session import PreparedSweep, SweepOutcome
+from master.batch.sweep.sweep_session import PAGE, PreparedSweep, SweepOutcome
 from master.batch.sweep.sweep_session import sweep as run_sweep
 from master.batch.sweep.sweep_table import columns
 from master.errors import RequestError
@@ -49,6 +49,11 @@ class Sweep:
     def failures(self) -> dict[int, str]:
         """Why runs failed, by their numbers."""
         return self.outcome.failures
+
+    @property
+    def page(self) -> Path:
+        """The page of its charts, a single HTML file."""
+        return self.folder / PAGE
 
     @property
     def table(self) -> pandas.DataFrame:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from master.evaluation.measured_force import MeasuredComparison
+from master.report.charts.chart import Chart
 from master.report.charts.run_charts import file_charts
 from master.report.charts.static_figure import static_figure
 from master.report.run_page import page
@@ -33,20 +34,30 @@ def write(done: Results, measured: MeasuredComparison | None = None, formats: Co
         Of `FORMATS`. Those that the folder already holds charts in are written as well, so that none is older than the
         report; PNG, if there is neither.
     """
-    from matplotlib import rc_context
-
     path = done.folder / results_folder.REPORT
     write_atomically(path, page(done, measured).encode())
-    figures = file_charts(done)
-    there = [ending for ending in FORMATS if any((done.folder / f"{name}.{ending}").exists() for name in figures)]
-    wanted = {*formats, *there} or {_DEFAULT}
-    for name, charts in figures.items():
-        figure = static_figure(charts)
+    write_charts(file_charts(done), done.folder, formats)
+    return path
+
+
+def write_charts(charts: Mapping[str, Sequence[Chart]], folder: Path, formats: Collection[str] = ()) -> list[Path]:
+    """Write charts, those of a file one below the other, by the file's name; return the files.
+
+    Those formats that the folder already holds charts in are written as well; PNG, if there is neither.
+    """
+    from matplotlib import rc_context
+
+    there = [ending for ending in FORMATS if any((folder / f"{name}.{ending}").exists() for name in charts)]
+    wanted = sorted({*formats, *there} or {_DEFAULT})
+    written = []
+    for name, each in charts.items():
+        figure = static_figure(each)
         # Laid out once, not for every format and each time twice.
         layout: Any = figure.get_layout_engine()
         layout.execute(figure)
         figure.set_layout_engine("none")
-        for ending in sorted(wanted):
-            with atomic_file(done.folder / f"{name}.{ending}") as temporary, rc_context(_SAME_NAMES):
+        for ending in wanted:
+            written.append(folder / f"{name}.{ending}")
+            with atomic_file(written[-1]) as temporary, rc_context(_SAME_NAMES):
                 figure.savefig(temporary, format=ending, **FORMATS[ending])
-    return path
+    return written

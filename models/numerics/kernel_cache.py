@@ -68,6 +68,27 @@ def load_kernels(name: str, source: bytes) -> ModuleType:
     return _load(module_name, _kept_source(source, f"{name}-{key}")) if found is None else found
 
 
+def kernels_if_wanted(name: str, source: bytes) -> ModuleType | None:
+    """Return kernels as `load_kernels` does, None if there are none or `SWITCH` says to do without.
+
+    Raises
+    ------
+    KernelError
+        If the environment asks for kernels that cannot be had, or for ones that do not exist.
+    """
+    wanted = os.environ.get(SWITCH, "auto")
+    if wanted not in ("auto", "numpy", "numba"):
+        raise KernelError(f"{SWITCH} is '{wanted}'; use auto, numpy or numba")
+    if wanted == "numpy":
+        return None
+    try:
+        return load_kernels(name, source)
+    except ImportError as error:
+        if wanted == "numba":
+            raise KernelError(f"{SWITCH} is 'numba', but {error}") from error
+        return None
+
+
 def _load(name: str, path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None

@@ -4,28 +4,35 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 from master.batch.batch_session import BatchFiles, BatchState, run_tasks
+from master.batch.sweep.held_fmus import held_fmus
+from master.batch.sweep.pages import sweep_page
+from master.batch.sweep.pages.sweep_view import read_view, view_of
 from master.batch.sweep.sensitivity import SensitivityIndices, described
 from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, sensitivity_data, sensitivity_of
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
-from master.batch.sweep.sweep_run import WORK, Row, RunPlace, SweepResult
+from master.batch.sweep.sweep_run import Row, RunPlace, SweepResult
 from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
-from master.batch.sweep.swept_systems import SweepRun, make_runs
+from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
 from master.errors import InterruptedRunError
+from master.report.report_files import write_charts
 from master.results import results_folder
 from master.system.components import System
 
 JSON: Final = "sweep.json"
 CSV: Final = "sweep.csv"
 PARQUET: Final = "sweep.parquet"
+PAGE: Final = "sweep.html"
+GENERATOR: Final = "openpanto sweep"
 SENSITIVITY_CSV: Final = "sensitivity.csv"
 SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
@@ -75,6 +82,8 @@ class SweepOutcome(BatchState):
         All of the plan.
     found : dict
         What has become of runs, by key.
+    setting : dict
+        What the page needs to know of the scenario, as in ``sweep.json``.
     """
 
     scenario: str
@@ -82,6 +91,7 @@ class SweepOutcome(BatchState):
     plan: SweepPlan
     runs: tuple[SweepRun, ...]
     found: Mapping[str, SweepResult] = field(default_factory=dict)
+    setting: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def finished(self) -> tuple[SweepRun, ...]:
@@ -98,7 +108,7 @@ class SweepOutcome(BatchState):
         """The table so far."""
         return table_rows(self.runs, self.found)
 
-    @property
+    @cached_property
     def sensitivity(self) -> tuple[SensitivityIndices, ...]:
         """Indices of every figure that varies; none if they were not asked for, or as long as runs are missing."""
         return sensitivity_of(self.request, self.plan, self.runs, self.found)
@@ -113,6 +123,7 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
         "status": outcome.status,
         "date": outcome.date,
         "versions": dict(outcome.versions),
+        "setting": dict(outcome.setting),
         "request": outcome.request.model_dump(mode="json", exclude_none=True),
         "parameters": [
             {"name": p.name, "unit": p.unit, "column": p.title, "targets": p.targets, "sampled": sampled.get(p.name)}
@@ -128,17 +139,21 @@ class SweepFiles(BatchFiles[SweepOutcome]):
     """The files of a sweep: written after every run, but not so often that writing takes more than a share of time."""
 
     def __init__(self) -> None:
-        super().__init__("sweep", "openpanto sweep", JSON, as_data, {CSV: lambda outcome: as_csv(outcome.rows)})
+        super().__init__("sweep", GENERATOR, JSON, as_data, {CSV: lambda outcome: as_csv(outcome.rows)})
         self.__dict__["_due"] = 0.0
 
     def write(self, state: SweepOutcome, folder: Path) -> None:
-        """Write the files of a state, unless they were written just now and more is to come."""
+        """Write the files of a state, unless they were written just now and more is to come; the page at the end."""
         began = time.monotonic()
         if state.status == "running" and began < self.__dict__["_due"]:
             return
         super().write(state, folder)
         if has_parquet() and state.found:
             write_parquet(state.rows, folder / PARQUET)
+        if state.status != "running":
+            indices = sensitivity_data(state.sensitivity)["indices"]
+            view = view_of(as_data(state), state.rows, folder, indices)
+            results_folder.write_text(folder / PAGE, sweep_page.page(view))
         now = time.monotonic()
         self.__dict__["_due"] = now + max(_LEAST_PAUSE, (now - began) / _SHARE)
 
@@ -169,7 +184,7 @@ class PreparedSweep:
         """
         plan = make_plan(base, request)
         runs = make_runs(base, plan, request)
-        return cls(base, SweepOutcome(scenario=base.name, request=request, plan=plan, runs=runs))
+        return cls(base, SweepOutcome(base.name, request, plan, runs, setting=scenario_setting(base, plan)))
 
     @property
     def announced(self) -> str:
@@ -219,7 +234,7 @@ def sweep(
     found: dict[str, SweepResult] = {}
     try:
         with results_folder.taken_over(folder, JSON, files.generator, files.kind):
-            _remove_leftovers(place)
+            _remove_leftovers(folder)
             with closing(SweepJournal(folder)) as journal:
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
                 found |= {r.key: old[r.key] for r in state.runs if r.key in old}
@@ -233,7 +248,7 @@ def sweep(
 
                 if why := prepared.announced:
                     tell(why)
-                with chosen.opened(prepared.base, place) as make_runs_of:
+                with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
                     tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     ended = run_tasks(state, results, finish, files, folder)
@@ -242,6 +257,19 @@ def sweep(
     except (InterruptedRunError, KeyboardInterrupt) as error:
         done = f"{len([r for r in state.runs if r.key in found])} of {len(state.runs)} runs are finished"
         raise InterruptedRunError(f"interrupted. {done} and in {folder}; the same command makes the others") from error
+
+
+def write_report(folder: Path, formats: Collection[str] = ()) -> list[Path]:
+    """Write the page of the sweep in a folder again, and its charts as files in some formats; return their paths.
+
+    Raises
+    ------
+    MasterError
+        If its files cannot be read.
+    """
+    view = read_view(folder / JSON, folder / CSV, folder / SENSITIVITY_JSON)
+    results_folder.write_text(folder / PAGE, sweep_page.page(view))
+    return [folder / PAGE, *write_charts(sweep_page.file_charts(view), folder, formats)]
 
 
 def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], None]) -> None:
@@ -257,9 +285,10 @@ def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], N
         tell(text)
 
 
-def _remove_leftovers(place: RunPlace) -> None:
-    for path in place.folder.glob(f"{WORK}*"):
-        shutil.rmtree(path, ignore_errors=True)
+def _remove_leftovers(folder: Path) -> None:
+    for place in (folder, folder / RUNS):
+        for path in place.glob(f"{results_folder.WORK}*"):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _is_there(result: SweepResult, place: RunPlace) -> bool:

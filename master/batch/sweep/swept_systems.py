@@ -18,6 +18,7 @@ from master.scenario.overrides import with_values
 from master.ssp.ssp_units import COMMON, conversion
 from master.ssp.ssv import Value
 from master.system.components import Component, System, without
+from master.system.contacts import find_contacts
 from master.system.pantograph_motion import pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
@@ -149,6 +150,25 @@ def _runs(base: System, plan: SweepPlan, choices: _Choices) -> Iterator[SweepRun
             raise RequestError(f"run {number} ({_told(values)}): {problem}")
         variant = plan.variants[number - 1] if plan.variants else ""
         yield replace(run, key=_key(origin, run), variant=variant)
+
+
+def scenario_setting(base: System, plan: SweepPlan) -> dict[str, Any]:
+    """Return what the page of a sweep needs to know of its scenario, as plain data."""
+    settings = base.settings
+    limits = settings.limits.model_dump()
+    described = {
+        name: variable.description
+        for p in plan.parameters
+        for name in p.targets
+        if (variable := base.component(name.partition(".")[0]).fmu.variables[name.partition(".")[2]]).description
+    }
+    return {
+        "interval": [settings.interval.start, settings.interval.end],
+        "limits": {"supply": limits.pop("supply"), "own": limits},
+        "speeds": {c.name: v for c in pantographs(base) if (v := _speed(c)) is not None},
+        "contacts": {c.pantograph: c.prefix for c in reversed(find_contacts(base.connections))},
+        "places": described,
+    }
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 
-from master.report.charts.chart import Axis, Band, Bars, Chart, Curve, Level, Points, Stroke, Ticks, fill, gapped
+from master.report.charts.chart import (
+    Axis,
+    Band,
+    Bars,
+    Cells,
+    Chart,
+    Curve,
+    Envelope,
+    Level,
+    Points,
+    Stroke,
+    Ticks,
+    fill,
+    gapped,
+    ink_on,
+)
 from master.report.charts.sample_packing import packed
 
 Trace = dict[str, Any]
@@ -26,24 +42,35 @@ def interactive_figure(chart: Chart) -> dict[str, Any]:
         layout["yaxis2"] = _SHARES
     if any(isinstance(bars, Bars) and bars.width is None and not isinstance(bars.x, tuple) for bars in chart.parts):
         layout["bargap"] = 0.04
+    if any(isinstance(part, Cells) for part in chart.parts):
+        layout |= {"barmode": "overlay", "bargap": 0}
     if chart.group:
         layout["meta"] = {"sync": chart.group}
     return {"data": data, "layout": layout}
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
-    found: dict[str, Any] = {"title": {"text": axis.label}}
+    found: dict[str, Any] = {"title": {"text": _plain(axis.label)}}
     if axis.limits is not None:
         found["range"] = np.log10(axis.limits).tolist() if axis.is_logarithmic else list(axis.limits)
     if axis.is_logarithmic:
         found |= {"type": "log", "exponentformat": "power"}
     if axis.ticks:
         found["tickvals"] = list(axis.ticks)
+    if axis.words:
+        found["ticktext"] = [_plain(word) for word in axis.words]
     return found
+
+
+def _plain(text: str) -> str:
+    """Return text that plotly.js shows as it is: it takes a few elements of HTML for what they are."""
+    return html.escape(text, quote=False).replace("\n", "<br>")
 
 
 def _curve(curve: Curve) -> Trace:
     trace = _lines(curve.name, *curve.points, curve.stroke)
+    if curve.has_marks:
+        trace |= {"mode": "lines+markers", "marker": {"size": 6}}
     if curve.is_whole:
         trace["hoverinfo"] = "skip"
     return trace if curve.is_shown else {**trace, "visible": "legendonly"}
@@ -58,21 +85,68 @@ def _ticks(ticks: Ticks) -> Trace:
 def _bars(bars: Bars) -> Trace:
     colour, hatching = fill(bars.index)
     marker = {"color": colour, "pattern": {"shape": _PATTERNS[hatching], "solidity": 0.4}}
-    x = list(bars.x) if isinstance(bars.x, tuple) else packed(bars.x)
-    trace = {"type": "bar", "name": bars.name, "marker": marker, "x": x, "y": packed(bars.y), "width": bars.width}
-    said = {"text": list(bars.words), "textposition": "none", "hovertemplate": "%{text}"}
+    x = [_plain(name) for name in bars.x] if isinstance(bars.x, tuple) else packed(bars.x)
+    along, across = ("y", "x") if bars.is_lying else ("x", "y")
+    trace: Trace = {"type": "bar", "name": _plain(bars.name), "marker": marker, along: x, across: packed(bars.y)}
+    trace["width"] = bars.width
+    if bars.is_lying:
+        trace["orientation"] = "h"
+    if bars.interval is not None:
+        below, above = bars.y - bars.interval[0], bars.interval[1] - bars.y
+        ends = {"type": "data", "symmetric": False, "array": packed(above), "arrayminus": packed(below)}
+        trace[f"error_{across}"] = {**ends, "thickness": 1.4, "width": 4}
+    said = {"text": [_plain(w) for w in bars.words], "textposition": "none", "hovertemplate": "%{text}"}
     return {**trace, **said} if bars.words else trace
+
+
+def _envelope(envelope: Envelope) -> Trace:
+    gap = np.array([np.nan])
+    x, y = (np.concatenate([np.concatenate((o[k], gap)) for o in envelope.outlines] or [gap]) for k in (0, 1))
+    trace = _lines(envelope.name, x, y, Stroke(envelope.colour, width=0.0))
+    return {
+        **trace,
+        "fill": "toself",
+        "fillcolor": _transparent(envelope.colour, envelope.opacity),
+        "hoverinfo": "skip",
+    }
+
+
+def _cells(cells: Cells) -> Trace:
+    """Return cells as bars that stand on each other's place: they need no other kind of trace, and have hatching."""
+    colours = cells.colours
+    there = [(r, c) for r, c in np.ndindex(cells.values.shape) if colours[r][c]]
+    own = [colours[r][c] for r, c in there]
+    inks = [ink_on(colour) for colour in own]
+    hatching = {"shape": ["/" if cells.hatched[r, c] else "" for r, c in there], "fgcolor": inks, "fgopacity": 0.45}
+    pattern = {**hatching, "fillmode": "overlay", "bgcolor": own, "size": 9, "solidity": 0.12}
+    return {
+        "type": "bar",
+        "x": [int(c) for _, c in there],
+        "y": [1] * len(there),
+        "base": [int(r) - 0.5 for r, _ in there],
+        "width": 1,
+        "marker": {"color": own, "pattern": pattern, "line": {"width": 0}},
+        "text": [_plain(cells.words[r][c]) for r, c in there],
+        "hovertext": [_plain(cells.hints[r][c]) for r, c in there],
+        "hoverinfo": "text",
+        "textposition": "inside",
+        "insidetextanchor": "middle",
+        "textangle": 0,
+        "insidetextfont": {"color": inks, "size": 12},
+        "showlegend": False,
+    }
 
 
 def _points(points: Points) -> Trace:
     marker = {"color": points.colour, "size": points.size, "symbol": points.symbol}
     trace = {"type": "scatter", "mode": "markers", "x": packed(points.x), "y": packed(points.y), "marker": marker}
-    return {**trace, "name": points.name} | ({"text": list(points.words)} if points.words else {})
+    said = {"text": [_plain(word) for word in points.words]} if points.words else {}
+    return {**trace, "name": _plain(points.name), **said}
 
 
 def _lines(name: str, x: Any, y: Any, stroke: Stroke) -> Trace:
     line = {"color": stroke.colour, "dash": stroke.dash, "width": stroke.width}
-    return {"type": "scatter", "mode": "lines", "x": packed(x), "y": packed(y), "line": line, "name": name}
+    return {"type": "scatter", "mode": "lines", "x": packed(x), "y": packed(y), "line": line, "name": _plain(name)}
 
 
 def _shape(part: Band | Level) -> dict[str, Any]:
@@ -101,4 +175,6 @@ def _transparent(colour: str, opacity: float) -> str:
     return f"rgba({red},{green},{blue},{opacity})"
 
 
-_TRACES: Final[dict[type, Callable[[Any], Trace]]] = {Curve: _curve, Ticks: _ticks, Bars: _bars, Points: _points}
+_TRACES: Final[dict[type, Callable[[Any], Trace]]] = {
+    Curve: _curve, Ticks: _ticks, Bars: _bars, Points: _points, Envelope: _envelope, Cells: _cells
+}  # fmt: skip

@@ -43,6 +43,7 @@ class LumpedModel:
         self.K = _chain([s.stiffness for s in definition.stage])
         self.size = n
         self._inverse: dict[float, tuple[Newmark, FloatArray]] = {}
+        self._transition: dict[float, FloatArray] = {}
 
     def initial_state(self, load: FloatArray | None = None) -> LumpedState:
         """Return the pantograph at rest at its reference height, its acceleration that of ``load``, shape (n,) [N]."""
@@ -74,6 +75,36 @@ class LumpedModel:
         velocity, acceleration = self._rates(state, step, displacement)
         state.displacement = displacement
         state.velocity, state.acceleration = np.array(velocity), np.array(acceleration)
+
+    def transition(self, step: float) -> FloatArray:
+        """Return the matrix that leads from the motion before a step and the load at its end to the motion after it.
+
+        The same step as `free_response` and `advance` make, solved for the accelerations: nothing cancels out.
+
+        Returns
+        -------
+        ndarray, shape (3 n, 4 n)
+            Motion mass by mass, bottom to top: displacement, velocity, acceleration; then, in the columns, the load on
+            every mass.
+        """
+        found = self._transition.get(step)
+        if found is None:
+            found = self._transition[step] = self._new_transition(Newmark(step))
+        return found
+
+    def _new_transition(self, newmark: Newmark) -> FloatArray:
+        h, gamma, beta = newmark.step, newmark.gamma, newmark.beta
+        known = np.eye(4 * self.size)
+        motion, load = known[: 3 * self.size], known[3 * self.size :]
+        velocity = motion[1::3] + (1.0 - gamma) * h * motion[2::3]
+        displacement = motion[0::3] + h * motion[1::3] + (0.5 - beta) * h**2 * motion[2::3]
+        inertia = self.M + gamma * h * self.C + beta * h**2 * self.K
+        acceleration = np.linalg.solve(inertia, load - self.C @ velocity - self.K @ displacement)
+        result = np.empty((3 * self.size, 4 * self.size))
+        result[0::3] = displacement + beta * h**2 * acceleration
+        result[1::3] = velocity + gamma * h * acceleration
+        result[2::3] = acceleration
+        return result
 
     def load(self, time: float, base: FloatArray) -> FloatArray:
         """Return uplift and roof motion as loads, shape (n,) [N].

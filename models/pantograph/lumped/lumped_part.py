@@ -8,6 +8,7 @@ from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation
 from models.numerics.newmark import steps_within
+from models.pantograph.lumped.compiled_step import CompiledStep, compiled_step
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
@@ -22,6 +23,8 @@ class LumpedPantographPart:
 
     Attributes
     ----------
+    outputs : ndarray, shape (12 + 3 n,)
+        The strip, then what is observed.
     strip : ndarray, shape (2, 2, 3)
         End A (left), B (right); position, velocity; x, y, z.
     observed : tuple of (name, unit, description)
@@ -31,17 +34,25 @@ class LumpedPantographPart:
     def __init__(self, definition: LumpedDefinition) -> None:
         self.definition = definition
         self.model = LumpedModel(definition)
-        self.state = self.model.initial_state()
         self.time = 0.0
         self._start_time = 0.0
+        # What the model's transition takes: the motion mass by mass, then the load.
+        n = self.model.size
+        self._values = np.zeros(4 * n)
+        self._motion, self._load = self._values[: 3 * n], self._values[3 * n :]
+        self.state = LumpedState(self._motion[0::3], self._motion[1::3], self._motion[2::3])
         # A step changes x, z and z's velocity alone.
         half, y = 0.5 * definition.strip_length, definition.strip_offset
         velocity = [definition.speed, 0.0, 0.0]
-        self.strip = np.array([[[0.0, y + side, 0.0], velocity] for side in (half, -half)])
+        self.outputs = np.zeros(12 + 3 * n)
+        self.strip = self.outputs[:12].reshape(2, 2, 3)
+        self.strip[...] = [[[0.0, y + side, 0.0], velocity] for side in (half, -half)]
+        self._rest = np.array([definition.reference_height, 0.0, 0.0] * n)
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._base = np.zeros(2)
         self._balance: LumpedBalance | None = None
-        self.observed = _observed(len(definition.stage))
+        self._compiled: CompiledStep | None = None
+        self.observed = _observed(n)
 
     def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
         """Set the pantograph to rest at its reference height at ``time``.
@@ -59,24 +70,28 @@ class LumpedPantographPart:
         self.time = self._start_time = time
         load = self.model.load(0.0, base)
         load[-1] -= force
-        self.state = self.model.initial_state(load)
+        self._motion[:] = 0.0
+        self.state.acceleration[:] = self.model.initial_state(load).acceleration
         self._balance = LumpedBalance(self.model, load, force) if self.definition.monitor_energy else None
         self._force.start(time, force)
-        self._base[...] = base
-        self._place_strip()
+        self._compile()
+        self._place()
 
     def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
-        self._force.receive_at(self.time, force, point.item(0), self._x(self.time), self.definition.speed, step)
-        count = steps_within(step, self.definition.time_step)
-        start, h = self.time, step / count
+        start, x, count = self.time, point.item(0), steps_within(step, self.definition.time_step)
+        self.time = start + step
+        if self._compiled is not None:
+            self._compiled.step(self._values, (self._start_time, start, step), count, (force, x), base, self.outputs)
+            return
+        self._force.receive_at(start, force, x, self._x(start), self.definition.speed, step)
+        h = step / count
         height, velocity = base.tolist()
         for k in range(1, count + 1):
             # Received for the step's beginning; the roof continues with its velocity.
             self._base[...] = height + k * h * velocity, velocity
             self._substep(start + k * h, h)
-        self.time = start + step
-        self._place_strip()
+        self._place()
 
     @property
     def energy(self) -> FloatArray:
@@ -90,20 +105,17 @@ class LumpedPantographPart:
 
     def observation_values(self) -> FloatArray:
         """Return height, velocity and acceleration of every mass, shape (3 n,)."""
-        values = np.empty((self.model.size, 3))
-        np.add(self.definition.reference_height, self.state.displacement, out=values[:, 0])
-        values[:, 1] = self.state.velocity
-        values[:, 2] = self.state.acceleration
-        return values.ravel()
+        return self.outputs[12:].copy()
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
+        if self._compiled is not None:
+            self._compiled.give(self._force)
         return {
             "time": np.array([self.time, self._start_time]),
             "displacement": self.state.displacement.copy(),
             "velocity": self.state.velocity.copy(),
             "acceleration": self.state.acceleration.copy(),
-            "base": self._base.copy(),
             **self._force.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
@@ -111,33 +123,41 @@ class LumpedPantographPart:
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
         self.time, self._start_time = (float(t) for t in snapshot["time"])
-        self.state = LumpedState(
-            *(np.array(snapshot[n], dtype=np.float64) for n in ("displacement", "velocity", "acceleration"))
-        )
-        self._base[...] = snapshot["base"]
+        for name in ("displacement", "velocity", "acceleration"):
+            getattr(self.state, name)[:] = snapshot[name]
         self._force.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
-        self._place_strip()
+        self._compile()
+        self._place()
+
+    def _compile(self) -> None:
+        """Let kernels make the steps, if there are any; they keep no balance."""
+        if self._compiled is None and not self.definition.monitor_energy:
+            self._compiled = compiled_step(self.model)
+        if self._compiled is not None:
+            self._compiled.take(self._force)
 
     def _substep(self, time: float, h: float) -> None:
         load = self.model.load(time - self._start_time, self._base)
         force = self._force.at(time)
         load[-1] -= force
-        before = self.state.displacement
-        self.model.advance(self.state, h, self.model.free_response(self.state, h, load))
+        self._load[:] = load
+        after = self.model.transition(h).dot(self._values)
         if self._balance is not None:
-            self._balance.add(h, self.state.displacement - before, load, force)
+            self._balance.add(h, after[0::3] - self.state.displacement, load, force)
+        self._motion[:] = after
 
     def _x(self, time: float) -> float:
         return self.definition.start_position + self.definition.speed * (time - self._start_time)
 
-    def _place_strip(self) -> None:
-        d = self.definition
-        height, velocity = d.reference_height + self.state.displacement.item(-1), self.state.velocity.item(-1)
-        self.strip[:, 0, 0] = self._x(self.time)
-        self.strip[:, 0, 2] = height
-        self.strip[:, 1, 2] = velocity
+    def _place(self) -> None:
+        """Write the strip and what is observed."""
+        outputs, height = self.outputs, self.definition.reference_height
+        outputs[0:12:6] = self._x(self.time)
+        outputs[2:12:6] = height + self._motion.item(-3)
+        outputs[5:12:6] = self._motion.item(-2)
+        np.add(self._motion, self._rest, out=outputs[12:])
 
 
 def _observed(stages: int) -> tuple[tuple[str, str, str], ...]:

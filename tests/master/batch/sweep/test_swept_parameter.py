@@ -95,7 +95,7 @@ def test_a_cell_without_a_unit_where_one_is_needed_is_one_sentence(line_and_pant
 def test_the_value_of_the_scenario_comes_in_the_unit_that_is_asked_for(line_and_pantograph):
     line_and_pantograph.component("line").parameters["tension"] = 19000.0
     assert ParameterReader(line_and_pantograph, "line.tension").present("kN") == pytest.approx(19.0)
-    assert ParameterReader(line_and_pantograph, "line.temperature").present("degC") is None
+    assert ParameterReader(line_and_pantograph, "line.temperature").present("degC") == 1.0
     assert ParameterReader(line_and_pantograph, "stop").present("s") == 1.0
 
 

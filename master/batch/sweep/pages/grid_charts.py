@@ -150,7 +150,7 @@ def map_charts(view: SweepView, rows: Sequence[Row], parameters: Sequence[SweptC
         _cell_axis(broken(view.short_title(second.title)), kept[1]),
     )
     width, height = 110 + _CELL_WIDTH * len(kept[0]), 80 + max(34 * len(kept[1]), 130)
-    made = []
+    made: list[Chart] = []
     for figure in figures:
         maps = {g: _cells(view, figure, groups[g], (first.title, second.title), kept) for g in drawn}
         for group, cells in _alike(maps).items():

@@ -175,7 +175,8 @@ def test_a_definition_that_does_not_build_is_answered_once(call, tmp_path):
     path.write_text(path.read_text().replace('20000, "N"', '20000, "kN"'))
     code, _, said = call("validate demo")
     assert code == 1
-    assert f"could not be built: {path}: contact_wire.tension" in said
+    assert f"error: {path}: contact_wire.tension" in said
+    assert re.search(r"contact_wire\.tension.*; so resources/Catenary_demo_LN2\.fmu of component 'catenary' ", said)
 
 
 def test_a_dc_project_is_judged_and_calibrated_by_its_limits(call, tmp_path):

@@ -11,7 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from master.batch.batch_session import BatchFiles, BatchState, run_tasks
+from master.batch.batch_session import BatchState, PacedFiles, run_tasks
+from master.batch.sweep.held_fmus import held_fmus
 from master.batch.sweep.pages import sweep_page
 from master.batch.sweep.pages.sweep_view import read_view, view_of
 from master.batch.sweep.sensitivity import SensitivityIndices, described
@@ -19,7 +20,7 @@ from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, s
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
-from master.batch.sweep.sweep_run import WORK, Row, RunPlace, SweepResult
+from master.batch.sweep.sweep_run import Row, RunPlace, SweepResult
 from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
 from master.errors import InterruptedRunError
@@ -37,9 +38,6 @@ SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
-#: Least time between two writings of the table [s], and most of the time that may be spent on writing.
-_LEAST_PAUSE: Final = 1.0
-_SHARE: Final = 0.05
 #: Steps of the rehearsal that the estimate of time comes from.
 _REHEARSED: Final = 100
 
@@ -134,27 +132,21 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
     }
 
 
-class SweepFiles(BatchFiles[SweepOutcome]):
-    """The files of a sweep: written after every run, but not so often that writing takes more than a share of time."""
+class SweepFiles(PacedFiles[SweepOutcome]):
+    """The files of a sweep."""
 
     def __init__(self) -> None:
         super().__init__("sweep", GENERATOR, JSON, as_data, {CSV: lambda outcome: as_csv(outcome.rows)})
-        self.__dict__["_due"] = 0.0
 
-    def write(self, state: SweepOutcome, folder: Path) -> None:
-        """Write the files of a state, unless they were written just now and more is to come; the page at the end."""
-        began = time.monotonic()
-        if state.status == "running" and began < self.__dict__["_due"]:
-            return
-        super().write(state, folder)
+    def write_now(self, state: SweepOutcome, folder: Path) -> None:
+        """Write the files of a state; the page at the end."""
+        super().write_now(state, folder)
         if has_parquet() and state.found:
             write_parquet(state.rows, folder / PARQUET)
         if state.status != "running":
             indices = sensitivity_data(state.sensitivity)["indices"]
             view = view_of(as_data(state), state.rows, folder, indices)
             results_folder.write_text(folder / PAGE, sweep_page.page(view))
-        now = time.monotonic()
-        self.__dict__["_due"] = now + max(_LEAST_PAUSE, (now - began) / _SHARE)
 
 
 @dataclass(frozen=True)
@@ -233,7 +225,7 @@ def sweep(
     found: dict[str, SweepResult] = {}
     try:
         with results_folder.taken_over(folder, JSON, files.generator, files.kind):
-            _remove_leftovers(place)
+            _remove_leftovers(folder)
             with closing(SweepJournal(folder)) as journal:
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
                 found |= {r.key: old[r.key] for r in state.runs if r.key in old}
@@ -247,7 +239,7 @@ def sweep(
 
                 if why := prepared.announced:
                     tell(why)
-                with chosen.opened(prepared.base, place) as make_runs_of:
+                with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
                     tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     ended = run_tasks(state, results, finish, files, folder)
@@ -284,9 +276,10 @@ def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], N
         tell(text)
 
 
-def _remove_leftovers(place: RunPlace) -> None:
-    for path in place.folder.glob(f"{WORK}*"):
-        shutil.rmtree(path, ignore_errors=True)
+def _remove_leftovers(folder: Path) -> None:
+    for place in (folder, folder / RUNS):
+        for path in place.glob(f"{results_folder.WORK}*"):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _is_there(result: SweepResult, place: RunPlace) -> bool:

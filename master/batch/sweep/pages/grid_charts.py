@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final, TypeVar
 
 import numpy as np
@@ -31,6 +31,7 @@ from master.report.charts.chart import (
     Envelope,
     Level,
     Part,
+    Points,
     Stroke,
     stroke,
 )
@@ -86,11 +87,21 @@ def curve_charts(view: SweepView, rows: Sequence[Row], parameters: Sequence[Swep
             parts += _curve(name, figure, [at_level(groups[group], first.title, v) for v in found], places, k)
         if not any(np.isfinite(p.y).any() for p in parts if isinstance(p, Curve)):
             continue
-        shown = np.concatenate([p.y for p in parts if isinstance(p, Curve)])
-        ordinate = Axis(figure.name, figure.unit, None if np.nanmax(np.abs(shown)) > 0.0 else (0.0, 1.0))
         parts += limit_parts(view, figure, [at_level(rows, first.title, v) for v in found], places)
+        ordinate = Axis(figure.name, figure.unit, shown_range(parts))
         made.append(Chart(f"{key}_{number}", figure.heading, axis, ordinate, tuple(parts), note, height=300))
     return made
+
+
+def shown_range(parts: Sequence[Part]) -> tuple[float, float]:
+    """Return the range of an ordinate in which all parts are seen, their limits and the words at them too."""
+    found = [np.array([p.at]) for p in parts if isinstance(p, Level)]
+    found += [p.y for p in parts if isinstance(p, Curve | Points)]
+    found += [v for p in parts if isinstance(p, Envelope) for v in (p.low, p.high)]
+    whole = np.concatenate(found)
+    low, high = float(np.nanmin(whole)), float(np.nanmax(whole))
+    margin = 0.1 * (high - low) or max(0.1 * abs(high), 1.0)
+    return (0.0, high + margin) if 0.0 <= low <= margin else (low - margin, high + margin)
 
 
 def _curve(name: str, figure: Figure, cells: Sequence[Sequence[Row]], places: FloatArray, index: int) -> list[Part]:
@@ -134,22 +145,28 @@ def map_charts(view: SweepView, rows: Sequence[Row], parameters: Sequence[SweptC
     if any(map(is_judged, rows)):
         figures.insert(0, _UNMET)
     kept = (evenly(columns, _MOST_CELLS), evenly(lines, _MOST_CELLS))
-    made = []
-    for number, (figure, group) in enumerate(itertools.product(figures, drawn)):
-        cells = _cells(view, figure, groups[group], (first.title, second.title), kept)
-        if not np.isfinite(cells.values).any():
-            continue
-        axes = (
-            _cell_axis(view.short_title(first.title), kept[0]),
-            _cell_axis(broken(view.short_title(second.title)), kept[1]),
-        )
-        title = f"{figure.heading}{f' [{figure.unit}]' if figure.unit else ''}{f', {group}' if group else ''}"
-        note = " ".join(_map_notes(cells, (len(columns), len(lines)), kept, (len(groups), len(drawn))))
-        width = 110 + _CELL_WIDTH * len(kept[0])
-        height = 80 + max(34 * len(kept[1]), 130)
-        chart = Chart(f"{key}_{number}", title, axes[0], axes[1], (cells,), note, height=height, least_width=width)
-        made.append(chart)
+    axes = (
+        _cell_axis(view.short_title(first.title), kept[0]),
+        _cell_axis(broken(view.short_title(second.title)), kept[1]),
+    )
+    width, height = 110 + _CELL_WIDTH * len(kept[0]), 80 + max(34 * len(kept[1]), 130)
+    made: list[Chart] = []
+    for figure in figures:
+        maps = {g: _cells(view, figure, groups[g], (first.title, second.title), kept) for g in drawn}
+        for group, cells in _alike(maps).items():
+            title = f"{figure.heading}{f' [{figure.unit}]' if figure.unit else ''}{f', {group}' if group else ''}"
+            note = " ".join(_map_notes(cells, (len(columns), len(lines)), kept, (len(groups), len(drawn))))
+            name = f"{key}_{len(made)}"
+            made.append(Chart(name, title, axes[0], axes[1], (cells,), note, height=height, least_width=width))
     return made
+
+
+def _alike(maps: dict[str, Cells]) -> dict[str, Cells]:
+    """Return maps in which one colour means one value; those without any value are left out."""
+    there = {name: cells for name, cells in maps.items() if np.isfinite(cells.values).any()}
+    ends = [(float(np.nanmin(c.values)), float(np.nanmax(c.values))) for c in there.values()]
+    span = (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
+    return {name: replace(cells, span=span) for name, cells in there.items()}
 
 
 def _map_notes(

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from master.batch.sweep.engine_selection import engine_of
-from master.batch.sweep.sweep_plan import SweepRequest, stored_request
+from master.batch.sweep.sweep_plan import SweepRequest, check_overridden, stored_request
 from master.batch.sweep.sweep_session import (
     CSV,
     JSON,
@@ -36,6 +36,7 @@ def sweep_verb(options: argparse.Namespace) -> int:
     overrides = replace(overrides_of(options), may_stop_early=options.stop is not None, faults=request.faults)
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedSweep.of(scenario.system, request)
+        check_overridden(prepared.outcome.plan, (*overrides.parameters, *(["step"] if overrides.step else [])))
         if options.dry_run:
             if text := prepared.announced:
                 note(text)

@@ -42,6 +42,11 @@ def table_frame(heads: Sequence[str], rows: Sequence[Sequence[object]], index: s
     return frame.set_index(index) if index else frame
 
 
+def columns_frame(columns: Mapping[str, Sequence[object]]) -> pandas.DataFrame:
+    """Return columns under their titles."""
+    return load_pandas().DataFrame(dict(columns))
+
+
 def side_by_side(columns: Mapping[str, Mapping[str, float]], index: str) -> pandas.DataFrame:
     """Return figures by name, a column for each of several things."""
     frame = load_pandas().DataFrame(dict(columns))

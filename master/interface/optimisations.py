@@ -12,8 +12,8 @@ from master.batch.optimisation.optimisation_page import page, verdict
 from master.batch.optimisation.optimisation_session import OptimisationOutcome, PreparedOptimisation
 from master.batch.optimisation.optimisation_session import optimise as run_optimisation
 from master.batch.sweep.engine_selection import engine_of
-from master.batch.sweep.sweep_table import columns
-from master.interface.data_frames import table_frame
+from master.batch.sweep.sweep_table import typed_columns
+from master.interface.data_frames import columns_frame
 from master.interface.scenario_runs import keep_apart
 from master.interface.scenario_view import Scenario, open_scenario
 from master.report.terminal_summary import Terminal
@@ -68,9 +68,7 @@ class Optimisation:
     @property
     def table(self) -> pandas.DataFrame:
         """Inputs and figures, a row for each run and pantograph (needs pandas)."""
-        rows = self.outcome.rows
-        heads = columns(rows)
-        return table_frame(heads, [tuple(row.get(head) for head in heads) for row in rows])
+        return columns_frame(typed_columns(self.outcome.rows))
 
 
 def optimise(
@@ -83,6 +81,7 @@ def optimise(
     subject_to: Sequence[str] = (),
     max_runs: int = 60,
     seed: int = 1,
+    mean_tolerance: float | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
     progress: bool = False,
@@ -104,6 +103,8 @@ def optimise(
     max_runs : int
         Most points that are tried.
     seed : int
+    mean_tolerance : float, optional
+        How near to a mean force that is held is enough, 0.2 N by default.
     jobs : int, optional
         Runs at a time, each in a process; a script that gives it begins with ``if __name__ == "__main__":``.
     scheduler : str, optional
@@ -119,7 +120,13 @@ def optimise(
         If the folder holds something else, or the workers are gone.
     """
     chosen = scenario if isinstance(scenario, Scenario) else open_scenario(scenario)
-    asked = {"minimise": minimise, "maximise": maximise, "vary": dict(vary), "subject_to": list(subject_to)}
+    asked: dict[str, object] = {
+        "minimise": minimise,
+        "maximise": maximise,
+        "vary": dict(vary),
+        "subject_to": list(subject_to),
+    }
+    asked |= {} if mean_tolerance is None else {"tolerance": mean_tolerance}
     request = OptimisationRequest.read({**asked, "max_runs": max_runs, "seed": seed, "stop": chosen.overrides.stop})
     console = Terminal(stderr=True)
 

@@ -14,9 +14,9 @@ from master.batch.sweep.sensitivity_table import sensitivity_heads, sensitivity_
 from master.batch.sweep.sweep_plan import Keep, SweepRequest
 from master.batch.sweep.sweep_session import PAGE, PreparedSweep, SweepOutcome
 from master.batch.sweep.sweep_session import sweep as run_sweep
-from master.batch.sweep.sweep_table import columns
+from master.batch.sweep.sweep_table import typed_columns
 from master.errors import RequestError
-from master.interface.data_frames import table_frame
+from master.interface.data_frames import columns_frame, table_frame
 from master.interface.results_view import Results, read_results
 from master.interface.scenario_runs import keep_apart
 from master.interface.scenario_view import Scenario, open_scenario
@@ -58,9 +58,7 @@ class Sweep:
     @property
     def table(self) -> pandas.DataFrame:
         """Inputs and figures, a row for each run and pantograph (needs pandas)."""
-        rows = self.outcome.rows
-        heads = columns(rows)
-        return table_frame(heads, [tuple(row.get(head) for head in heads) for row in rows])
+        return columns_frame(typed_columns(self.outcome.rows))
 
     @property
     def sensitivity(self) -> pandas.DataFrame:
@@ -101,6 +99,7 @@ def sweep(
     faults: Sequence[int] = (),
     static_force: str | None = None,
     mean_force: str | None = None,
+    mean_tolerance: float | None = None,
     keep: Keep = "figures",
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -129,6 +128,8 @@ def sweep(
         Spans of the line whose droppers break one after the other; the first run has none broken.
     static_force, mean_force : str, optional
         Static force over the speed, ``70 N + 0.00097 v^2`` with v in km/h; or the mean force that it is found for.
+    mean_tolerance : float, optional
+        How near to the mean force is enough, 0.2 N by default.
     keep : str
         What stays beside the table: ``all``, ``thinned``, ``figures`` or ``failed``.
     jobs : int, optional
@@ -146,9 +147,10 @@ def sweep(
         If the folder holds something else, or the workers are gone.
     """
     chosen = scenario if isinstance(scenario, Scenario) else open_scenario(scenario)
-    grid = {name: _listed(values) for name, values in (over or {}).items()}
+    grid = {name: _listed(name, values) for name, values in (over or {}).items()}
     asked: dict[str, object] = {"over": grid, "vary": dict(vary or {}), "samples": samples, "seed": seed}
     asked |= {} if method is None else {"method": method}
+    asked |= {} if mean_tolerance is None else {"tolerance": mean_tolerance}
     given = {
         "sensitivity": sensitivity,
         "table": table,
@@ -172,5 +174,20 @@ def sweep(
         return Sweep(folder, run_sweep(prepared, folder, engine_of(jobs, scheduler, tell), tell, tell))
 
 
-def _listed(values: Values) -> str:
-    return values if isinstance(values, str) else ",".join(v if isinstance(v, str) else repr(float(v)) for v in values)
+def _listed(name: str, values: Values) -> str:
+    if isinstance(values, str):
+        return values
+    try:
+        return ",".join(map(_written, values))
+    except (TypeError, ValueError) as error:
+        raise RequestError(f"{name}: {values!r} is neither a text nor a list of numbers or texts") from error
+
+
+def _written(value: object) -> str:
+    """Return a value as on the command line, that of numpy too."""
+    if isinstance(value, str):
+        return value
+    plain = getattr(value, "item", lambda: value)()
+    if isinstance(plain, bool):
+        return str(plain).lower()
+    return str(plain) if isinstance(plain, int) else repr(float(plain))  # type: ignore[arg-type]

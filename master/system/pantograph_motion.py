@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from master.system.components import Component, System
+
+#: Parameter that lifts a pantograph's strip to the wire.
+STATIC_FORCE: Final = "static_force"
 
 
 def parameter_value(component: Component, name: str) -> float | None:

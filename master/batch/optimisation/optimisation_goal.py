@@ -14,11 +14,12 @@ from master.batch.assessment_figures import FIGURES
 from master.batch.sweep.sweep_plan import MOST_RUNS, PlainRequest, SweepRequest, check_distinct
 from master.batch.sweep.sweep_run import OUTPUT_KINDS, Row, SweepResult
 from master.batch.sweep.swept_parameter import ParameterReader, SweptParameter
-from master.batch.sweep.swept_systems import STATIC_FORCE, ForceLaw
+from master.batch.sweep.swept_systems import ForceLaw
 from master.errors import RequestError, hint
 from master.recording.recording_plan import recording_plans
 from master.ssp.ssp_units import COMMON, conversion, split_quantity
 from master.system.components import System
+from master.system.pantograph_motion import STATIC_FORCE
 
 #: What can be held at a value: the static force of every run is found for it.
 HELD: Final = "mean"
@@ -310,5 +311,7 @@ def sweep_request(request: OptimisationRequest, goal: Goal, bounds: Sequence[Bou
     names = [name for b in bounds for name in (b.parameter.name, *b.parameter.targets)]
     if goal.mean_force and any(name.rpartition(".")[2] == STATIC_FORCE for name in names):
         raise RequestError(f"the {STATIC_FORCE} is found for the mean force, so it cannot be varied as well")
+    if "tolerance" in request.model_fields_set and not goal.mean_force:
+        raise RequestError("--mean-tolerance is of a mean force that is held: give mean=.., or leave it out")
     force = {"mean_force": goal.mean_force} if goal.mean_force else {}
     return SweepRequest.read({"stop": request.stop, "tolerance": request.tolerance, **force})

@@ -12,9 +12,10 @@ from master.arrays import BoolArray, FloatArray
 from master.batch.optimisation.optimisation_goal import BoundedParameter, shown
 from master.batch.optimisation.optimisation_session import CSV, OptimisationOutcome, told
 from master.batch.sweep.sweep_run import Row
-from master.batch.sweep.swept_systems import STATIC_FORCE, SweepRun
+from master.batch.sweep.swept_systems import SweepRun
 from master.report import html_markup
 from master.report.charts.chart import Axis, Chart, Curve, Points, stroke
+from master.system.pantograph_motion import STATIC_FORCE
 
 _STATUS: Final = {
     "running": "Not finished: the optimisation is still running or was killed. The runs so far follow.",
@@ -84,7 +85,7 @@ def command(outcome: OptimisationOutcome, run: SweepRun) -> str:
         for target in b.parameter.targets
     }
     for row in outcome.rows_of(run) if outcome.goal.mean_force else ():
-        values[f"{row['pantograph']}.{STATIC_FORCE}"] = f"{row['static force [N]']!r} N"
+        values[f"{row['pantograph']}.{STATIC_FORCE}"] = repr(row["static force [N]"])
     own = {b.parameter.name: v for b, v in zip(outcome.bounds, outcome.point(run), strict=True)}
     times = [f"--{name} {own[name]!r}" for name in ("step", "stop") if name in own]
     settings = [f"--set {shlex.quote(f'{name}={value}')}" for name, value in values.items()]

@@ -32,10 +32,12 @@ def engine_of(
     Raises
     ------
     UsageError
-        If both are asked for.
+        If both are asked for, or a limit of processes that none starts.
     MasterError
         If Dask is not installed.
     """
+    if jobs is None and memory_limit != "auto":
+        raise UsageError("--memory-limit is of the processes that --jobs starts: give that too, or leave it out")
     if jobs is None and scheduler is None:
         return ChildEngine(tell, renew_after) if can_start_processes() else HereEngine()
     if jobs is not None and scheduler is not None:

@@ -12,7 +12,7 @@ import itertools
 import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, Self
@@ -20,10 +20,11 @@ from typing import Any, Final, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
-from master.batch.sweep.sensitivity import SensitivityMethod, block_size, designed
+from master.batch.sweep.sensitivity import LEAST_BLOCKS, SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
 from master.errors import MasterError, RequestError, said
 from master.system.components import System
+from master.system.pantograph_motion import STATIC_FORCE
 
 Keep = Literal["all", "thinned", "figures", "failed"]
 #: Most runs of a sweep.
@@ -193,9 +194,34 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
         raise RequestError("nothing is varied: give --over, --vary with --samples, or --from-csv")
     parameters = tuple(p for part in parts for p in part.parameters)
     check_distinct(parameters)
+    _check_used(request, parameters)
     points = tuple(tuple(itertools.chain(*rows)) for rows in itertools.product(*(part.rows for part in parts)))
     each = len(points) // len(names) if names else 0
     return SweepPlan(parameters, points, distributions, tuple(name for name in names for _ in range(each)))
+
+
+def _check_used(request: SweepRequest, parameters: Sequence[SweptParameter]) -> None:
+    """Refuse what the runs would not heed, and values that they would not have."""
+    given = request.model_fields_set
+    if not request.vary and ("method" in given or request.seed != SweepRequest.model_fields["seed"].default):
+        raise RequestError("--seed and --method are of samples: give --vary with --samples, or leave them out")
+    if "tolerance" in given and request.mean_force is None:
+        raise RequestError("--mean-tolerance is of --mean-force: give that too, or leave it out")
+    varied = {name.rpartition(".")[2] for p in parameters for name in (p.targets or (p.name,))}
+    if request.stop is not None and "stop" in varied:
+        raise RequestError("the stop time is varied, so it cannot be the same for all runs: leave out --stop")
+    for option, force in (("static", request.static_force), ("mean", request.mean_force)):
+        if force is not None and STATIC_FORCE in varied:
+            does = "follows the speed" if option == "static" else "is found for the mean force"
+            raise RequestError(f"the static force is varied, and it {does}: leave out one, or --{option}-force")
+
+
+def check_overridden(plan: SweepPlan, given: Collection[str]) -> None:
+    """Raise a `RequestError` if a parameter is varied whose value in all runs is given too."""
+    for p in plan.parameters:
+        for name in p.targets or (p.name,):
+            if name in given:
+                raise RequestError(f"'{name}' is varied, so it cannot be given a value for all runs as well")
 
 
 def _check_sensitivity(request: SweepRequest) -> None:
@@ -209,6 +235,8 @@ def _check_sensitivity(request: SweepRequest) -> None:
         raise RequestError(f"--sensitivity looks at what --vary samples, alone: {text}")
     if "method" in request.model_fields_set:
         raise RequestError("--sensitivity has samples of its own: leave out --method")
+    if request.samples is not None and request.samples < LEAST_BLOCKS:
+        raise RequestError(f"--sensitivity needs at least {LEAST_BLOCKS} samples, not {request.samples}")
 
 
 def check_distinct(parameters: Sequence[SweptParameter]) -> None:
@@ -251,6 +279,10 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
     if len(columns) < len(heads):
         raise RequestError(f"{path}: a column appears more than once")
     names = tuple(columns.pop(VARIANT, ()))
+    if "" in names:
+        raise RequestError(f"{path}: column '{VARIANT}' has an empty cell; name every row")
+    if twice := next((n for n in names if names.count(n) > 1), None):
+        raise RequestError(f"{path}: two rows are named '{twice}' in column '{VARIANT}'")
     if not columns:
         raise RequestError(f"{path} has no column of values")
     try:

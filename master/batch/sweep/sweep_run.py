@@ -20,7 +20,7 @@ from typing import Final
 from master.batch.assessment_figures import FIGURES, verdict_of
 from master.batch.calibration import find_values
 from master.batch.sweep.sweep_plan import Keep
-from master.batch.sweep.swept_systems import STATIC_FORCE, SweepRun
+from master.batch.sweep.swept_systems import SweepRun
 from master.errors import InterruptedRunError, MasterError, RunError, one_line
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_positions import leading_first
@@ -30,11 +30,13 @@ from master.results.run_results import Results
 from master.results.run_summary import peak_memory
 from master.run_session import RunOptions, run
 from master.system.components import System
-from master.system.pantograph_motion import pantographs, parameter_value
+from master.system.pantograph_motion import STATIC_FORCE, pantographs, parameter_value
 
 #: What is in a cell of the table.
 Cell = float | str | None
 Row = Mapping[str, Cell]
+#: Columns of the table that hold text, whatever it looks like.
+TEXTS: Final = ("variant", "key", "status", "reason", "pantograph", "verdict", "failed limits", "remarks")
 #: Figures of a recorded output, in runs without a pantograph.
 OUTPUT_KINDS: Final = ("end", "minimum", "maximum", "mean")
 #: Files of a run that stay if it is thinned.

@@ -38,6 +38,8 @@ SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
+#: Files of a run that was kept whole, and of none that was thinned.
+TIME_SERIES: Final = "timeseries*.csv"
 #: Steps of the rehearsal that the estimate of time comes from.
 _REHEARSED: Final = 100
 
@@ -240,7 +242,7 @@ def sweep(
                 if why := prepared.announced:
                     tell(why)
                 with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
-                    tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
+                    tell(_announcement(make_runs_of, prepared.base.start, missing, state, chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     ended = run_tasks(state, results, finish, files, folder)
                 _write_sensitivity(ended, folder, tell)
@@ -284,7 +286,10 @@ def _remove_leftovers(folder: Path) -> None:
 
 def _is_there(result: SweepResult, place: RunPlace) -> bool:
     """Whether what shall stay of a finished run is still there; of a failed one there may never have been anything."""
-    return result.failed or place.keep in ("figures", "failed") or place.of(result.key).is_dir()
+    if result.failed or place.keep in ("figures", "failed"):
+        return True
+    folder = place.of(result.key)
+    return any(folder.glob(TIME_SERIES)) if place.keep == "all" else folder.is_dir()
 
 
 def _shown(
@@ -306,28 +311,38 @@ def _shown(
         show(SweepProgress(done, failed, min(engine.width, open_runs), total, left))
 
 
-def _announcement(make: MakeRuns, start: float, missing: Sequence[SweepRun], total: int, engine: SweepEngine) -> str:
+def _announcement(
+    make: MakeRuns, start: float, missing: Sequence[SweepRun], state: SweepOutcome, engine: SweepEngine
+) -> str:
     """Return how many runs there are to make, and how long that may take."""
+    total = len(state.runs)
     if not missing:
         return f"{total} runs, all finished"
-    begun = f"{total} runs" if len(missing) == total else f"{total} runs, {len(missing)} of them missing"
+    which = f"{len(missing)} of them {'missing' if state.found else 'different'}"
+    begun = f"{total} runs" if len(missing) == total else f"{total} runs, {which}"
     if any(r.target is not None for r in missing):
         return f"{begun}; the static force of each is found in several trials"
-    each = _rehearsed(make, start, missing)
-    if each is None:  # the runs themselves will say why
+    seconds = _rehearsed(make, start, missing, engine)
+    if seconds is None:  # the runs themselves will say why
         return begun
-    about = duration(each * -(-len(missing) // engine.width))
+    about = duration(seconds)
     return f"{begun}, {min(engine.width, len(missing))} at a time, about {about}"
 
 
-def _rehearsed(make: MakeRuns, start: float, missing: Sequence[SweepRun]) -> float | None:
-    """Return about how long a run takes on average [s], from the first steps of the middle one; None if they fail."""
+def _rehearsed(make: MakeRuns, start: float, missing: Sequence[SweepRun], engine: SweepEngine) -> float | None:
+    """Return about how long runs take [s], from the first steps of the middle one; None if they fail.
+
+    They are made twice: a process loads FMUs and compiles in its first run alone.
+    """
     short = missing[len(missing) // 2].rehearsal(start, _REHEARSED)
-    done = next(iter(make([short])))
-    if not done.stepping:
+    first = next(iter(make([short])))
+    if not first.stepping:
         return None
+    then = next(iter(make([short])))
     mean = sum((r.stop - start) / r.step for r in missing) / len(missing)
-    return done.seconds - done.stepping + done.stepping * mean * short.step / (short.stop - start)
+    each = then.seconds - then.stepping + then.stepping * mean * short.step / (short.stop - start)
+    others = max(0.0, first.seconds - then.seconds) if engine.width > 1 else 0.0
+    return others + each * -(-len(missing) // engine.width)
 
 
 def duration(seconds: float) -> str:

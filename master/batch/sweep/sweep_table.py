@@ -8,14 +8,19 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from master.batch.sweep.sweep_plan import VARIANT
-from master.batch.sweep.sweep_run import Cell, Row, SweepResult
+from master.batch.sweep.sweep_run import TEXTS, Cell, Row, SweepResult
 from master.batch.sweep.swept_systems import SweepRun
 from master.safety.safe_files import atomic_file, safe_cell
+
+#: A whole number as a parameter's value is written: any other text would not come back the same.
+_WHOLE: Final = re.compile(r"0|-?[1-9]\d{0,9}", re.ASCII)
+_TRUTH: Final = {"true": True, "false": False}
 
 
 def table_rows(runs: Sequence[SweepRun], found: Mapping[str, SweepResult]) -> list[Row]:
@@ -50,7 +55,7 @@ def _cell(name: str, value: Cell) -> str:
     if value is None:
         return ""
     if isinstance(value, str):
-        return safe_cell(value)
+        return value if _WHOLE.fullmatch(value) else safe_cell(value)
     return str(int(value)) if name == "run" else repr(value)
 
 
@@ -64,17 +69,32 @@ def has_parquet() -> bool:
 
 
 def write_parquet(rows: Sequence[Row], path: Path) -> None:
-    """Write a table as Parquet, atomically; columns of numbers are double, all others text."""
+    """Write a table as Parquet, atomically; columns are double, whole numbers, true or false, or text."""
     import pyarrow
     from pyarrow import parquet
 
     with atomic_file(path) as temporary:
-        parquet.write_table(pyarrow.table({n: _column(pyarrow, n, rows) for n in columns(rows)}), temporary)
+        parquet.write_table(pyarrow.table({n: _column(pyarrow, v) for n, v in typed_columns(rows).items()}), temporary)
 
 
-def _column(pyarrow: Any, name: str, rows: Sequence[Row]) -> Any:
-    values = [row.get(name) for row in rows]
+def _column(pyarrow: Any, values: Sequence[Any]) -> Any:
+    return pyarrow.array(values) if any(v is not None for v in values) else pyarrow.array(values, pyarrow.float64())
+
+
+def typed_columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
+    """Return the columns of a table for programs: whole numbers and truths as such, None where a cell is empty."""
+    return {name: _typed(name, [row.get(name) for row in rows]) for name in columns(rows)}
+
+
+def _typed(name: str, values: list[Cell]) -> list[Any]:
+    """Return the values of a column; parameters that are not Real have come as texts."""
     if name == "run":
-        return pyarrow.array([int(v) for v in values if isinstance(v, float)], pyarrow.int64())
-    is_text = any(isinstance(v, str) for v in values)
-    return pyarrow.array(values, pyarrow.string() if is_text else pyarrow.float64())
+        return [int(v) for v in values if isinstance(v, float)]
+    there = [v for v in values if isinstance(v, str) and v]
+    if not any(isinstance(v, str) for v in values):
+        return values
+    if name not in TEXTS and there and all(v in _TRUTH for v in there):
+        return [_TRUTH[v] if isinstance(v, str) and v else None for v in values]
+    if name not in TEXTS and there and all(_WHOLE.fullmatch(v) for v in there):
+        return [int(v) if isinstance(v, str) and v else None for v in values]
+    return [v if v is None or isinstance(v, str) else repr(v) for v in values]

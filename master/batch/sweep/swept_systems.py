@@ -19,10 +19,9 @@ from master.ssp.ssp_units import COMMON, conversion
 from master.ssp.ssv import Value
 from master.system.components import Component, System, without
 from master.system.contacts import find_contacts
-from master.system.pantograph_motion import pantographs, parameter_value
+from master.system.pantograph_motion import STATIC_FORCE, pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
-STATIC_FORCE: Final = "static_force"
 _NUMBER: Final = r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
 _LAW: Final = re.compile(rf"\s*({_NUMBER})\s*N?\s*(?:\+\s*({_NUMBER})\s*\*?\s*v(?:\^2|\*\*2|²)\s*)?", re.ASCII)
 
@@ -186,6 +185,8 @@ class _Choices:
         if static is not None and mean is not None:
             raise RequestError("the static force is given or found for a mean force, not both")
         chosen = static or mean
+        if mean is not None and mean.constant <= 0.0 and mean.factor <= 0.0:
+            raise RequestError(f"the mean force '{request.mean_force}' must be greater than 0")
         if chosen is not None:
             trains = pantographs(base)
             if not trains:

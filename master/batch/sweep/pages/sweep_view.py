@@ -18,14 +18,14 @@ import numpy as np
 
 from master.arrays import FloatArray
 from master.batch.assessment_figures import FIGURES
-from master.batch.sweep.sweep_run import Cell, Row
+from master.batch.sweep.sweep_run import TEXTS, Cell, Row
 from master.errors import MasterError
 from master.evaluation.en50367_limits import LimitChoice, OwnLimits, limits_at
 from master.safety.safe_files import plain_cell
 from master.ssp.ssp_units import COMMON, conversion
 
-#: Columns of the table that hold text, and those that hold no figures.
-_TEXTS: Final = ("variant", "key", "status", "reason", "pantograph", "verdict", "passed", "failed limits", "remarks")
+#: Columns of the table that are read as text, and those that hold no figures.
+_TEXTS: Final = (*TEXTS, "passed")
 _HEAD: Final = (*_TEXTS, "run", "stop time [s]", "static force [N]")
 #: Criterion that judges a figure, by the figure's name.
 _JUDGED_BY: Final = {

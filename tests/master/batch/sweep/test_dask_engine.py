@@ -16,7 +16,7 @@ from tests.master.batch.sweep.conftest import GRID, ROOT, ended, journal
 
 distributed = pytest.importorskip("distributed")
 
-from master.batch.sweep import dask_engine  # noqa: E402 (it needs distributed)
+from master.batch.sweep import dask_engine, local_cluster  # noqa: E402 (it needs distributed)
 from master.batch.sweep.dask_engine import DaskEngine  # noqa: E402
 
 SMALL = {"over": {"catenary.stiffness": "4000:6000:500"}}
@@ -169,11 +169,36 @@ def test_processes_that_cannot_be_started_are_one_sentence(swept, tmp_path, monk
     def ended(**_):
         raise RuntimeError("Nanny failed to start.") from OSError("Cannot allocate memory")
 
-    monkeypatch.setattr(dask_engine, "LocalCluster", ended)
+    ended._instances = set()
+    monkeypatch.setattr(local_cluster, "LocalCluster", ended)
     text = "the 2 processes of --jobs cannot be started (Cannot allocate memory); start the sweep again"
     with pytest.raises(MasterError, match=re.escape(text)):
         swept("out", DaskEngine(jobs=2), **SMALL)
     assert journal(tmp_path / "out") == []
+
+
+def test_processes_that_are_interrupted_as_they_start_do_not_trip_dask_at_its_end(monkeypatch):
+    class HalfMade:
+        _instances = {"of another"}
+
+        def __init__(self, **_):
+            self._instances.add(self)
+            raise KeyboardInterrupt
+
+        def close(self, timeout=None):
+            raise AssertionError("Status.init")
+
+    assert hasattr(distributed.LocalCluster, "_instances")
+    monkeypatch.setattr(local_cluster, "LocalCluster", HalfMade)
+    with pytest.raises(KeyboardInterrupt):
+        local_cluster.local_cluster(2, "auto")
+    assert HalfMade._instances == {"of another"}
+
+
+@pytest.mark.parametrize("limit", ["much", "-1GB", "0"])
+def test_a_size_of_memory_that_is_none_is_one_sentence(limit):
+    with pytest.raises(MasterError, match=f"'{limit}' is no size of memory"):
+        local_cluster.local_cluster(1, limit)
 
 
 def test_a_scheduler_that_does_not_answer_is_one_sentence(command, tmp_path):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from master.batch.sweep.sweep_plan import SweepRequest, make_plan, stored_request
+from master.batch.sweep.sweep_plan import SweepRequest, check_overridden, make_plan, stored_request
 from master.errors import RequestError
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
@@ -46,6 +46,13 @@ def test_a_table_names_its_rows_and_has_units_in_heads_or_cells(toy_system, tmp_
         ({"over": {"speed": "1,2"}, "colour": "red"}, "colour"),
         ({"over": {"speed": "1,2"}, "samples": 0}, "samples"),
         ({"over": {"speed": "1,2"}, "method": "dice"}, "method"),
+        ({"over": {"speed": "1,2"}, "method": "sobol"}, "--seed and --method are of samples"),
+        ({"over": {"speed": "1,2"}, "seed": 2}, "--seed and --method are of samples"),
+        ({"over": {"speed": "1,2"}, "tolerance": 2.0}, "--mean-tolerance is of --mean-force"),
+        ({"over": {"stop": "1,2"}, "stop": 1.0}, "the stop time is varied"),
+        ({"over": {"static_force": "1,2"}, "static_force": "70 N"}, "leave out one, or --static-force"),
+        ({"over": {"pantograph.static_force": "1,2"}, "mean_force": "70 N"}, "leave out one, or --mean-force"),
+        ({"vary": {"speed": "uniform(1, 2)"}, "samples": 3, "sensitivity": "morris"}, "needs at least 4 samples"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(toy_system, request_, said):
@@ -69,6 +76,8 @@ def test_what_cannot_be_is_one_sentence(toy_system, request_, said):
         ("catenary.stiffness\nmuch\n", "'much' is not a number"),
         ("catenary.stiffness,catenary.stiffness\n1,2\n", "more than once"),
         ("catenary.stiffness,stop [s]\n1,\n", "has an empty cell"),
+        ("variant,catenary.stiffness\na,1\nb,2\na,3\n", "two rows are named 'a'"),
+        ("variant,catenary.stiffness\na,1\n,2\n", "column 'variant' has an empty cell; name every row"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_one_sentence(toy_system, tmp_path, text, said):
@@ -79,6 +88,14 @@ def test_a_table_that_cannot_be_used_is_one_sentence(toy_system, tmp_path, text,
     assert said in str(caught.value)
     assert str(table) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_all_runs_are_given_cannot_be_varied(toy_system):
+    plan = _plan(toy_system, over={"speed": "40,50", "step": "0.001,0.002"})
+    check_overridden(plan, ["pantograph.static_force"])
+    for name in ("pantograph.speed", "step"):
+        with pytest.raises(RequestError, match=f"'{name}' is varied, so it cannot be given"):
+            check_overridden(plan, [name])
 
 
 def test_a_study_may_hold_a_sweep(toy_system, toy):

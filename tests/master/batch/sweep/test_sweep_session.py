@@ -12,7 +12,9 @@ from master import run_session
 from master.batch.sweep.pages import grid_charts
 from master.batch.sweep.sweep_engines import HereEngine
 from master.batch.sweep.sweep_plan import SweepRequest
+from master.batch.sweep.sweep_run import SweepResult
 from master.batch.sweep.sweep_session import PreparedSweep, sweep, write_report
+from master.batch.sweep.sweep_table import as_csv, write_parquet
 from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError
 from master.results.results_folder import WORK
@@ -64,6 +66,55 @@ def test_parquet_holds_the_same(swept, tmp_path):
     assert parquet.read_table(tmp_path / "out" / "sweep.parquet").column("mean [N]").to_pylist() == [
         row["mean [N]"] for row in done.rows
     ]
+
+
+def test_programs_read_whole_numbers_and_truths_as_such(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    inputs = {"a.n": ("-1", "2"), "a.on": ("true", "false"), "a.file": ("7", "x"), "key": ("11", "12")}
+    rows = [{"run": 1.0 + k, **{n: v[k] for n, v in inputs.items()}, "passed": ("", "true")[k]} for k in (0, 1)]
+    write_parquet(rows, tmp_path / "t.parquet")
+    assert parquet.read_table(tmp_path / "t.parquet").to_pydict() == {
+        "run": [1, 2],
+        "a.n": [-1, 2],
+        "a.on": [True, False],
+        "a.file": ["7", "x"],
+        "key": ["11", "12"],
+        "passed": [None, True],
+    }
+    assert as_csv(rows).splitlines()[1] == "1,-1,true,7,11,"
+
+
+def test_what_was_thinned_is_made_again_if_all_is_to_be_kept(swept, tmp_path):
+    over = {"over": {"catenary.stiffness": "4000"}}
+    (run,) = swept(keep="thinned", **over).runs
+    engine = Backwards()
+    swept("out", engine, keep="all", **over)
+    assert engine.made == [1]
+    assert (tmp_path / "out" / "runs" / run.key / "timeseries.csv").is_file()
+    engine = Backwards()
+    swept("out", engine, keep="thinned", **over)
+    assert engine.made == []
+
+
+def test_the_time_of_a_first_run_is_not_that_of_all(toy_system, tmp_path):
+    class Cold(HereEngine):
+        """Takes long in its first run alone."""
+
+        def opened(self, base, place):
+            import contextlib
+
+            def made(runs):
+                for run in runs:
+                    self.count += 1
+                    yield SweepResult(run.key, seconds=1000.0 if self.count == 1 else 1.0, stepping=0.1)
+
+            self.count = 0
+            return contextlib.nullcontext(made)
+
+    told = []
+    prepared = PreparedSweep.of(toy_system, SweepRequest.read(STIFFNESSES))
+    sweep(prepared, tmp_path / "out", Cold(), told.append)
+    assert told == ["3 runs, 1 at a time, about 6 s"]  # 3 * (0.9 s + 1000 steps of 0.1 s / 100)
 
 
 def test_the_order_of_the_runs_does_not_matter(swept, tmp_path):

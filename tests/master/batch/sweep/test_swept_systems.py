@@ -70,3 +70,8 @@ def test_the_first_run_that_cannot_be_made_is_named(toy_system, over, said):
     with pytest.raises(RequestError) as caught:
         _runs(toy_system, over=over)
     assert str(caught.value).startswith(said)
+
+
+def test_a_mean_force_of_nothing_is_one_sentence(toy_system):
+    with pytest.raises(RequestError, match="the mean force '0 N' must be greater than 0"):
+        _runs(toy_system, over={"speed": "40"}, mean_force="0 N")

@@ -20,6 +20,7 @@ import pytest
 
 import master
 import models
+from master.interface import parameter_sweeps
 from tests.master.conftest import SSV, ssd_text, toy_fmus  # noqa: F401 (a fixture)
 
 ROOT = Path(__file__).parents[1]
@@ -340,6 +341,27 @@ def test_without_pandas_one_sentence_says_what_to_install(toy_run, monkeypatch):
         with pytest.raises((master.MasterError, ImportError)) as caught:
             ask()
         assert str(caught.value) == "data frames need pandas: pip install 'openpanto[pandas]'"
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ("200:300:10", "200:300:10"),
+        (["18 kN", 20], "18 kN,20"),
+        (range(1, 4), "1,2,3"),
+        (np.arange(2), "0,1"),
+        (np.array([0.1, 2.0]), "0.1,2.0"),
+        ([True, False], "true,false"),
+    ],
+)
+def test_values_of_a_grid_are_written_as_on_the_command_line(values, text):
+    assert parameter_sweeps._listed("x", values) == text
+
+
+@pytest.mark.parametrize("values", [200, [None], [[1, 2]]])
+def test_values_that_are_no_list_are_one_sentence(values):
+    with pytest.raises(master.MasterError, match=r"x: .* is neither a text nor a list of numbers or texts"):
+        parameter_sweeps._listed("x", values)
 
 
 # A line and a pantograph.

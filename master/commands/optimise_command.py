@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -30,7 +29,7 @@ def optimise_verb(options: argparse.Namespace) -> int:
     """Optimise; return 0 if a point was found that keeps the constraints, else 1."""
     console = Terminal(stderr=True)
     note: Callable[[str], None] = (lambda _: None) if options.quiet else partial(say, console=console)
-    overrides = replace(overrides_of(options), may_stop_early=options.stop is not None)
+    overrides = overrides_of(options)
     request = _request(options)
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedOptimisation.of(scenario.system, request, str(options.scenario))

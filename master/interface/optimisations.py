@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -134,7 +134,7 @@ def optimise(
         if progress:
             console.print(str(text), markup=False, highlight=False)
 
-    with scenario_files.open_scenario(chosen.path, chosen.overrides) as opened:
+    with scenario_files.open_scenario(chosen.path, replace(chosen.overrides, may_stop_early=False)) as opened:
         folder = Path(out) if out is not None else Path("results") / "optimise" / opened.system.name
         keep_apart(folder, opened.package)
         prepared = PreparedOptimisation.of(opened.system, request, str(chosen.path))

@@ -182,6 +182,8 @@ class Goal:
         if held and name == HELD:
             raise RequestError("the mean force is held at a value, so it cannot be optimised as well")
         bounds = tuple(c for c in read if isinstance(c, Constraint))
+        if held and any(c.figure == HELD for c in bounds):
+            raise RequestError("the mean force is held at a value, so it cannot be bounded as well")
         _check_room(bounds)
         return cls(name, known[name], request.minimise is not None, bounds, held[0] if held else "")
 

@@ -34,7 +34,8 @@ def verdict(outcome: OptimisationOutcome) -> str:
             (goal.excess(outcome.found[r.key]) for r in outcome.finished if outcome.value(r) is not None), default=None
         )
         if nearest is None:
-            return f"no run has the figure {goal.figure} ({made})"
+            why = next((f"; run {number}: {reason}" for number, reason in outcome.failures.items()), "")
+            return f"no run has the figure {goal.figure} ({made}){why}"
         return (
             f"no run keeps {', '.join(c.text for c in goal.constraints)}; the nearest misses by {nearest:.1%} ({made})"
         )

@@ -218,9 +218,15 @@ def _rows(done: Results, system: System) -> Iterator[Row]:
         yield _row(found[contact], system)
     if not done.contacts:
         figures = output_figures(done.recordings)
-        yield {f"{f.name} {kind} [{f.unit or '1'}]": float(getattr(f, kind)) for f in figures for kind in OUTPUT_KINDS}
+        yield {
+            f"{f.name} {kind} [{f.unit or '1'}]": _finite(getattr(f, kind)) for f in figures for kind in OUTPUT_KINDS
+        }
     elif not found:
         yield {"verdict": done.not_judged or "nothing to judge"}
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
 
 
 def _row(assessment: Assessment, system: System) -> Row:
@@ -229,7 +235,7 @@ def _row(assessment: Assessment, system: System) -> Row:
     return {
         "pantograph": assessment.contact.pantograph,
         "static force [N]": force,
-        **{title: None if v is None or not math.isfinite(v) else float(v) for title, v in figures.items()},
+        **{title: _finite(v) for title, v in figures.items()},
         "verdict": verdict_of(assessment),
         "passed": "" if assessment.withheld else str(assessment.passed).lower(),
         "failed limits": "; ".join(c.name for c in assessment.criteria if not c.passed),

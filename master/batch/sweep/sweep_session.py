@@ -21,7 +21,7 @@ from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
 from master.batch.sweep.sweep_run import Row, RunPlace, SweepResult
-from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
+from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, unjudged_note, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
 from master.errors import InterruptedRunError
 from master.report.report_files import write_charts
@@ -246,6 +246,8 @@ def sweep(
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     ended = run_tasks(state, results, finish, files, folder)
                 _write_sensitivity(ended, folder, tell)
+                if note := unjudged_note(ended.rows):
+                    tell(note)
                 return ended
     except (InterruptedRunError, KeyboardInterrupt) as error:
         done = f"{len([r for r in state.runs if r.key in found])} of {len(state.runs)} runs are finished"

@@ -41,6 +41,20 @@ def columns(rows: Iterable[Row]) -> list[str]:
     return list(dict.fromkeys(name for row in rows for name in row))
 
 
+def unjudged_note(rows: Iterable[Row]) -> str:
+    """Return what is to be said of complete runs that have no figures, empty if there are none."""
+    found = {
+        row["run"]: str(row["verdict"])
+        for row in rows
+        if row.get("status") == "complete" and row.get("verdict") and not row.get("pantograph")
+    }
+    if not found:
+        return ""
+    first, reason = next(iter(found.items()))
+    runs = "1 run has" if len(found) == 1 else f"{len(found)} runs have"
+    return f"{runs} no figures; run {first:g}: {reason}"
+
+
 def as_csv(rows: Sequence[Row]) -> str:
     """Return a table as CSV; numbers read back to the last bit."""
     names = columns(rows)

@@ -14,6 +14,7 @@ from master.batch.sweep.pages import criticality, grid_charts, sample_charts, se
 from master.batch.sweep.pages.force_bands import force_band
 from master.batch.sweep.pages.sweep_view import SweepView, SweptColumn, is_judged, level_text, levels
 from master.batch.sweep.sweep_run import Row
+from master.batch.sweep.sweep_table import unjudged_note
 from master.report import html_markup
 from master.report.charts.chart import Chart
 
@@ -76,6 +77,8 @@ def page(view: SweepView) -> str:
     body += [html_markup.table(("parameter", "values"), _parameter_rows(view), numbers=False), *_failures(view)]
     if not view.complete:
         body.append("<p class='warning'>No run is complete: there is nothing to draw.</p>")
+    if note := unjudged_note(view.rows):
+        body.append(f"<p class='warning'>{html_markup.text(note)}</p>")
     for chapter in chapters(view):
         body += [f"<h2>{html_markup.text(chapter.title)}</h2>", *chapter.text]
         if chapter.charts:
@@ -237,9 +240,12 @@ def _parameter_rows(view: SweepView) -> Iterator[tuple[str, str]]:
             if len(found) <= 12
             else (f"{len(found)} values, {level_text(found[0])} to {level_text(found[-1])}")
         )
-        yield p.title, f"{p.distribution}: {len(found)} values" if p.distribution else text
+        count = "1 value" if len(found) == 1 else f"{len(found)} values"
+        yield p.title, f"{p.distribution}: {count}" if p.distribution else text
     names = {"samples": "samples", "seed": "seed", "method": "method of sampling", "static_force": "static force"}
     is_sampled = any(p.distribution for p in view.parameters)
+    if view.request.get("sensitivity"):
+        del names["method"]  # a design has its own
     for key, name in {
         **names,
         "sensitivity": "sensitivity",

@@ -9,6 +9,7 @@ from master.batch.optimisation.optimisation_goal import OptimisationRequest
 from master.batch.optimisation.optimisation_page import command, lines, page
 from master.batch.optimisation.optimisation_session import PreparedOptimisation, optimise
 from master.batch.sweep.sweep_engines import HereEngine
+from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError
 from master.run_session import run
 from master.scenario.open_scenario import open_scenario
@@ -115,3 +116,11 @@ def test_the_command_that_is_told_makes_the_best_run_again(toy_system, toy, tmp_
     with open_scenario(toy, Overrides(parameters=values), build=False) as found:
         again = run(found.system, tmp_path / "again").assessments()[0].quality
     assert again.sigma == done.value(best)
+
+
+def test_runs_that_end_too_soon_to_have_figures_have_failed_and_the_reason_is_told(toy, tmp_path, capsys):
+    wanted = ["--minimise", "sigma", "--vary", "catenary.stiffness=4000:5000", "--out", str(tmp_path / "out")]
+    assert main(["optimise", str(toy), *wanted, "--stop", "0.3", "--max-runs", "1", "--no-build"]) == 1
+    said = capsys.readouterr().out
+    assert "no run has the figure sigma (1 runs, 1 failed); run 1: " in said
+    assert "before the end of the interval of interest" in said

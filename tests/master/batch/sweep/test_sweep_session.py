@@ -2,13 +2,17 @@
 
 import csv
 import io
+import math
 import os
 import signal
 import time
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from master import run_session
+from master.batch.sweep import sweep_run
 from master.batch.sweep.pages import grid_charts
 from master.batch.sweep.sweep_engines import HereEngine
 from master.batch.sweep.sweep_plan import SweepRequest
@@ -82,6 +86,30 @@ def test_programs_read_whole_numbers_and_truths_as_such(tmp_path):
         "passed": [None, True],
     }
     assert as_csv(rows).splitlines()[1] == "1,-1,true,7,11,"
+
+
+def test_an_option_that_runs_would_not_heed_is_refused(toy, capsys):
+    grid = ["sweep", str(toy), "--over", "speed=40,50", "--dry-run", "--no-build"]
+    assert main([*grid, "--set", "pantograph.speed=60"]) == 1
+    assert "'pantograph.speed' is varied, so it cannot be given a value for all runs" in capsys.readouterr().err
+    assert main([*grid[:-2], "--memory-limit", "2GB", "--no-build"]) == 2
+    assert "--memory-limit is of the processes that --jobs starts" in capsys.readouterr().err
+
+
+def test_a_figure_that_is_no_number_is_an_empty_cell(ishigami_swept, tmp_path, monkeypatch):
+    figure = SimpleNamespace(name="f.y", unit="", end=math.nan, minimum=-math.inf, maximum=1.0, mean=math.nan)
+    monkeypatch.setattr(sweep_run, "output_figures", lambda _: [figure])
+    done = ishigami_swept(over={"f.x3": "1,2"})
+    assert [row["f.y end [1]"] for row in done.rows] == [None, None]
+    assert [row["f.y maximum [1]"] for row in done.rows] == [1.0, 1.0]
+    assert "nan" not in (tmp_path / "out" / "sweep.csv").read_text()
+
+
+def test_runs_without_figures_are_told_at_the_end(toy, toy_system, tmp_path):
+    told = []
+    short = replace(toy_system, may_stop_early=True)
+    sweep(PreparedSweep.of(short, SweepRequest.read({**STIFFNESSES, "stop": 0.2})), tmp_path / "out", tell=told.append)
+    assert told[-1].startswith("3 runs have no figures; run 1: the run ends with 'pantograph' at ")
 
 
 def test_what_was_thinned_is_made_again_if_all_is_to_be_kept(swept, tmp_path):

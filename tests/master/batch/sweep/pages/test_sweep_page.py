@@ -37,6 +37,19 @@ def test_samples_have_shares_distributions_and_effects():
     assert "normal(0, 1): 30 values" in html
 
 
+def test_runs_without_figures_are_told():
+    bare = {"status": "complete", "verdict": "the run ends before the interval"}
+    whole = view([row(1, {"a": 1.0}), *({"run": float(k), "a": float(k), **bare} for k in (2, 3))], {"a": ""})
+    assert "<p class='warning'>2 runs have no figures; run 2: the run ends before the interval</p>" in page(whole)
+    assert "no figures" not in page(view([row(1, {"a": 1.0})], {"a": ""}))
+
+
+def test_a_design_for_sensitivity_has_no_method_of_sampling():
+    request = {"samples": 30, "method": "lhs"}
+    assert "method of sampling" in page(view(sample_rows(30), SAMPLED, request=request))
+    assert "method of sampling" not in page(view(sample_rows(30), SAMPLED, request={**request, "sensitivity": "sobol"}))
+
+
 def test_seeds_of_a_grid_are_samples():
     rows = [row(k, {"line.seed": str(k)}, sigma=40.0 + k % 7) for k in range(1, 31)]
     whole = view(rows, {"line.seed": ""}, over=("line.seed",))

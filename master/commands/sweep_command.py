@@ -17,7 +17,7 @@ from rich.status import Status
 
 from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
-from master.batch.sweep.sweep_plan import Keep, SweepRequest, stored_request
+from master.batch.sweep.sweep_plan import Engine, Keep, SweepRequest, stored_request
 from master.batch.sweep.sweep_session import CSV, JSON, PARQUET, PreparedSweep, SweepOutcome, SweepProgress, sweep
 from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say
 from master.errors import UsageError
@@ -41,6 +41,10 @@ def add_sweep(verbs: Any) -> None:
     parser.add_argument(
         "--keep", choices=get_args(Keep), help="what stays of the runs beside the table; default: figures"
     )
+    text = "what makes the runs: their FMUs (default), or many side by side without FMUs, for lumped pantographs"
+    parser.add_argument("--engine", choices=get_args(Engine), help=text)
+    text = "with --engine lanes: runs that are made as FMUs as well, to compare; default: 1"
+    parser.add_argument("--check", type=_count_or_none, metavar="N", help=text)
     parser.add_argument("--jobs", type=_count, metavar="N", help="make N runs at a time, in processes of this computer")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="make the runs on the workers of this Dask scheduler")
     parser.add_argument("--memory-limit", default="auto", metavar="SIZE", help="of each process with --jobs, e.g. 2GB")
@@ -85,6 +89,10 @@ def _count(text: str) -> int:
     return value
 
 
+def _count_or_none(text: str) -> int:
+    return 0 if text == "0" else _count(text)
+
+
 def _sweep(options: argparse.Namespace) -> int:
     """Make a sweep; return 0 if every run was made, 1 if one failed."""
     console = Terminal(stderr=True)
@@ -98,7 +106,7 @@ def _sweep(options: argparse.Namespace) -> int:
             return 0
         folder = options.out or Path("results") / "sweep" / scenario.system.name
         keep_apart(folder, scenario.package)
-        engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after)
+        engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after, request)
         with _progress(console, options.quiet) as show:
             done = sweep(prepared, folder, engine, note, show, options.again)
     _print(options, folder, done)
@@ -119,6 +127,8 @@ def _request(options: argparse.Namespace) -> SweepRequest:
         "mean_force": options.mean_force,
         "tolerance": options.mean_tolerance,
         "keep": options.keep,
+        "engine": options.engine,
+        "check": options.check,
     }
     asked = {name: value for name, value in given.items() if value not in (None, {})}
     # A plan is taken whole, from here or from there: half of each would be neither's.
@@ -170,3 +180,7 @@ def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> Non
         files = [str(folder / name) for name in (CSV, PARQUET) if (folder / name).is_file()]
         text = f"{len(done.finished)} runs, {len(done.failures)} failed; table: {', '.join(files)}"
         console.print(text, markup=False, soft_wrap=True)
+        if done.checks:
+            largest = max(check["largest difference [N]"] for check in done.checks)
+            text = f"{len(done.checks)} of them made by FMUs as well: contact forces differ by at most {largest:.1e} N"
+            console.print(text, markup=False, soft_wrap=True)

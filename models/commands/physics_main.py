@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
-from models.commands import couple_command, identify_command, pantograph_command, statics_command
+from models.commands import couple_command, identify_command, lanes_command, pantograph_command, statics_command
 from models.definition_files.message_text import printable
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError
@@ -16,7 +16,7 @@ from models.library.catalogue import UnknownNameError
 from models.numerics.kernel_cache import KernelError
 from models.pantograph.multibody.mechanism import MechanismError
 
-_VERBS = (couple_command, statics_command, pantograph_command, identify_command)
+_VERBS = (couple_command, statics_command, pantograph_command, identify_command, lanes_command)
 #: What a user can cause; everything else is a defect and keeps its traceback.
 _USER_ERRORS = (
     DefinitionError,

@@ -25,6 +25,7 @@ from master.errors import MasterError, RequestError
 from master.system.components import System
 
 Keep = Literal["all", "thinned", "figures", "failed"]
+Engine = Literal["fmu", "lanes"]
 #: Most runs of a sweep.
 MOST_RUNS: Final = 100_000
 #: Column of a table that names its rows.
@@ -59,6 +60,10 @@ class SweepRequest(BaseModel):
     keep : str
         What stays of the runs beside the table: ``all``; ``thinned``, the contact force and the summary;
         ``figures``, nothing; ``failed``, what those left that failed.
+    engine : str
+        What makes the runs: ``fmu``, or ``lanes``, which steps them side by side without FMUs.
+    check : int
+        How many runs ``lanes`` makes as FMUs as well, to compare.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -74,6 +79,8 @@ class SweepRequest(BaseModel):
     mean_force: str | None = None
     tolerance: float = Field(0.2, gt=0)
     keep: Keep = "figures"
+    engine: Engine = "fmu"
+    check: int = Field(1, ge=0)
 
     @classmethod
     def read(cls, data: Mapping[str, Any], origin: str = "") -> SweepRequest:

@@ -73,6 +73,8 @@ class SweepOutcome(BatchState):
         All of the plan.
     found : dict
         What has become of runs, by key.
+    checks : sequence of dict
+        Runs that were made in two ways, and by how much these differ; see `SweepEngine`.
     """
 
     scenario: str
@@ -80,6 +82,7 @@ class SweepOutcome(BatchState):
     plan: SweepPlan
     runs: tuple[SweepRun, ...]
     found: Mapping[str, SweepResult] = field(default_factory=dict)
+    checks: Sequence[Mapping[str, Any]] = ()
 
     @property
     def finished(self) -> tuple[SweepRun, ...]:
@@ -113,6 +116,7 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
         ],
         "runs": len(outcome.runs),
         "finished": len(outcome.finished),
+        "checks": list(outcome.checks),
         "failures": {str(number): reason for number, reason in outcome.failures.items()},
     }
 
@@ -209,7 +213,7 @@ def sweep(
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
                 found |= {r.key: old[r.key] for r in state.runs if r.key in old}
                 missing = list({r.key: r for r in state.runs if r.key not in found}.values())
-                state = replace(state, found=found)
+                state = replace(state, found=found, checks=chosen.checks)
 
                 def finish(so_far: SweepOutcome, result: SweepResult) -> SweepOutcome:
                     journal.add(result)
@@ -217,7 +221,7 @@ def sweep(
                     return so_far
 
                 with chosen.opened(prepared.base, place) as make_runs_of:
-                    tell(_announcement(prepared.base, missing, len(state.runs), chosen.width))
+                    tell(_announcement(prepared.base, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     return run_tasks(state, results, finish, files, folder)
     except (InterruptedRunError, KeyboardInterrupt) as error:
@@ -254,13 +258,16 @@ def _shown(
         show(SweepProgress(done, failed, min(engine.width, open_runs), total, left))
 
 
-def _announcement(base: System, missing: Sequence[SweepRun], total: int, width: int) -> str:
+def _announcement(base: System, missing: Sequence[SweepRun], total: int, engine: SweepEngine) -> str:
     """Return how many runs there are to make, and how long that may take."""
     if not missing:
         return f"{total} runs, all finished"
     begun = f"{total} runs" if len(missing) == total else f"{total} runs, {len(missing)} of them missing"
     if any(r.target is not None for r in missing):
         return f"{begun}; the static force of each is found in several trials"
+    width = min(engine.width, len(missing))
+    if not engine.is_rehearsed:
+        return f"{begun}, {width} at a time"
     try:
         each = _rehearsed(base, missing)
     except InterruptedRunError:
@@ -268,7 +275,7 @@ def _announcement(base: System, missing: Sequence[SweepRun], total: int, width: 
     except MasterError:  # the run itself will say so
         return begun
     about = duration(each * -(-len(missing) // width))
-    return f"{begun}, {min(width, len(missing))} at a time, about {about}"
+    return f"{begun}, {width} at a time, about {about}"
 
 
 def _rehearsed(base: System, missing: Sequence[SweepRun]) -> float:

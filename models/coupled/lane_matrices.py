@@ -83,7 +83,7 @@ class LaneMatrices:
         self.wires, self.most = contact.Wires(*responses.wires), responses.most
 
     def _band(self, matrices: StepMatrices, kernels: ModuleType) -> tuple[FloatArray, FloatArray]:
-        """Return the factor's rows and columns, each after the inverse of its diagonal, in whole groups of diagonals."""
+        """Return the factor's rows and columns, each after the inverse of its diagonal."""
         if not isinstance(matrices.factor, Banded):
             nothing = np.zeros((len(matrices.modes.attached), 1))
             return nothing, nothing

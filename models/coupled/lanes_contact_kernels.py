@@ -2,11 +2,12 @@
 
 The arithmetic is that of `models.catenary.contact_and_slack` and `models.catenary.line_model`; a lane is one run.
 
-This module imports nothing of the project and is not divided, so it is longer than a file should be: it is compiled from
-a copy in the user's cache (`models.numerics.kernel_cache`), which cannot see other files.
+This module imports nothing of the project and is not divided, so it is longer than a file should be: it is compiled
+from a copy in the user's cache (`models.numerics.kernel_cache`), which cannot see other files.
 """
 
 from collections import namedtuple
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -30,18 +31,19 @@ Law = namedtuple("Law", ("stiffness", "exponent", "restitution", "radii"))
 Motion = namedtuple(
     "Motion", ("a1", "modes", "rates", "slot_end", "table", "attached", "known", "change", "pull", "droppers")
 )
-#: What every lane remembers. By pantograph and wire: element last met, velocity at impact; interval, force, row and load
-#: of the force on the wire. Of the slack droppers: how many, which, and what they lack.
+#: What every lane remembers. By pantograph and wire: element last met, velocity at impact; interval, force, row and
+#: load of the force on the wire. Of the slack droppers: how many, which, and what they lack.
 Memory = namedtuple(
     "Memory",
     ("active", "status", "element", "impact", "interval", "force", "row", "load", "slack_count", "slack", "lacking"),
 )
-#: An interval of a contact wire and how it gives way, see `models.catenary.contact_and_slack.wire_response`: its
-#: columns, of forces on the attachments at its ends, reach rows from ``begin`` on, and droppers ``near``.
+#: An interval of a contact wire and how it gives way, see `models.catenary.contact_and_slack.wire_response`: how many
+#: modes, displacements of attachments, rows that forces on these reach, from which on, and droppers near; its first
+#: element; and where in the records its parts begin, matrices row by row.
 Interval = namedtuple(
     "Interval",
-    ("first", "begin", "slots", "ends", "plan", "plan_static", "height", "height_static", "yielding", "at_ends",
-     "columns", "near", "near_force"),
+    ("modes", "ends", "reached", "begin", "near", "first", "slots", "places", "plan", "plan_static", "height",
+     "height_static", "yielding", "at_ends", "columns", "near_index", "near_force"),
 )  # fmt: skip
 #: Work space: ``met``, ``row`` and ``load`` by lane, pantograph and wire, the others for one lane.
 Work = namedtuple(
@@ -54,92 +56,78 @@ Work = namedtuple(
     FOUND, ELEMENT, XI, SHARE, ENGAGED, HEIGHT, RISE, RATE, GIVES, DEPTH, SPEED, IMPACT, PRESSES, FORCE, CLOSED, MET,
 ) = range(16)  # fmt: skip
 #: Sums may be reordered, not more: infinities and NaN stay what they are.
-_compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+_OPTIONS: Any = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
+#: Functions that are called from outside, and those that are not: what leads into these from Python is not compiled.
+_compiled = njit(cache=True, **_OPTIONS)
+_inner = njit(**(_OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}))
 
 
-@_compiled
+@_inner
 def of_lane(lane, memory):
     """Return the places of a lane's pantographs and wires."""
     count = memory.interval.size // memory.active.size
     return range(lane * count, (lane + 1) * count)
 
 
-@_compiled
-def unpacked(wires, index):
-    """Return the parts of an interval's record; whole numbers are held as what they are."""
+@_inner
+def interval_of(wires, index):
+    """Return the numbers of an interval; in its record whole numbers are held as what they are."""
     numbers = wires.numbers[index]
     n, e, k, r, near, at = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[7]
-    m, nodes, records = n + e, 2 * (k + 1), wires.records
-    slots, at = records[at : at + n], at + n
-    ends, at = records[at : at + e], at + e
-    plan, at = records[at : at + nodes * m].reshape((nodes, m)), at + nodes * m
-    plan_static, at = records[at : at + nodes], at + nodes
-    height, at = records[at : at + 4 * k * m].reshape((k, 4, m)), at + 4 * k * m
-    height_static, at = records[at : at + 4 * k].reshape((k, 4)), at + 4 * k
-    yielding, at = records[at : at + n * e].reshape((n, e)), at + n * e
-    at_ends, at = records[at : at + e * e].reshape((e, e)), at + e * e
-    columns, at = records[at : at + e * r].reshape((e, r)), at + e * r
-    near_index, at = records[at : at + near], at + near
-    near_force = records[at : at + e * near].reshape((e, near))
+    m, nodes = n + e, 2 * (k + 1)
+    places = at + n
+    plan = places + e
+    plan_static = plan + nodes * m
+    height = plan_static + nodes
+    height_static = height + 4 * k * m
+    yielding = height_static + 4 * k
+    at_ends = yielding + n * e
+    columns = at_ends + e * e
+    near_index = columns + e * r
     return Interval(
-        numbers[5], numbers[6], slots, ends, plan, plan_static, height, height_static, yielding, at_ends, columns,
-        near_index, near_force,
+        n, e, r, numbers[6], near, numbers[5], at, places, plan, plan_static, height, height_static, yielding, at_ends,
+        columns, near_index, near_index + near,
     )  # fmt: skip
 
 
-@_compiled
-def slots_of(wires, index):
-    """Return where the modes of an interval are."""
-    at = wires.numbers[index, 7]
-    return wires.records[at : at + wires.numbers[index, 0]]
-
-
-@_compiled
-def ends_of(wires, index):
-    """Return where the displacements of the attachments at the ends of an interval are."""
-    at = wires.numbers[index, 7] + wires.numbers[index, 0]
-    return wires.records[at : at + wires.numbers[index, 1]]
-
-
-@_compiled
-def local_motion(interval, index, lane, memory, motion, local):
+@_inner
+def local_motion(interval, index, lane, records, memory, motion, local):
     """Put local coordinates of an interval and their rates at the end of the step into ``local``, shape (2, m)."""
-    a1 = motion.a1[0]
-    n, e = interval.yielding.shape
+    a1, n, e = motion.a1[0], interval.modes, interval.ends
     for j in range(e):
-        local[0, n + j] = motion.change[np.int64(interval.ends[j]), lane]
+        local[0, n + j] = motion.change[np.int64(records[interval.places + j]), lane]
     for i in range(n):
-        slot = np.int64(interval.slots[i])
+        slot = np.int64(records[interval.slots + i])
         amplitude, rate, momentum = (
             motion.table[slot, 0, lane],
             motion.table[slot, 1, lane],
             motion.table[slot, 2, lane],
         )
         change = motion.modes[slot, 1] * amplitude + motion.modes[slot, 2] * momentum
+        yielding = records[interval.yielding + i * e : interval.yielding + (i + 1) * e]
         for j in range(e):
-            change -= interval.yielding[i, j] * local[0, n + j]
+            change -= yielding[j] * local[0, n + j]
         for q in of_lane(lane, memory):
             if memory.interval[q] == index:
                 change += memory.force[q] * memory.row[q, i] * motion.modes[slot, 0]
         local[0, i] = amplitude + change
         local[1, i] = a1 * change - rate
     for j in range(e):
-        place, change = np.int64(interval.ends[j]), local[0, n + j]
+        place, change = np.int64(records[interval.places + j]), local[0, n + j]
         local[0, n + j] = motion.attached[place, 0, lane] + change
         local[1, n + j] = a1 * change - motion.attached[place, 1, lane]
 
 
-@_compiled
-def standing(interval, lane, motion, local):
+@_inner
+def standing(interval, lane, records, motion, local):
     """Put local coordinates of an interval as they are into ``local``."""
-    n, e = interval.yielding.shape
-    for i in range(n):
-        local[0, i] = motion.table[np.int64(interval.slots[i]), 0, lane]
-    for j in range(e):
-        local[0, n + j] = motion.attached[np.int64(interval.ends[j]), 0, lane]
+    for i in range(interval.modes):
+        local[0, i] = motion.table[np.int64(records[interval.slots + i]), 0, lane]
+    for j in range(interval.ends):
+        local[0, interval.modes + j] = motion.attached[np.int64(records[interval.places + j]), 0, lane]
 
 
-@_compiled
+@_inner
 def start_element(wires, wire, guess, x):
     """Return where to begin walking; see `ContactWire.start`."""
     first, last = wires.first[wire], wires.first[wire + 1] - 1
@@ -149,7 +137,7 @@ def start_element(wires, wire, guess, x):
     return min(max(np.searchsorted(wires.starts[first : last + 1], x) - 1, 0), count - 1)
 
 
-@_compiled
+@_inner
 def meet(wires, wire, lane, q, strip, guess, memory, motion, work):
     """Find where a strip (x, y of its ends, z, vz) crosses a wire at the end of the step; see `ContactWire.find`."""
     met, local = work.met[q], work.local
@@ -164,13 +152,13 @@ def meet(wires, wire, lane, q, strip, guess, memory, motion, work):
         x -= np.floor((x - begins) / period) * period
     element = start_element(wires, wire, guess, x)
     known, direction, rounds = -1, 0, 0
-    interval = unpacked(wires, wires.interval[first + element])
+    interval = interval_of(wires, wires.interval[first + element])
     while True:
         index = wires.interval[first + element]
         if index != known:
-            known, interval = index, unpacked(wires, index)
-            local_motion(interval, index, lane, memory, motion, local)
-        place_nodes(interval, element - interval.first, local, work.place)
+            known, interval = index, interval_of(wires, index)
+            local_motion(interval, index, lane, wires.records, memory, motion, local)
+        place_nodes(interval, element - interval.first, wires.records, local, work.place)
         x1, y1, x2, y2 = work.place
         determinant = (right - left) * (x2 - x1)
         if determinant == 0.0:
@@ -198,53 +186,59 @@ def meet(wires, wire, lane, q, strip, guess, memory, motion, work):
         engaged *= min(1.0, min(along - begins, ends - along) / _WIRE_EDGE)
     met[FOUND], met[ELEMENT], met[XI], met[SHARE], met[ENGAGED] = 1.0, element, xi, share, engaged
     met[HEIGHT], met[GIVES] = lift_and_give(
-        interval, element - interval.first, xi, motion.modes, work.row[q], work.load[q]
+        interval, element - interval.first, xi, wires.records, motion.modes, work.row[q], work.load[q]
     )
     rise = rate = 0.0
-    for m in range(interval.plan.shape[1]):
+    for m in range(interval.modes + interval.ends):
         rise += work.row[q, m] * local[0, m]
         rate += work.row[q, m] * local[1, m]
     met[RISE], met[RATE] = rise, rate
 
 
-@_compiled
-def place_nodes(interval, own, local, place):
+@_inner
+def place_nodes(interval, own, records, local, place):
     """Put the positions in plan of both ends of an element into ``place``."""
+    count = interval.modes + interval.ends
     for k in range(4):
-        value = interval.plan_static[2 * own + k]
-        for m in range(interval.plan.shape[1]):
-            value += interval.plan[2 * own + k, m] * local[0, m]
+        value, at = records[interval.plan_static + 2 * own + k], interval.plan + (2 * own + k) * count
+        row = records[at : at + count]
+        for m in range(count):
+            value += row[m] * local[0, m]
         place[k] = value
 
 
-@_compiled
-def lift_and_give(interval, own, xi, modes, row, load):
+@_inner
+def lift_and_give(interval, own, xi, records, modes, row, load):
     """Put what a unit force on a point does to the local coordinates into ``row`` and to the attachments into ``load``.
 
     Returns its static height and its compliance.
     """
-    n, e = interval.yielding.shape
+    n, e = interval.modes, interval.ends
     height, power = 0.0, 1.0
     row[:] = 0.0
     for k in range(4):
-        height += power * interval.height_static[own, k]
+        height += power * records[interval.height_static + 4 * own + k]
+        at = interval.height + (4 * own + k) * (n + e)
+        height_row = records[at : at + n + e]
         for m in range(n + e):
-            row[m] += power * interval.height[own, k, m]
+            row[m] += power * height_row[m]
         power *= xi
     gives = 0.0
     for j in range(e):
         load[j] = row[n + j]
     for i in range(n):
-        gives += row[i] * row[i] * modes[np.int64(interval.slots[i]), 0]
-        for j in range(e):
-            load[j] -= row[i] * interval.yielding[i, j]
+        if row[i] != 0.0:
+            gives += row[i] * row[i] * modes[np.int64(records[interval.slots + i]), 0]
+            yielding = records[interval.yielding + i * e : interval.yielding + (i + 1) * e]
+            for j in range(e):
+                load[j] -= row[i] * yielding[j]
     for j in range(e):
         for k in range(e):
-            gives += load[j] * interval.at_ends[j, k] * load[k]
+            gives += load[j] * records[interval.at_ends + j * e + k] * load[k]
     return height, gives
 
 
-@_compiled
+@_inner
 def normal_force(law, engaged, impact_before, penetration, velocity):
     """Return the force of a contact and its slopes; see `models.contact_law.continuous_contact`."""
     if penetration <= 0.0:
@@ -259,7 +253,7 @@ def normal_force(law, engaged, impact_before, penetration, velocity):
     return engaged * (elastic * factor), engaged * slope, engaged * (elastic * hysteresis)
 
 
-@_compiled
+@_inner
 def single_contact(met, compliance, law, a1):
     """Return force, velocity and penetration of one contact alone, and whether they were found."""
     force = 0.0
@@ -274,29 +268,28 @@ def single_contact(met, compliance, law, a1):
     return force, 0.0, 0.0, False
 
 
-@_compiled
-def column_at(values, begin, rows, place):
-    """Return a response that reaches ``values.size`` rows from ``begin`` on, at a row of all ``rows``."""
+@_inner
+def column_at(values, at, reached, begin, rows, place):
+    """Return a response, which reaches some rows of all from ``begin`` on, at a row."""
     offset = place - begin
     if offset < 0:
         offset += rows
-    return values[offset] if offset < values.size else 0.0
+    return values[at + offset] if offset < reached else 0.0
 
 
-@_compiled
-def move_apart(interval, load, response):
-    """Put the response of the attachments to a load on an interval into ``response``; return how many it reaches."""
-    reached = interval.columns.shape[1]
-    response[:reached] = 0.0
-    for j in range(interval.columns.shape[0]):
-        share, column = load[j], interval.columns[j]
+@_inner
+def add_columns(records, at, rows, count, load, result):
+    """Put the sum of the rows of a matrix, each times its load, into ``result``; they have ``count`` entries."""
+    result[:count] = 0.0
+    for j in range(rows):
+        share = load[j]
         if share != 0.0:
-            for k in range(reached):
-                response[k] += column[k] * share
-    return reached
+            row = records[at + j * count : at + (j + 1) * count]
+            for k in range(count):
+                result[k] += row[k] * share
 
 
-@_compiled
+@_inner
 def solve_dense(system, right, n):
     """Solve a small system in place by elimination with pivots; return whether it could be."""
     for k in range(n):
@@ -323,7 +316,7 @@ def solve_dense(system, right, n):
     return True
 
 
-@_compiled
+@_inner
 def find_contacts(lane, wires, strips, law, memory, motion, work):
     """Find which strips of a lane cross wires, and put those that may press into ``work.contacts``; return how many."""
     n, sections = 0, wires.period.size
@@ -344,66 +337,65 @@ def find_contacts(lane, wires, strips, law, memory, motion, work):
     return n
 
 
-@_compiled
-def couple(lane, contacts, wires, motion, work):
+@_inner
+def couple(contacts, wires, motion, work):
     """Find what the contacts' forces do to droppers and to one another."""
-    rows, sections = motion.change.shape[0], wires.period.size
+    rows, records = motion.change.shape[0], wires.records
     for b in range(contacts):
         q = work.contacts[b]
-        index = wires.interval[wires.first[q % sections] + np.int64(work.met[q, ELEMENT])]
-        interval = unpacked(wires, index)
+        index = pressed_interval(q, wires, work)
+        interval = interval_of(wires, index)
         work.by_contact[b, :] = 0.0
-        near = work.response[: interval.near.size]
-        near[:] = 0.0
-        for e in range(interval.ends.size):
-            share, force = work.load[q, e], interval.near_force[e]
-            if share != 0.0:
-                for j in range(near.size):
-                    near[j] += force[j] * share
-        for j in range(near.size):
-            work.by_contact[b, np.int64(interval.near[j])] = near[j]
+        add_columns(records, interval.near_force, interval.ends, interval.near, work.load[q], work.response)
+        for j in range(interval.near):
+            work.by_contact[b, np.int64(records[interval.near_index + j])] = work.response[j]
+        work.compliance[b, b] = work.met[q, GIVES]
         if contacts > 1:
-            move_apart(interval, work.load[q], work.response)
+            add_columns(records, interval.columns, interval.ends, interval.reached, work.load[q], work.response)
         for a in range(contacts):
             if a == b:
-                work.compliance[a, b] = work.met[q, GIVES]
                 continue
             other = work.contacts[a]
-            there = wires.interval[wires.first[other % sections] + np.int64(work.met[other, ELEMENT])]
-            target = unpacked(wires, there)
+            there = pressed_interval(other, wires, work)
+            target = interval_of(wires, there)
             total = 0.0
-            for e in range(target.ends.size):
-                place = np.int64(target.ends[e])
-                reached = work.response[: interval.columns.shape[1]]
-                total += work.load[other, e] * column_at(reached, interval.begin, rows, place)
+            for e in range(target.ends):
+                place = np.int64(records[target.places + e])
+                moved = column_at(work.response, 0, interval.reached, interval.begin, rows, place)
+                total += work.load[other, e] * moved
             if there == index:
-                for i in range(interval.slots.size):
-                    slot = np.int64(interval.slots[i])
+                for i in range(interval.modes):
+                    slot = np.int64(records[interval.slots + i])
                     total += work.row[q, i] * work.row[other, i] * motion.modes[slot, 0]
             work.compliance[a, b] = total
 
 
-@_compiled
+@_inner
+def pressed_interval(q, wires, work):
+    """Return the interval on which a candidate is."""
+    return wires.interval[wires.first[q % wires.period.size] + np.int64(work.met[q, ELEMENT])]
+
+
+@_inner
 def couple_slack(k, j, contacts, wires, motion, work):
     """Find what a force of dropper ``j``, the ``k``-th slack one, does to droppers and contacts."""
-    reached, begin, near, at = wires.slack_numbers[j]
-    values = wires.slack_records[at : at + reached]
-    index = wires.slack_records[at + reached : at + reached + near]
-    force = wires.slack_records[at + reached + near : at + reached + 2 * near]
+    numbers = wires.slack_numbers[j]
+    reached, begin, near, at = numbers[0], numbers[1], numbers[2], numbers[3]
+    values, index = wires.slack_records, at + reached
     work.by_slack[k, :] = 0.0
     for i in range(near):
-        work.by_slack[k, np.int64(index[i])] = force[i]
-    sections = wires.period.size
+        work.by_slack[k, np.int64(values[index + i])] = values[index + near + i]
     for a in range(contacts):
         q = work.contacts[a]
-        interval = unpacked(wires, wires.interval[wires.first[q % sections] + np.int64(work.met[q, ELEMENT])])
+        interval = interval_of(wires, pressed_interval(q, wires, work))
         total = 0.0
-        for e in range(interval.ends.size):
-            total += work.load[q, e] * column_at(values, begin, motion.change.shape[0], np.int64(interval.ends[e]))
+        for e in range(interval.ends):
+            place = np.int64(wires.records[interval.places + e])
+            total += work.load[q, e] * column_at(values, at, reached, begin, motion.change.shape[0], place)
         work.on_contacts[a, k] = total
 
 
-@_compiled
+@_inner
 def penetrate(contacts, slack, a1, work):
     """Find penetrations and their velocities under the present forces."""
     for a in range(contacts):
@@ -416,7 +408,7 @@ def penetrate(contacts, slack, a1, work):
         work.velocity[a] = work.met[work.contacts[a], SPEED] + a1 * change
 
 
-@_compiled
+@_inner
 def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
     """Solve for contact forces and slack droppers of a lane; see `LocalProblem.solve`.
 
@@ -432,7 +424,7 @@ def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
         lowest = min(lowest, work.pull[j])
     if not contacts and not slack and lowest >= 0.0:
         return 0
-    couple(lane, contacts, wires, motion, work)
+    couple(contacts, wires, motion, work)
     if contacts == 1 and not slack:
         met = work.met[work.contacts[0]]
         force, work.velocity[0], work.penetration[0], found = single_contact(met, met[GIVES], law, a1)
@@ -479,7 +471,7 @@ def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
     return -UNSETTLED
 
 
-@_compiled
+@_inner
 def find_slack(contacts, slack, work):
     """Put the droppers that would push under the present forces into ``work.found``; return how many."""
     now = 0
@@ -495,7 +487,7 @@ def find_slack(contacts, slack, work):
     return now
 
 
-@_compiled
+@_inner
 def take_over(now, before, contacts, wires, motion, work):
     """Take the droppers of ``work.found`` for the slack ones, with the forces of those that were so before."""
     work.change[:before] = work.lacking[:before]
@@ -510,7 +502,7 @@ def take_over(now, before, contacts, wires, motion, work):
     return now
 
 
-@_compiled
+@_inner
 def newton_step(contacts, slack, law, unilateral, a1, work):
     """Solve the local problem linearised at the present forces into ``work.change``; return whether it could be.
 
@@ -540,33 +532,33 @@ def newton_step(contacts, slack, law, unilateral, a1, work):
     return solve_dense(system, right, contacts + slack)
 
 
-@_compiled
-def add_along(change, lane, begin, factor, values):
-    """Add a multiple of values to the rows from ``begin`` on, round the end of a line that closes on itself."""
-    before = min(change.shape[0] - begin, values.size)
+@_inner
+def add_along(change, lane, begin, factor, values, at, count):
+    """Add a multiple of some values to the rows from ``begin`` on, round the end of a line that closes on itself."""
+    before = min(change.shape[0] - begin, count)
+    rows, shown = change[begin : begin + before], values[at : at + count]
     for k in range(before):
-        change[begin + k, lane] += factor * values[k]
-    for k in range(before, values.size):
-        change[k - before, lane] += factor * values[k]
+        rows[k, lane] += factor * shown[k]
+    for k in range(before, count):
+        change[k - before, lane] += factor * shown[k]
 
 
-@_compiled
+@_inner
 def react(lane, contacts, slack, wires, motion, work):
     """Add what the forces found in the step change to the attachments."""
-    sections = wires.period.size
     for a in range(contacts):
         q = work.contacts[a]
         if work.force[a] != 0.0:
-            index = wires.interval[wires.first[q % sections] + np.int64(work.met[q, ELEMENT])]
-            interval = unpacked(wires, index)
-            reached = move_apart(interval, work.load[q], work.response)
-            add_along(motion.change, lane, interval.begin, work.force[a], work.response[:reached])
+            interval = interval_of(wires, pressed_interval(q, wires, work))
+            reached = interval.reached
+            add_columns(wires.records, interval.columns, interval.ends, reached, work.load[q], work.response)
+            add_along(motion.change, lane, interval.begin, work.force[a], work.response, 0, reached)
     for k in range(slack):
-        reached, begin, _, at = wires.slack_numbers[work.slack[k]]
-        add_along(motion.change, lane, begin, -work.lacking[k], wires.slack_records[at : at + reached])
+        numbers, lacking = wires.slack_numbers[work.slack[k]], work.lacking[k]
+        add_along(motion.change, lane, numbers[1], -lacking, wires.slack_records, numbers[3], numbers[0])
 
 
-@_compiled
+@_inner
 def keep(lane, contacts, slack, memory, work):
     """Note what was found for a lane in the step, until it has moved."""
     memory.slack_count[lane] = slack
@@ -582,32 +574,31 @@ def keep(lane, contacts, slack, memory, work):
             met[CLOSED] = met[IMPACT] if met[IMPACT] else max(work.velocity[a], _SLOWEST_IMPACT)
 
 
-@_compiled
+@_inner
 def remember(lane, wires, memory, work):
     """Take the forces at the end of the step for those with which the next one begins."""
-    sections = wires.period.size
     for q in of_lane(lane, memory):
         met = work.met[q]
         memory.impact[q], memory.force[q], memory.interval[q] = 0.0, 0.0, -1
         if met[PRESSES]:
             memory.impact[q], memory.force[q] = met[CLOSED], met[FORCE]
-            memory.interval[q] = wires.interval[wires.first[q % sections] + np.int64(met[ELEMENT])]
+            memory.interval[q] = pressed_interval(q, wires, work)
             for m in range(work.row.shape[1]):
                 memory.row[q, m] = work.row[q, m]
             for e in range(work.load.shape[1]):
                 memory.load[q, e] = work.load[q, e]
 
 
-@_compiled
+@_inner
 def press(lane, wires, memory, motion):
     """Add what the remembered forces do to the modes of their intervals in a step, and so to the ends of these."""
     a1, modes = motion.a1[0], motion.modes
     for q in of_lane(lane, memory):
         if memory.interval[q] < 0 or memory.force[q] == 0.0:
             continue
-        slots = slots_of(wires, memory.interval[q])
-        for i in range(slots.size):
-            slot = np.int64(slots[i])
+        interval = interval_of(wires, memory.interval[q])
+        for i in range(interval.modes):
+            slot = np.int64(wires.records[interval.slots + i])
             change = memory.force[q] * memory.row[q, i] * modes[slot, 0]
             if change == 0.0:
                 continue
@@ -622,22 +613,23 @@ def press(lane, wires, memory, motion):
                     motion.pull[end + j, lane] += modes[slot, OWN + j] * value
 
 
-@_compiled
+@_inner
 def know(lane, droppers, wires, memory, motion):
     """Add what is known of the forces on the attachments in the next step to ``motion.known``."""
     rows, columns, stretch, _ = droppers
     for q in of_lane(lane, memory):
         if memory.interval[q] >= 0:
-            ends = ends_of(wires, memory.interval[q])
-            for j in range(ends.size):
-                motion.known[np.int64(ends[j]), lane] += memory.force[q] * memory.load[q, j]
+            interval = interval_of(wires, memory.interval[q])
+            for j in range(interval.ends):
+                place = np.int64(wires.records[interval.places + j])
+                motion.known[place, lane] += memory.force[q] * memory.load[q, j]
     for k in range(memory.slack_count[lane]):
         j = memory.slack[lane, k]
         for at in range(rows[j], rows[j + 1]):
             motion.known[columns[at], lane] -= memory.lacking[lane, k] * stretch[at]
 
 
-@_compiled
+@_inner
 def publish(lane, p, strip, wires, memory, motion, work, output):
     """Put the resultant on a strip and its point of application into ``output``, then the force on every wire."""
     sections = wires.period.size
@@ -667,15 +659,15 @@ def publish(lane, p, strip, wires, memory, motion, work, output):
             output[k] /= total
 
 
-@_compiled
+@_inner
 def crossed_at(q, wire, along, wires, motion, work):
     """Return where a wire is crossed as it stands, in the lap of a strip at ``along``; ``work.local`` is replaced."""
     met, place = work.met[q], work.place
-    interval = unpacked(wires, wires.interval[wires.first[wire] + np.int64(met[ELEMENT])])
-    standing(interval, q // (work.met.shape[0] // motion.change.shape[1]), motion, work.local)
-    place_nodes(interval, np.int64(met[ELEMENT]) - interval.first, work.local, place)
+    interval = interval_of(wires, pressed_interval(q, wires, work))
+    standing(interval, q // (work.met.shape[0] // motion.change.shape[1]), wires.records, motion, work.local)
+    place_nodes(interval, np.int64(met[ELEMENT]) - interval.first, wires.records, work.local, place)
     x, y, z = place[0] + met[XI] * (place[2] - place[0]), place[1] + met[XI] * (place[3] - place[1]), met[HEIGHT]
-    for m in range(interval.plan.shape[1]):
+    for m in range(interval.modes + interval.ends):
         z += work.row[q, m] * work.local[0, m]
     if wires.period[wire]:
         x += wires.period[wire] * np.round((along - x) / wires.period[wire])

@@ -1,13 +1,14 @@
 """The linear part of a step of one line under several trains, for all lanes at once, for numba.
 
-A lane is one run. In every array the numbers of all lanes stand side by side, so that factor and couplings are read once
-for all of them and the processor takes several lanes at a time. The arithmetic is that of `models.catenary.step`.
+A lane is one run. In every array the numbers of all lanes stand side by side, so that factor and couplings are read
+once for all of them and the processor takes several lanes at a time. The arithmetic is that of `models.catenary.step`.
 
 This module imports nothing of the project: it is compiled from a copy in the user's cache
 (`models.numerics.kernel_cache`), which cannot see other files.
 """
 
 from collections import namedtuple
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -25,11 +26,14 @@ Linear = namedtuple(
 #: Elongation of droppers over the attachments, compressed by rows, three columns of values: for displacements,
 #: velocities and changes; and what they pull at rest.
 Droppers = namedtuple("Droppers", ("rows", "columns", "values", "rest"))
-#: Motion, an array of all lanes each: modes; displacement and velocity of each attachment, what is known of the forces on
-#: them, their change in this step; motion of the intervals' ends and forces on these; pulls of the droppers.
+#: Motion, an array of all lanes each: modes; displacement and velocity of each attachment, what is known of the forces
+#: on them, their change in this step; motion of the intervals' ends and forces on these; pulls of the droppers.
 Motion = namedtuple("Motion", ("table", "attached", "known", "change", "ends", "pull", "droppers"))
 #: Sums may be reordered, not more: infinities and NaN stay what they are.
-_compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+_OPTIONS: Any = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
+#: Functions that are called from outside, and those that are not: what leads into these from Python is not compiled.
+_compiled = njit(cache=True, **_OPTIONS)
+_inner = njit(**(_OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}))
 _U = np.uint64
 _K = _U(LANES)
 _0, _1, _2, _3, _4, _5, _6, _7, _8 = (_U(i) for i in range(9))
@@ -46,7 +50,7 @@ def load(linear, motion):
     multiply(linear.back, motion.pull, right)
 
 
-@_compiled
+@_inner
 def middle(linear, change):
     """Return the part of an array that stands between the rows of zeros that the band needs."""
     margin = (linear.lower.shape[1] - 1) * LANES
@@ -91,7 +95,7 @@ def finish(linear, motion):
             attached[at + _K + i] = a1 * change[of + i] - attached[at + _K + i]
 
 
-@_compiled
+@_inner
 def multiply(matrix, vector, result):
     """Add a matrix times a vector of every lane to ``result``; rows are filled up to an even number of entries."""
     rows, columns, values = matrix
@@ -104,7 +108,7 @@ def multiply(matrix, vector, result):
             k += _2
 
 
-@_compiled
+@_inner
 def add_own(own, attached, result):
     """Add -2 K x + a2 M v of the attachments to ``result``; rows are filled up to a multiple of three entries."""
     rows, columns, values = own
@@ -121,7 +125,7 @@ def add_own(own, attached, result):
             k += _3
 
 
-@_compiled
+@_inner
 def solve(lower, upper, x):
     """Solve a band for all lanes; ``x`` holds the loads, then the solution, between rows of zeros.
 
@@ -164,7 +168,7 @@ def solve(lower, upper, x):
             x[at + i] *= diagonal
 
 
-@_compiled
+@_inner
 def follow(linear, motion):
     """Let all modes follow their ends, and find what they do to these in the next step.
 
@@ -227,7 +231,7 @@ def follow(linear, motion):
     follow_wide(linear, first[first.size - 1], table, ends, pull)
 
 
-@_compiled
+@_inner
 def follow_wide(linear, begin, table, ends, pull):
     """Do as `follow` does for modes that move with more ends, one by one."""
     a1, rates, modes, slot_end = linear.a1, linear.rates, linear.modes, linear.slot_end

@@ -8,6 +8,7 @@ This module imports nothing of the project: it is compiled from a copy in the us
 """
 
 from collections import namedtuple
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -23,16 +24,19 @@ _STAMP_TOLERANCE, _LEAST_TRAVEL, _SAME_TIME = 0.25, 1e-9, 1e-12
 X, Z, VX, VZ, AZ, TIME, RECEIVED = range(7)
 #: What ``forces`` holds: three times, three values, latest first, and how many are known.
 KNOWN, FORCES = 6, 7
-#: Pantographs of all lanes, arrays (lanes, P, ...): masses; inverse of K_hat and damping matrix; number of masses and of
-#: inner steps; length of such a step; displacement, velocity, acceleration of the masses; see above for the rest.
+#: Pantographs of all lanes, arrays (lanes, P, ...): masses; inverse of K_hat and damping matrix; number of masses and
+#: of inner steps; length of such a step; displacement, velocity, acceleration of the masses; see above for the rest.
 Trains = namedtuple(
     "Trains",
     ("mass", "inverse", "damping", "masses", "steps", "length", "motion", "setting", "strip", "received", "forces"),
 )
-_compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+_OPTIONS: Any = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
+#: Functions that are called from outside, and those that are not: what leads into these from Python is not compiled.
+_compiled = njit(cache=True, **_OPTIONS)
+_inner = njit(**(_OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}))
 
 
-@_compiled
+@_inner
 def lead_of(position, expected, speed, step):
     """Return how long after the beginning of the step a received position is valid."""
     travel = speed * step
@@ -41,7 +45,7 @@ def lead_of(position, expected, speed, step):
     return step if abs((position - expected) / travel - 1.0) < _STAMP_TOLERANCE else 0.0
 
 
-@_compiled
+@_inner
 def place_strip(trains, lane, p, elapsed):
     """Put the strip where the pantograph is, so long after its start."""
     setting, strip, top = trains.setting[lane, p], trains.strip[lane, p], trains.masses[lane, p] - 1
@@ -51,7 +55,7 @@ def place_strip(trains, lane, p, elapsed):
     strip[VZ] = trains.motion[lane, p, 1, top]
 
 
-@_compiled
+@_inner
 def raised(setting, time):
     """Return the share of the uplift that acts at a time after the start."""
     if time < setting[RAISE_START]:
@@ -111,7 +115,7 @@ def continue_strips(trains, active, times, later, order, strips):
             strips[lane, p, 4] = held[VZ] + tau * held[AZ]
 
 
-@_compiled
+@_inner
 def take_force(forces, time, force):
     """Take a force valid at ``time``; see `ForceExtrapolation.receive`."""
     if forces[KNOWN] and time <= forces[0] + _SAME_TIME:
@@ -123,7 +127,7 @@ def take_force(forces, time, force):
     forces[KNOWN] = min(forces[KNOWN] + 1.0, 3.0)
 
 
-@_compiled
+@_inner
 def force_at(forces, wanted, time):
     """Return the force at ``time``; see `ForceExtrapolation.at`."""
     if forces[3] == 0.0 and time > forces[0]:
@@ -169,7 +173,7 @@ def step_trains(trains, active, times, began, step, contact):
             place_strip(trains, lane, p, time + step - began)
 
 
-@_compiled
+@_inner
 def step_masses(trains, lane, p, uplift, contact):
     """Let the masses of a pantograph make one inner step by the trapezoidal rule; see `LumpedModel`."""
     n, h, mass, damping = trains.masses[lane, p], trains.length[lane, p], trains.mass[lane, p], trains.damping[lane, p]

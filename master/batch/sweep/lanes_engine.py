@@ -121,6 +121,7 @@ class LanesEngine:
                     text = f"run {wanted.number} made side by side and by FMUs differs by {difference:.3g} N"
                     raise MasterError(f"{text} in its contact force, more than {AGREEMENT:g} N; use --engine fmu")
                 found.append(result)
+        self.checks.sort(key=lambda check: int(check["run"]))
         yield from found
 
 
@@ -131,7 +132,7 @@ def _samples(runs: Sequence[SweepRun], count: int) -> list[SweepRun]:
 
 
 def _difference(wanted: SweepRun, base: System, result: SweepResult, forces: FloatArray) -> float:
-    """Return by how much contact forces, shape (n, P), differ from those of FMUs [N]; NaN if only one has come to its end."""
+    """Return by how much contact forces, shape (n, P), differ from those of FMUs [N]; NaN if only one run has ended."""
     system = wanted.system(base)
     with tempfile.TemporaryDirectory(prefix="sweep-") as name:
         try:

@@ -36,7 +36,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn
 
-from master.errors import hint
+from master.errors import empty_argument, hint
 from master.safety.supervision import phase, supervised
 
 
@@ -49,7 +49,7 @@ class Verb(NamedTuple):
     examples: tuple[str, ...]
 
 
-_MASTER: Final = "master.commands.main:carry_out"
+_MASTER: Final = "master.commands.verb_execution:carry_out"
 _MODELS: Final = "models.commands.physics_main:carry_out"
 _FMUS: Final = "fmus.__main__:carry_out"
 
@@ -60,7 +60,7 @@ REQUIRED: Final = ("numpy", "scipy", "pythonfmu", "fmpy", "lxml", "pydantic", "f
 VERBS: Final[Mapping[str, Verb]] = {
     "run": Verb(
         "run a scenario",
-        "master.commands.run_command:add_run",
+        "master.commands.verb_options:add_run",
         _MASTER,
         ("run cx_ln2", "run demo --set catenary.contact_wire.tension='20 kN' --out results/20kN"),
     ),
@@ -88,76 +88,82 @@ VERBS: Final[Mapping[str, Verb]] = {
     ),
     "validate": Verb(
         "check a scenario without running it",
-        "master.commands.scenario_commands:add_validate",
+        "master.commands.verb_options:add_validate",
         _MASTER,
         ("validate demo", "validate theirs.ssp --strict"),
     ),
     "pack": Verb(
         "write a scenario as a .ssp archive, FMUs included",
-        "master.commands.scenario_commands:add_pack",
+        "master.commands.verb_options:add_pack",
         _MASTER,
         ("pack cx_ln2", "pack demo --standalone --out demo.ssp"),
     ),
     "calibrate": Verb(
         "find the parameter value that gives the wanted mean force, and store it in the scenario",
-        "master.commands.calibrate_command:add_calibrate",
+        "master.commands.verb_options:add_calibrate",
         _MASTER,
         ("calibrate demo", "calibrate demo --parameter pantograph.static_force --mean 120 --dry-run"),
     ),
     "study": Verb(
         "run a family of variants of a scenario and report them side by side",
-        "master.commands.study_command:add_study",
+        "master.commands.verb_options:add_study",
         _MASTER,
         ("study --list", "study cx_ln2_overlap", "study cx_ln2_overlap --only '200 m'"),
     ),
     "sweep": Verb(
         "run a scenario over a grid, a sample or a table of values",
-        "master.commands.sweep_command:add_sweep",
+        "master.commands.verb_options:add_sweep",
         _MASTER,
         (
             "sweep cx_ln2 --over speed=200:320:10",
             "sweep demo --samples 200 --vary 'catenary.contact_wire.tension=normal(20kN, 0.2kN)' --jobs 4",
         ),
     ),
+    "optimise": Verb(
+        "find the values of a few parameters for which a figure is least or greatest",
+        "master.commands.verb_options:add_optimise",
+        _MASTER,
+        ("optimise cx_ln2 --minimise sigma --vary 'pantograph.stage[3].stiffness=2:12kN/m' --subject-to mean=157N",),
+    ),
     "compare": Verb(
         "show two or more runs side by side",
-        "master.commands.report_commands:add_compare",
+        "master.commands.verb_options:add_compare",
         _MASTER,
         ("compare results/demo results/20kN", "compare results/demo results/20kN --report compare.html"),
     ),
     "report": Verb(
-        "write plots and report of a run again, with a measurement or a film on request",
-        "master.commands.report_commands:add_report",
+        "write plots and report of a run or a sweep again, with a measurement or a film of a run on request",
+        "master.commands.verb_options:add_report",
         _MASTER,
         ("report results/demo", "report results/demo --measured force.csv --film run.mp4"),
     ),
     "verify": Verb(
         "run reference cases and judge every figure",
-        "master.commands.verify_command:add_verify",
+        "master.commands.verb_options:add_verify",
         _MASTER,
         ("verify --list", "verify cx_ln2", "verify"),
     ),
     "statics": Verb(
         "static shape, droppers, elasticity and wave figures of a line",
-        "models.commands.statics_command:add",
+        "models.commands.physics_verbs:add_statics",
         _MODELS,
         ("statics LN2", "statics demo/lines/demo_LN2.toml --speed 250 --out statics"),
     ),
     "pantograph": Verb(
         "statics over height, modes, apparent mass of a pantograph",
-        "models.commands.pantograph_command:add",
+        "models.commands.physics_verbs:add_pantograph",
         _MODELS,
         ("pantograph CX", "pantograph CX_multibody --heights 4.8 5.4 --out pantograph"),
     ),
     "identify": Verb(
         "fit a lumped pantograph to a frequency response",
-        "models.commands.identify_command:add",
+        "models.commands.physics_verbs:add_identify",
         _MODELS,
         ("identify response.csv", "identify response.csv --stages 2 --fix m2=7.75 --plot fit.png"),
     ),
     "couple": Verb(
         "run a lumped pantograph on a line as one system, without co-simulation",
-        "models.commands.couple_command:add",
+        "models.commands.physics_verbs:add_couple",
         _MODELS,
         ("couple LN2 CX", "couple LN2 CX --speed 280 --interval 400 700 --out coupled"),
     ),
@@ -221,18 +227,18 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
     import shtab
 
     from fmus.builder.recipe import known_names
-    from master.batch.study.family import family_names
-    from master.batch.verification.case import CASES
-    from master.scenario.scenario_place import scenario_names
-    from models.library.catalogue import line_names, pantograph_names
+    from master.batch import verification
+    from master.scenario import scenario_place
+    from models.library.search_path import LIBRARY, definition_names
 
+    lines, pantographs = definition_names("lines", [LIBRARY]), definition_names("pantographs", [LIBRARY])
     known = {
-        "scenario": scenario_names(),
-        "line": line_names(),
-        "pantograph": pantograph_names(),
-        "like": (*line_names(), *pantograph_names()),
-        "name": family_names(),
-        "cases": [case.stem for case in CASES.glob("*.toml")],
+        "scenario": scenario_place.scenario_names(),
+        "line": lines,
+        "pantograph": pantographs,
+        "like": (*lines, *pantographs),
+        "name": [study.parent.stem for study in scenario_place.LIBRARY.glob("*.ssp/study.toml")],
+        "cases": [case.stem for case in (Path(verification.__path__[0]) / "cases").glob("*.toml")],
         "names": known_names(),
     }
     parser, functions = command_line(), []
@@ -272,9 +278,11 @@ def _worked(given: Sequence[str]) -> int:
     """Carry out a command line, having imported what its verb needs."""
     verb = given[0] if given else ""
     parser = command_line([verb])
-    if not verb:
+    if not given:
         parser.print_help()
         return 2
+    if empty := empty_argument(given):
+        parser.error(empty)
     if not verb.startswith("-") and verb not in VERBS:
         parser.error(f"there is no verb '{verb}'{_wanted_run(verb) or hint(verb, VERBS)}")
     options, unknown = parser.parse_known_args(given)
@@ -339,7 +347,7 @@ def _named(place: str) -> Callable[..., Any]:
 
 def add_new(verbs: Any) -> None:
     """Declare ``new`` and its options."""
-    from master.commands.command_options import assignment, finite_number
+    from master.commands.verb_options import assignment, finite_number
 
     parser = verbs.add_parser("new", help=VERBS["new"].text)
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the project, new or empty")
@@ -352,10 +360,20 @@ def add_new(verbs: Any) -> None:
     parser.add_argument("--speed", required=True, type=finite_number, metavar="KM/H", help="of the train [km/h]")
     text = "where figures are taken [m]; by default as many spans as the line has room for, ten at most"
     parser.add_argument("--interval", nargs=2, type=finite_number, metavar=("START", "END"), help=text)
+    text = "whose limits apply and whose upper mean force calibrate seeks: AC (default), 'DC 1.5kV', 'DC 3kV'"
+    parser.add_argument("--supply", type=_supply, default="AC", metavar="SYSTEM", help=text)
     text = "which variable of an FMU a port is (A.x ... B.vz, contact.force), if its name does not say; repeatable"
     port = partial(assignment, form="PORT=VARIABLE")
     parser.add_argument("--map", action="append", type=port, default=[], metavar="PORT=VARIABLE", help=text)
     parser.set_defaults(verb=_new)
+
+
+def _supply(text: str) -> str:
+    """Return the name that limits have for a supply system."""
+    name = text.upper().replace(" ", "").replace("KV", "")
+    if name not in ("AC", "DC1.5", "DC3"):
+        raise argparse.ArgumentTypeError(f"'{text}' has no limits here: give AC, 'DC 1.5kV' or 'DC 3kV'")
+    return name
 
 
 def add_new_line(verbs: Any) -> None:
@@ -377,7 +395,7 @@ def _add_copy(verbs: Any, verb: str, kind: str) -> None:
 
 def _new(options: argparse.Namespace) -> int:
     """Write a project."""
-    from master.evaluation.en50367_limits import LimitChoice, limits_at
+    from master.evaluation.en50367_limits import SUPPLIES, LimitChoice, limits_at
     from master.scenario.project import new_project as projects
     from master.scenario.project.stretch import Wire, check_speed
     from models.library import definition_facts as facts
@@ -386,7 +404,7 @@ def _new(options: argparse.Namespace) -> int:
     projects.check_folder(options.folder)
     check_speed(options.speed / 3.6)
     name, speed = projects.project_name(options.folder), options.speed / 3.6
-    wire, lifts = None, {}
+    wire, lifts, raised = None, {}, 0.0
     line, definition = _source("lines", options.line, name, load_line)
     if definition is not None:
         wire = Wire(options.line, *facts.line_facts(definition))
@@ -395,13 +413,17 @@ def _new(options: argparse.Namespace) -> int:
         pantograph, definition = _source("pantographs", given, name, load_pantograph)
         train.append(pantograph)
         if definition is not None:
+            raised = raised if len(train) > 1 else facts.raised_after(definition)
             lifts[pantograph.name] = projects.Lift(*facts.lift_facts(definition))
-    target = limits_at(speed, LimitChoice()).mean_upper.value
+    target = limits_at(speed, LimitChoice(options.supply)).mean_upper.value
     interval = tuple(options.interval) if options.interval else None
     request = projects.Request(
-        options.folder, line, wire, train, lifts, options.separation, speed, target, interval, options.map
-    )
+        options.folder, line, wire, train, lifts, options.separation, speed, target, interval, options.map,
+        (options.supply, SUPPLIES[options.supply]), raised,
+    )  # fmt: skip
     projects.new_project(request)
+    if doubt := projects.doubt(request):
+        print(f"note: {doubt}", file=sys.stderr)
     print(f"{options.speed:g} km/h; {options.folder / 'README.md'} says what each file is and what was chosen")
     print(f"next: openpanto run {shlex.quote(str(options.folder))}")
     return 0
@@ -452,7 +474,8 @@ def _original(kind: Any, given: str, load: Callable[[str], Any]) -> tuple[Path, 
 
     try:
         path = (catalogue.line_path if kind == "lines" else catalogue.pantograph_path)(given)
-        return path, path.read_text(encoding="utf-8"), load(str(path))
+        definition = load(str(path))  # says what is wrong with the file, if anything is
+        return path, path.read_text(encoding="utf-8"), definition
     except (catalogue.UnknownNameError, DefinitionError) as error:
         raise RequestError(str(error)) from error
     except UnicodeDecodeError as error:

@@ -10,37 +10,36 @@ if __name__ == "__main__" and not sys.flags.safe_path and sys.path[0] != __file_
     del sys.path[0]
 
 import argparse
+import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
-from fmus.builder.fmu_build import build, why_no_loader
-from fmus.builder.recipe import (
-    MAX_PORTS,
-    BuildError,
-    Recipe,
-    UnknownFmuError,
-    doubts,
-    fingerprint,
-    known_names,
-    recipe,
-)
-from fmus.builder.standalone_fmu import bundled_platform, runtime_of, write_runtime
-from fmus.loader import doctor
-from fmus.loader.runtime import Runtime
-from models.definition_files.message_text import printable
+from models.definition_files.message_text import empty_argument, printable, said
 from models.library.search_path import search_path
 
+# What builds is imported where it is used: help and a mistyped option are answered without NumPy.
+if TYPE_CHECKING:
+    from fmus.builder.recipe import Recipe
+    from fmus.loader.runtime import Runtime
+
+#: Pantograph ports that a line may have, as in `fmus.builder.recipe`.
+_MAX_PORTS: Final = 16
 DEFAULT_FOLDER = Path("build/fmus")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return 0 for success, 1 for failure, 2 for a command line that was not understood."""
-    return carry_out(_parser().parse_args(arguments))
+    parser, given = _parser(), sys.argv[1:] if arguments is None else arguments
+    if empty := empty_argument(given):
+        parser.error(empty)
+    return carry_out(parser.parse_args(given))
 
 
 def carry_out(options: argparse.Namespace) -> int:
     """Carry out a verb that was understood and return the exit code; what a user can cause is one message."""
+    from fmus.builder.recipe import BuildError, UnknownFmuError
+
     try:
         code: int | None = options.run(options)
         if sys.stdout is not None:  # closed by the caller
@@ -51,7 +50,7 @@ def carry_out(options: argparse.Namespace) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        return _fail(f"{error.filename or 'standard output'}: {said(error)}")
     except MemoryError:
         return _fail("there is not enough memory; close other programs, or raise the limit (ulimit -v)")
     except KeyboardInterrupt:
@@ -77,6 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_lookup(verb)
     verb.add_argument("name", metavar="NAME", help="as for build")
     verb.add_argument("--if-known", action="store_true", help="print nothing for a name that no FMU has")
+    verb.add_argument("--watched", action="store_true", help="list what it depends on as well, as JSON strings")
     verb.set_defaults(run=_fingerprint)
     verb = verbs.add_parser("list", help="list the FMUs that can be built")
     verb.set_defaults(run=_list)
@@ -123,12 +123,15 @@ def add_doctor(verbs: Any) -> None:
 
 
 def _count(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and len(text) <= 2 and 1 <= int(text) <= MAX_PORTS):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of pantographs, 1 to {MAX_PORTS}")
+    if not (text.isascii() and text.isdigit() and len(text) <= 2 and 1 <= int(text) <= _MAX_PORTS):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of pantographs, 1 to {_MAX_PORTS}")
     return int(text)
 
 
 def _build(options: argparse.Namespace) -> None:
+    from fmus.builder.fmu_build import build, why_no_loader
+    from fmus.builder.recipe import BuildError, known_names
+
     if options.runtime is not None and options.standalone is False:
         raise BuildError("--runtime is for standalone FMUs, which --no-standalone excludes")
     for wanted in _recipes(options.names or known_names(), options):
@@ -140,6 +143,9 @@ def _build(options: argparse.Namespace) -> None:
 
 def _runtime(options: argparse.Namespace, replaced: Path) -> Runtime | None:
     """Return the Python that an FMU is to bring along, if it is asked for or the FMU that it replaces brings one."""
+    from fmus.builder.recipe import BuildError
+    from fmus.builder.standalone_fmu import bundled_platform, runtime_of
+
     if options.standalone or options.runtime is not None:
         return _noted(runtime_of(options.runtime))
     there = bundled_platform(replaced) if options.standalone is None else ""
@@ -162,34 +168,53 @@ def _noted(runtime: Runtime) -> Runtime:
 
 
 def _write_runtime(options: argparse.Namespace) -> None:
+    from fmus.builder.standalone_fmu import runtime_of, write_runtime
+
     print(write_runtime(_noted(runtime_of(options.runtime)), options.out))
 
 
 def _examine(options: argparse.Namespace) -> int:
+    from fmus.loader import doctor
+
     return doctor.main(options.fmu)
 
 
 def _recipes(names: Sequence[str], options: argparse.Namespace) -> list[Recipe]:
+    from fmus.builder.recipe import BuildError, doubts, recipe
+
     # All names are looked up before anything is built: a typing mistake must not cost a build.
+    for folder in options.library or ():
+        if not folder.is_dir():
+            raise BuildError(f"--library {folder}: there is no such folder; check the name")
     folders = search_path(*(options.library or ()))
     found = [recipe(name, options.pantographs, folders, options.built_from) for name in names]
-    for text in dict.fromkeys(doubts(name, folders) for name in names):
-        if text:
-            print(f"note: {printable(text)}", file=sys.stderr)
+    for text in dict.fromkeys(text for name in names for text in doubts(name, folders)):
+        print(f"note: {printable(text)}", file=sys.stderr)
     return found
 
 
 def _fingerprint(options: argparse.Namespace) -> None:
+    from fmus.builder.recipe import UnknownFmuError, fingerprint
+    from fmus.builder.watched_places import watched_places
+
+    definitions = [] if options.built_from is None else [options.built_from]
     try:
         (wanted,) = _recipes([options.name], options)
     except UnknownFmuError:
-        if options.if_known:
-            return
-        raise
-    print(fingerprint(wanted))
+        if not options.if_known:
+            raise
+    else:
+        print(fingerprint(wanted))
+        definitions.append(wanted.definition)
+    if options.watched:
+        starts = options.library or [Path()]
+        for place in watched_places(starts, search_path(*starts), definitions):
+            print(f"watched: {json.dumps(str(place))}")
 
 
 def _list(options: argparse.Namespace) -> None:
+    from fmus.builder.recipe import known_names
+
     for name in known_names():
         print(name)
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from master.errors import MasterError
+    from master.interface.optimisations import Optimisation, optimise
     from master.interface.parameter_sweeps import Sweep, sweep
     from master.interface.results_view import Results, compare, contact_figures, read_results
     from master.interface.scenario_runs import Calibrated, calibrate, run
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Calibrated",
     "MasterError",
+    "Optimisation",
     "Parameter",
     "Results",
     "Scenario",
@@ -29,6 +31,7 @@ __all__ = [
     "compare",
     "contact_figures",
     "open_scenario",
+    "optimise",
     "read_results",
     "run",
     "sweep",
@@ -37,6 +40,7 @@ __all__ = [
 if not TYPE_CHECKING:  # a type checker shall notice a name that is not there
     _PLACES = {
         "errors": ("MasterError",),
+        "interface.optimisations": ("Optimisation", "optimise"),
         "interface.parameter_sweeps": ("Sweep", "sweep"),
         "interface.results_view": ("Results", "compare", "contact_figures", "read_results"),
         "interface.scenario_runs": ("Calibrated", "calibrate", "run"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -11,6 +12,15 @@ from typing import Final
 #: Longest value or text that is shown in full [characters], and most problems that are listed at once.
 _LONGEST: Final = 400
 _MOST: Final = 100
+#: What the system says of a file, in words, with what to do.
+_SAID: Final = {
+    errno.ENOENT: "there is no such file or folder: check the name",
+    errno.ENOTDIR: "a part of the path is a file, where a folder is needed: name another place",
+    errno.EISDIR: "it is a folder, where a file is needed: name the file",
+    errno.EEXIST: "it is a file, where a folder is needed: name another place",
+    errno.EACCES: "its permissions do not allow it: change them, or name another place",
+    errno.EROFS: "the disk is read-only: name another place",
+}
 
 
 def one_line(text: str) -> str:
@@ -31,6 +41,17 @@ def one_line(text: str) -> str:
     return "".join(map(_shown, text))
 
 
+def said(error: OSError) -> str:
+    """Return why a file could not be used, and what to do, in words.
+
+    Examples
+    --------
+    >>> said(FileNotFoundError(errno.ENOENT, "No such file or directory"))
+    'there is no such file or folder: check the name'
+    """
+    return _SAID.get(error.errno or 0) or error.strerror or str(error)
+
+
 def hint(name: str, known: Iterable[str], most: int = 1) -> str:
     """Return the question whether a known name was meant, empty if none is near: one that is very near, or the nearest.
 
@@ -45,6 +66,28 @@ def hint(name: str, known: Iterable[str], most: int = 1) -> str:
     matches = partial(difflib.get_close_matches, name.casefold(), folded)
     near = matches(n=1, cutoff=0.85) or matches(n=most, cutoff=0.55)
     return f"; did you mean {' or '.join(repr(folded[k]) for k in near)}?" if near else ""
+
+
+def empty_argument(given: Sequence[str]) -> str:
+    """Return what to say of an empty argument, as of a shell variable that is not set; nothing if none is empty.
+
+    Examples
+    --------
+    >>> empty_argument(["run", "cx_ln2", "--out", ""])
+    "what comes after '--out' is empty: write it out, or set the shell variable that stands there"
+    >>> empty_argument(["run", "cx_ln2"])
+    ''
+    """
+    for k, text in enumerate(given):
+        option, equals, value = text.partition("=")
+        if not text.strip():
+            what = f"what comes after '{given[k - 1]}'" if k else "the first argument"
+        elif option.startswith("--") and equals and not value.strip():
+            what = f"what comes after '{text}'"
+        else:
+            continue
+        return f"{what} is empty: write it out, or set the shell variable that stands there"
+    return ""
 
 
 def printable(text: str) -> str:

@@ -36,6 +36,7 @@ from master.recording.recording import Recording
 from master.recording.recording_plan import Recordable, make_recorder, recording_name, recording_plans
 from master.recording.static_geometry import GeometryObserver
 from master.results import run_summary
+from master.results.kept_definitions import write_definitions
 from master.results.results_folder import RunFolder, claimed_for_run, write_forces
 from master.results.run_results import Results
 from master.safety.interruption import interruptible
@@ -60,6 +61,8 @@ class RunOptions:
         Given if every FMU is to have its own process.
     real_time : float, optional
         Simulated seconds per second of wall clock; as fast as possible if not given.
+    keep_definitions : bool
+        Whether the definitions of the components are copied into the folder.
     """
 
     checkpoint: float | None = None
@@ -67,6 +70,7 @@ class RunOptions:
     continuation: Continuation | None = None
     isolation: Isolation | None = None
     real_time: float | None = None
+    keep_definitions: bool = True
 
     def schedule(self, system: System) -> CheckpointSchedule:
         """Return after which macro steps checkpoints are written; refuses what does not fit the system."""
@@ -110,6 +114,8 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), option
     with claimed_for_run(folder, options.continuation) as own, unfinished(own.summary_file, own.run):
         description = run_summary.describe(system, own.run)
         own.write_summary({**description, "status": "running"})
+        if options.keep_definitions:
+            write_definitions(own.path, system.components)
         troubles: dict[str, str] = {}
         with (
             interruptible() as stop_wanted,

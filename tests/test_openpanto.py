@@ -18,6 +18,8 @@ import openpanto
 from openpanto import VERBS, command_line
 
 ROOT = Path(__file__).parents[1]
+#: What help does without.
+HEAVY = ("numpy", "scipy", "matplotlib", "fmpy", "pandas", "numba", "pydantic")
 #: What an installer makes of the entry point in pyproject.toml.
 SCRIPT = "import sys\nfrom openpanto import main\nif __name__ == '__main__':\n    sys.exit(main())\n"
 
@@ -267,3 +269,20 @@ def test_verbs_options_names_and_files_are_completed(completion, line, word, tmp
     command = [shell, "-c", TAB[shell].format(script=path, line=line)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert word in [offered.partition("\t")[0] for offered in done.stdout.splitlines()], done.stderr
+
+
+def test_help_version_and_completion_need_nothing_that_takes_time():
+    """In one process for all verbs; what is imported on the way to ``VERB --help`` counts."""
+    code = f"""
+import contextlib, io, sys
+import openpanto
+for line in [[], ["--version"], ["--help"], *([verb, "--help"] for verb in openpanto.VERBS), ["--completion", "bash"]]:
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with contextlib.suppress(SystemExit):
+            openpanto._worked(line)
+    found = [name for name in {HEAVY} if name in sys.modules]
+    if found:
+        sys.exit(f"{{line}} imports {{found}}")
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

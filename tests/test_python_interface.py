@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import dataclasses
 import json
 import os
 import pickle
@@ -27,7 +28,7 @@ NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 USER_SCRIPT = """
 from pathlib import Path
 
-from master import MasterError, Results, Scenario, calibrate, compare, open_scenario, read_results, run, sweep
+from master import MasterError, Results, Scenario, calibrate, compare, open_scenario, optimise, read_results, run, sweep
 from models import Line, couple, open_line, open_pantograph, statics
 
 
@@ -47,6 +48,8 @@ else:
     print(compare(results, read_results("other")), calibrate(scenario, mean=150.0).value + 1.0)
 table = sweep(scenario, over={"speed": "280:300:20", "catenary.contact_wire.tension": ["20 kN"]}, jobs=2).table
 print(table.head())
+found = optimise(scenario, minimise="sigma", vary={"static_force": "100:200 N"}, subject_to=["maximum<=350 N"])
+print(found.best["static_force [N]"] + 1.0, found.at_bounds, found.table.head(), sweep(scenario).sensitivity.head())
 line: Line = open_line("LN2").set({"contact_wire.tension": 22e3})
 print(statics(line, span=3).elasticity.maximum + 1.0, line.spans[0].length + 1.0)
 run_of = couple(line, open_pantograph("CX").set(static_force="160 N"), speed=83.3)
@@ -193,6 +196,39 @@ def test_frames_have_units_in_their_titles(toy_run):
     assert "uplift [m]" in results.uplifts
     assert "duration [s]" in results.events
     assert "mean [N]" in results.spans
+
+
+def test_variables_are_found_by_their_unit_and_others_are_answered_by_their_likes(toy_run):
+    pytest.importorskip("pandas")
+    recording = toy_run[1].stored.recordings[0]
+    units = tuple("N" if n.endswith(".force") else "m" for n in recording.names)
+    stored = dataclasses.replace(toy_run[1].stored, recordings=(dataclasses.replace(recording, units=units),))
+    results = master.Results(stored)
+    forces = [name for name in recording.names if name.endswith(".force")]
+    assert forces
+    assert list(results.frame("*[N]")) == list(results.frame("*[N]", "nothing")) == [f"{name} [N]" for name in forces]
+    assert list(results.frame("*contact.force [N]")) == [f"{n} [N]" for n in forces if n.endswith("contact.force")]
+    with pytest.raises(master.MasterError, match=r"units are \[N\], \[m\].* lists them all"):
+        results.frame("*[kN]")
+    with pytest.raises(master.MasterError, match=r"did you mean .*contact\.force"):
+        results.frame("catenary.pantograph[1].contact.forse")
+
+
+def test_what_is_no_scenario_and_no_value_is_one_sentence(toy_run):
+    with pytest.raises(master.MasterError, match=r"^open_scenario\(None\): give the path"):
+        master.open_scenario(None)
+    with pytest.raises(master.MasterError, match=r"^open_scenario\(''\): give the path"):
+        master.open_scenario("")
+    with pytest.raises(master.MasterError, match=r"^set\('static_force=120'\) says no parameter with its value: write"):
+        toy_run[0].set("static_force=120")
+
+
+def test_a_report_names_what_was_changed_of_its_scenario(toy_run, tmp_path):
+    changed = master.run(toy_run[0].set(static_force="160"), tmp_path / "changed")
+    changed.write_report()
+    head = (tmp_path / "changed" / "report.html").read_text(encoding="utf-8").split("</h1>")[1].split("</p>")[0]
+    assert "with pantograph.static_force = 160" in head
+    assert "changes" not in toy_run[1].stored.summary
 
 
 def test_scenario_and_results_travel_between_processes(toy_run):

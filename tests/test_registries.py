@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import ast
+import importlib
 import inspect
+import re
 import typing
 from dataclasses import fields
 from pathlib import Path
@@ -12,24 +14,35 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import openpanto
+from fmus import __main__ as fmus_main
 from fmus.__main__ import _parser as fmus_parser
+from fmus.builder import recipe
 from fmus.slave.model_description import _DERIVED
+from master.batch.optimisation import optimisation_session
+from master.batch.study import study_session
+from master.batch.sweep import distributions, sensitivity, sweep_plan, sweep_session
+from master.batch.verification import verification_session
 from master.batch.verification.quantities import QUANTITIES
-from master.commands import main
+from master.commands import main, verb_options
 from master.coupling import coupling_schemes
 from master.coupling.coupling_schemes import ALGORITHMS, make_algorithm
 from master.coupling.network import Network
 from master.errors import RunError
+from master.evaluation import filters
+from master.fmu.isolation import isolated_instance
+from master.report import report_files
 from master.report.charts import run_charts
 from master.report.run_inputs import scheme_options
 from master.ssp.run_settings import OPTIONS, SCHEMES, Coupling
 from master.ssp.ssp_units import COMMON
 from models import contact_law
 from models.catenary.definition.line_definition import Contact
-from models.commands import physics_main
+from models.commands import physics_main, physics_verbs
 from models.contact_law import CONTACT_LAWS, ContactLawError, NormalForce, continuous_contact, register_contact_law
 from models.definition_files.si_units import SI, to_si
 from models.definition_files.toml_reader import DefinitionError
+from models.pantograph import identification
 from models.pantograph.multibody.elements import joints
 from models.pantograph.multibody.elements.force_elements import KNOWN, ForceElements
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
@@ -171,6 +184,7 @@ GIVEN = {
     "actuator_force": {"force": q(50.0, "N")},
     "actuator_moment": {"moment": q(50.0, "N.m"), "axis_i": q([0.0, 1.0, 0.0], "1")},
     "bump_stop": {"stiffness": q(1e4, "N/m"), "longest": q(0.01, "m")},
+    "angle_stop": {"stiffness": q(1e3, "N.m/rad"), "highest": q(-0.1, "rad"), "axis_i": q([0.0, 1.0, 0.0], "1")},
     "bushing": {"translation_stiffness": q([1e3, 1e3, 1e3], "N/m"), "rotation_damping": q([1, 1, 1], "N.m.s/rad")},
     "joint_friction": {"moment": q(5.0, "N.m"), "transition": q(0.1, "rad/s"), "joint": "hinge"},
 }
@@ -181,7 +195,7 @@ def pushed(kind):
     given = dict(GIVEN[kind])
     if kind != "joint_friction":
         given |= {"body_i": "base", "body_j": "rod"}
-        if kind != "actuator_moment":
+        if kind not in ("actuator_moment", "angle_stop"):
             given |= {"point_i": q([0.0, 0.0, 0.5], "m"), "point_j": q([0.2, 0.0, 0.0], "m")}
     axes = {"axis_i": (0, 1, 0), "axis_j": (0, 1, 0)}
     hinge = joint("revolute", "base", "rod", point_i=(0, 0, 0), point_j=(-0.5, 0, 0), **axes)
@@ -271,7 +285,7 @@ def verbs(parser):
 
 def test_every_verb_of_the_master_is_one_and_does_something():
     """One that is missing from `VERBS` would be taken for a scenario's name."""
-    known = verbs(main._parser())
+    known = verbs(main._parser(main.VERBS))
     assert tuple(sorted(known)) == tuple(sorted(main.VERBS))
     assert all(callable(parser.get_default("verb")) for parser in known.values())
 
@@ -280,11 +294,22 @@ def test_every_verb_of_the_others_does_something():
     assert all(callable(parser.get_default("run")) for parser in verbs(fmus_parser()).values())
     parser = argparse.ArgumentParser()
     subparsers = parser.add_subparsers()
-    for verb in physics_main._VERBS:
-        verb.add(subparsers)
+    for add in physics_main._VERBS:
+        add(subparsers)
     assert all(callable(p.get_default("run")) for p in subparsers.choices.values())
-    modules = {p.stem for p in (ROOT / "models/commands").glob("*.py") if "\ndef add(" in p.read_text(encoding="utf-8")}
-    assert modules == {verb.__name__.rpartition(".")[2] for verb in physics_main._VERBS}
+    assert {p.stem for p in (ROOT / "models/commands").glob("*_command.py")} == {
+        f"{v}_command" for v in subparsers.choices
+    }
+
+
+def test_what_carries_out_a_verb_is_there():
+    """The modules that are imported when a verb is carried out, by their names."""
+    called = re.findall(r'_later\("(\w+)", "(\w+)"\)', inspect.getsource(verb_options))
+    assert len(called) == len(main.VERBS)
+    assert all(callable(getattr(importlib.import_module(f"master.commands.{m}"), f)) for m, f in called)
+    called = re.findall(r'_later\("(\w+)"\)', inspect.getsource(physics_verbs))
+    assert len(called) == len(physics_main._VERBS)
+    assert all(callable(importlib.import_module(f"models.commands.{m}").run) for m in called)
 
 
 @pytest.mark.parametrize("name", sorted(SI))
@@ -302,3 +327,37 @@ def test_every_unit_of_a_definition_is_one_of_the_master_and_of_fmi(name):
 
 def test_schemes_have_their_types():
     assert typing.get_args(Coupling.model_fields["scheme"].annotation) == SCHEMES
+
+
+# What the command lines write out, so that they need not import it
+
+
+def test_the_choices_of_the_verbs_are_the_kinds_that_there_are():
+    assert verb_options.SCHEMES == SCHEMES
+    assert verb_options.FORMATS == tuple(report_files.FORMATS)
+    assert typing.get_args(sweep_plan.Keep) == verb_options.KEPT
+    assert typing.get_args(sweep_plan.Engine) == verb_options.ENGINES
+    assert typing.get_args(distributions.Method) == verb_options.SAMPLINGS
+    assert typing.get_args(sensitivity.SensitivityMethod) == verb_options.SENSITIVITIES
+    assert physics_verbs.RESPONSES == identification.RESPONSE_KINDS
+    assert typing.get_args(filters.Kind) == physics_verbs.FILTERS
+    assert fmus_main._MAX_PORTS == recipe.MAX_PORTS
+
+
+def test_the_defaults_in_the_help_are_those_that_are_taken():
+    verbs = openpanto._verbs(openpanto.command_line())
+    said = {name: " ".join(verb.format_help().split()) for name, verb in verbs.items()}
+    default = filters.DEFAULT
+    assert f"of butterworth (default {default.order})" in said["couple"]
+    assert f"of butterworth (default {default.phase})" in said["couple"]
+    assert verbs["couple"].get_default("cutoff") == default.cutoff
+    assert verbs["couple"].get_default("filter") == default.kind
+    assert f"from {filters.SETTLING:g} s after the first contact" in said["couple"]
+    assert f"initialising may take, default {isolated_instance.INIT_TIMEOUT:g}" in said["run"]
+    for verb, name in (
+        ("study", study_session.JSON),
+        ("sweep", sweep_session.JSON),
+        ("optimise", optimisation_session.JSON),
+        ("verify", verification_session.JSON),
+    ):
+        assert f"print {name}" in said[verb]

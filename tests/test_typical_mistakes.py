@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import shutil
+import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -201,3 +202,27 @@ def test_a_mistake_ends_in_one_sentence_that_says_what_to_do(mistake, workplace,
     errors = [line for line in said.splitlines() if "warning: " not in line]
     assert len(errors) == 1, said
     assert "error: " in errors[0]
+
+
+def test_an_fmu_of_another_fmi_is_named_by_its_version(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    with zipfile.ZipFile("Theirs.fmu", "w") as file:
+        file.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="3.0" modelName="x" instantiationToken="{1}">'
+            '<CoSimulation modelIdentifier="x"/><ModelVariables><Float64 name="a" valueReference="1"/></ModelVariables>'
+            "</fmiModelDescription>",
+        )
+    assert openpanto._worked(shlex.split("new project --line LN2 --pantograph Theirs.fmu --speed 300")) == 1
+    assert capfd.readouterr().err == (
+        "error: Theirs.fmu is an FMU of FMI 3.0; an FMI 2.0 co-simulation FMU is needed: "
+        "let the tool that made it export one\n"
+    )
+    assert not (tmp_path / "project").exists()
+
+
+def test_a_value_to_fix_that_is_mistyped_is_answered_by_the_nearest(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.csv").write_text("".join(f"{f / 2},{100 - f},{3 * f}\n" for f in range(1, 41)))
+    assert openpanto._worked(shlex.split("identify r.csv --fix mm2=7.75")) == 1
+    assert "did you mean 'm2'?" in capfd.readouterr().err

@@ -18,6 +18,7 @@ from fmus.builder.fmu_page import About, page
 from fmus.builder.recipe import MARK, BuildError, FmuSources, Recipe, content_hash, gather, platform_libraries
 from fmus.builder.source_bundle import BundleError, rewrite
 from fmus.loader.loader_build import DESCRIPTION, LoaderError, with_loader, with_windows_loader
+from models.definition_files.message_text import said
 
 #: The earliest time a zip archive can hold: the same for every file, so that builds are identical.
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
@@ -65,12 +66,12 @@ def build(wanted: Recipe, folder: Path, loader: bool = True, runtime: Mapping[st
         If the definition or the sources do not make an FMU, or it cannot be written.
     """
     data = archive(wanted, loader, _origin(wanted, folder), runtime)
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{wanted.name}.fmu"
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         _write_atomically(path, data)
     except OSError as error:
-        raise BuildError(f"{path} cannot be written ({error.strerror or error})") from error
+        raise BuildError(f"{path} cannot be written ({said(error)})") from error
     return path
 
 

@@ -16,6 +16,7 @@ from typing import Final, Literal
 from xml.etree import ElementTree
 
 from fmus.loader.loader_build import DESCRIPTION, INNER_SUFFIX, PROBE, LoaderError, loader_library, needed_versions
+from models.definition_files.message_text import said
 
 Level = Literal["ok", "note", "missing"]
 #: (system, machine) -> folder and suffix of an FMU's library.
@@ -29,7 +30,6 @@ _SECONDS: Final = 300
 _LARGEST: Final = 1024**3
 #: What reading a file that is not an FMU can raise: zipfile documents only some of it.
 _UNREADABLE: Final = (
-    OSError,
     ValueError,
     KeyError,
     EOFError,
@@ -140,6 +140,8 @@ def examine(path: Path) -> list[Finding]:
     """Examine an FMU and this machine; return all findings."""
     try:
         package = read_package(path)
+    except OSError as error:
+        return [Finding("missing", f"{path} cannot be read ({said(error)})")]
     except _UNREADABLE as error:
         return [Finding("missing", f"{path} is not an FMU of this kind ({error})")]
     python = ask()

@@ -91,7 +91,7 @@ def installed_at(folder: Path) -> Installation:
         If something is missing in it that a runtime needs.
     """
     if not folder.is_dir():
-        raise InstallationError(f"{folder} is not a folder")
+        raise InstallationError(f"{folder} is not a folder; name that of a Python")
     base = _base_of(folder)
     _read(base, {})  # whether it is a Python at all comes before what it lacks
     candidates = [*_package_folders(folder), *_package_folders(base)]

@@ -32,6 +32,7 @@ from fmus.loader.module_rehearsal import LoadedModules, RehearsalError, rehearse
 from fmus.loader.python_installation import PACKAGES, Installation, InstallationError, own
 from fmus.loader.runtime_licences import COMPILED_HERE, licences
 from fmus.loader.shared_libraries import BlasError, Libraries, collect_libraries
+from models.definition_files.message_text import said
 
 #: Version of this layout, for the loader.
 FORMAT: Final = 1
@@ -136,7 +137,7 @@ def make_runtime(source: Installation, resources: Iterable[Path]) -> Runtime:
     except RehearsalError as error:
         raise RuntimeBuildError(f"an FMU does not run with the bundled Python: {error}") from error
     except OSError as error:
-        raise RuntimeBuildError(f"{error.filename} cannot be read ({error.strerror})") from error
+        raise RuntimeBuildError(f"{error.filename} cannot be read ({said(error)})") from error
 
 
 def _smallest(source: Installation, here: Installation, folders: Sequence[Path], work: Path) -> Runtime:

@@ -64,7 +64,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         numbers = range(1, self.pantographs + 1)
         return Ports(
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
-            outputs=(*_contact_ports(numbers, part.section_count), _uplift_port(part)),
+            outputs=(_output_port(numbers, part),),
             local=(*_dropper_ports(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
             calculated=(
                 *_geometry_ports(part),
@@ -100,7 +100,8 @@ def _end(number: int, end: str) -> tuple[Signal, ...]:
     return position + vector(f"{name}.v", "m/s", f"velocity {text}", (0.0, 0.0, 0.0))
 
 
-def _contact_ports(numbers: range, sections: int) -> tuple[Port, ...]:
+def _output_port(numbers: range, part: CatenaryPart) -> Port:
+    """Return what the part hands out in one piece: resultants, their points, forces per wire if several, uplifts."""
     force = tuple(
         Signal(
             f"pantograph[{p}].contact.force",
@@ -114,25 +115,17 @@ def _contact_ports(numbers: range, sections: int) -> tuple[Port, ...]:
         for p in numbers
         for s in vector(f"pantograph[{p}].contact.", "m", "point of application of the contact force")
     )
-    ports = (Port(force, attrgetter("contact_force")), Port(point, attrgetter("contact_point")))
-    return ports if sections == 1 else (*ports, _section_port(numbers, sections))
-
-
-def _section_port(numbers: range, sections: int) -> Port:
-    signals = tuple(
+    sections = range(1, part.section_count + 1) if part.section_count > 1 else ()
+    of_sections = tuple(
         Signal(f"pantograph[{p}].section[{s}].force", "N", f"part of the contact force on wire section {s}")
         for p in numbers
-        for s in range(1, sections + 1)
+        for s in sections
     )
-    return Port(signals, attrgetter("section_force"))
-
-
-def _uplift_port(part: CatenaryPart) -> Port:
-    signals = tuple(
+    uplift = tuple(
         Signal(f"support[{i}].uplift", "m", f"uplift of the contact wire at support {s.name}, x = {s.x:g} m")
         for i, s in enumerate(part.supports, 1)
     )
-    return Port(signals, attrgetter("support_uplift"))
+    return Port((*force, *point, *of_sections, *uplift), attrgetter("outputs"))
 
 
 def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:

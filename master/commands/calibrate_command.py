@@ -8,10 +8,9 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from master.batch import calibration
-from master.commands.command_options import add_overrides, add_verb, overrides_of, positive_number, say, say_warnings
+from master.commands.command_options import overrides_of, say, say_warnings
 from master.commands.run_command import run_shown
 from master.errors import Problem, RequestError, ScenarioError
 from master.results import run_results
@@ -25,22 +24,8 @@ from master.ssp.ssp_xml import Reader
 from master.system.components import System
 
 
-def add_calibrate(verbs: Any) -> None:
-    """Declare ``calibrate`` and its options."""
-    text = "find the parameter value that gives the wanted mean force, and store it in the scenario"
-    parser = add_verb(verbs, "calibrate", text, _calibrate, scenario=True)
-    add_overrides(parser)
-    parser.add_argument(
-        "--parameter", metavar="COMPONENT.PARAMETER", help="what to change; default: as the scenario says"
-    )
-    parser.add_argument(
-        "--mean", type=positive_number, metavar="N", help="wanted mean force [N]; default: as the scenario says"
-    )
-    parser.add_argument("--tolerance", type=positive_number, metavar="N", help="how near is enough [N], default 0.1")
-    parser.add_argument("--dry-run", action="store_true", help="do not store the value")
-
-
-def _calibrate(options: argparse.Namespace) -> int:
+def calibrate_verb(options: argparse.Namespace) -> int:
+    """Find the parameter value that gives the wanted mean force; store it unless told not to."""
     is_stored = not (options.dry_run or options.set)
     folder = located(options.scenario)
     if is_stored:

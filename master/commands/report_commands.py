@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from master.commands.command_options import add_verb, finite_number
 from master.errors import MasterError, UsageError
 from master.evaluation.measured_force import MeasuredComparison, compare_measured, read_measured
 from master.report import report_files, result_tables
@@ -21,37 +20,20 @@ from master.report.moving_picture import MOST_LAPS, make_movie
 from master.report.run_inputs import differing_inputs
 from master.report.terminal_summary import WIDTH, Terminal
 from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
+from master.results.kept_definitions import differing_definitions
 from master.results.run_results import Results
 from master.safety import folder_lock
 from master.safety.safe_files import write_atomically
 
 
-def add_report(verbs: Any) -> None:
-    """Declare ``report`` and its options."""
-    text = "write plots and report of a run again, with a measurement or a film on request"
-    parser = add_verb(verbs, "report", text, _report)
-    parser.add_argument("run", type=Path, metavar="RUN", help="results folder")
-    parser.add_argument("--measured", type=Path, metavar="FILE", help="CSV of a measured contact force to compare with")
-    parser.add_argument(
-        "--measured-offset",
-        type=finite_number,
-        metavar="D",
-        help="added to the measured positions [m] or times [s]; where they fall, the track position is D less them",
-    )
-    parser.add_argument("--contact", type=int, default=1, metavar="N", help="which contact was measured, default 1")
-    parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
-    parser.add_argument(
-        "--magnify", type=float, default=8.0, metavar="N", help="of deformations in the film, default 8"
-    )
-    parser.add_argument("--parquet", action="store_true", help="also write the time series as Parquet")
-
-
-def _report(options: argparse.Namespace) -> int:
+def report_verb(options: argparse.Namespace) -> int:
     """Write the report of a run again, and what else is asked for."""
     if options.measured_offset is not None and not options.measured:
         raise UsageError("--measured-offset moves a measurement: give that as well, with --measured FILE")
     if options.film:
         check_name(options.film)
+    if results_folder.made_by(options.run / "sweep.json", "openpanto sweep"):
+        return _report_sweep(options)
     results_folder.identity(options.run)  # a folder that is not ours is left alone
     with _claimed(options.run):
         done = run_results.read(options.run)
@@ -61,7 +43,7 @@ def _report(options: argparse.Namespace) -> int:
         measured = _measured(done, options) if options.measured else None
         results_folder.write_forces(done.folder, done.signals)
         results_folder.write_json(done.folder / results_folder.SUMMARY, summary)
-        print(report_files.write(done, measured))
+        print(report_files.write(done, measured, options.figures))
         if options.parquet:
             print(*parquet_export.write_parquet(done.folder), sep="\n")
     _warn_of_open_runs([done])
@@ -69,6 +51,18 @@ def _report(options: argparse.Namespace) -> int:
         print(_film(done, options))
     if measured is not None:
         _say_measured(measured)
+    return 0
+
+
+def _report_sweep(options: argparse.Namespace) -> int:
+    """Write the page and the charts of a sweep again."""
+    from master.batch.sweep import sweep_session  # takes longer than all that the report of a run needs
+
+    if options.measured or options.film or options.parquet:
+        text = "--measured, --film and --parquet are of a single run"
+        raise UsageError(f"{options.run} holds a sweep; {text}")
+    with _claimed(options.run):
+        print(*sweep_session.write_report(options.run, options.figures), sep="\n")
     return 0
 
 
@@ -128,16 +122,7 @@ def _film(done: Results, options: argparse.Namespace) -> Path:
     return write_film(movie, options.film, FilmOptions(options.magnify, start=start, end=end))
 
 
-def add_compare(verbs: Any) -> None:
-    """Declare ``compare`` and its options."""
-    parser = add_verb(verbs, "compare", "show two or more runs side by side", _compare)
-    parser.add_argument("first", type=Path, metavar="RUN", help="results folder")
-    parser.add_argument("others", type=Path, metavar="RUN", nargs="+", help="results folders")
-    parser.add_argument("--report", type=Path, metavar="FILE", help="write a report in HTML")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-
-
-def _compare(options: argparse.Namespace) -> int:
+def compare_verb(options: argparse.Namespace) -> int:
     """Compare runs with the first one."""
     runs = [run_results.read(folder) for folder in (options.first, *options.others)]
     _warn_of_open_runs(runs)
@@ -174,7 +159,7 @@ def _show(
 
 def _show_inputs(console: Terminal, runs: Sequence[Results]) -> None:
     """Print what differs in the inputs of runs."""
-    rows = differing_inputs([run.summary for run in runs])
+    rows = [*differing_definitions(runs), *differing_inputs([run.summary for run in runs])]
     if not rows:
         console.print("the inputs are the same")
         return
@@ -193,5 +178,6 @@ def _as_json(c: run_difference.RunDifference, first: Results, other: Results) ->
     notes = list(run_difference.setting_notes([first, other]))
     forces = {"rms": c.rms, "largest": c.largest, "apart": c.apart}
     known = {"notes": notes, "contact": one.contact, "difference": difference, **forces}
-    inputs = {name: values for name, *values in differing_inputs([first.summary, other.summary])}
+    rows = [*differing_definitions([first, other]), *differing_inputs([first.summary, other.summary])]
+    inputs = {name: values for name, *values in rows}
     return {**known, "filters": filters, "same_filter": same, "inputs": inputs}

@@ -6,16 +6,11 @@ import argparse
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from master.commands import report_commands
 from master.commands.command_options import (
-    add_overrides,
-    add_tolerance,
-    add_verb,
-    finite_number,
     overrides_of,
-    positive_number,
     say,
     say_warnings,
 )
@@ -39,60 +34,16 @@ from master.system.step_rounding import adjustments
 _DEFAULT: Final = RunOptions()
 
 
-def add_run(verbs: Any) -> None:
-    """Declare ``run`` and its options."""
-    parser = add_verb(verbs, "run", "run a scenario", _run, scenario=True)
-    add_overrides(parser)
-    add_tolerance(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="results folder, default: results/NAME")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar, no tables")
-    parser.add_argument("--no-report", action="store_true", help="no plots, no report.html")
-    parser.add_argument("--json", action="store_true", help="print summary.json instead of tables")
-    parser.add_argument("--checkpoint", type=finite_number, metavar="T", help="write the whole state at time T to DIR")
-    parser.add_argument(
-        "--checkpoint-every", type=positive_number, metavar="T", help="write it every T seconds of simulated time"
-    )
-    parser.add_argument(
-        "--resume",
-        type=Path,
-        metavar="DIR|FILE",
-        help="finish the run in results folder DIR from its last checkpoint; or begin a new run from checkpoint FILE",
-    )
-    parser.add_argument(
-        "--renew", action="append", default=[], metavar="COMPONENT", help="with --resume: this component starts afresh"
-    )
-    parser.add_argument("--energy", action="store_true", help="check the energy balance and report its drift")
-    parser.add_argument("--parquet", action="store_true", help="also write the time series as Parquet")
-    parser.add_argument("--isolate", action="store_true", help="run each FMU in a separate process, which may crash")
-    parser.add_argument(
-        "--step-timeout",
-        type=positive_number,
-        metavar="S",
-        help="with --isolate: longest that a step may take",
-    )
-    parser.add_argument(
-        "--init-timeout",
-        type=positive_number,
-        metavar="S",
-        help=f"with --isolate: longest that loading or initialising may take, default {INIT_TIMEOUT:g}",
-    )
-    parser.add_argument(
-        "--real-time",
-        type=positive_number,
-        nargs="?",
-        const=1.0,
-        metavar="FACTOR",
-        help="keep pace with the wall clock: FACTOR simulated seconds per second (default 1)",
-    )
-
-
 def _run_overrides(options: argparse.Namespace) -> Overrides:
     """Return the changes to a scenario: a run with --stop may end before it can be judged."""
     return replace(overrides_of(options), energy=options.energy, may_stop_early=options.stop is not None)
 
 
-def _run(options: argparse.Namespace) -> int:
+def run_verb(options: argparse.Namespace) -> int:
+    """Run a scenario and show its results."""
     note = (lambda _: None) if options.quiet else say
+    if options.figures and options.no_report:
+        raise UsageError("--figures says how charts are written, which --no-report leaves out: omit one of them")
     run_options = _run_options(options)
     with open_scenario(options.scenario, _run_overrides(options), note, not options.no_build) as scenario:
         folder = _folder(options, scenario.system)
@@ -111,7 +62,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _show_results(done: Results, options: argparse.Namespace) -> None:
     if not options.no_report:
-        report_files.write(done)
+        report_files.write(done, formats=options.figures)
     if options.parquet:
         parquet_export.write_parquet(done.folder)
     if options.json:

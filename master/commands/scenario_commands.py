@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import tempfile
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from master.commands.command_options import add_overrides, add_tolerance, add_verb, overrides_of, say, say_warnings
+from master.commands.command_options import overrides_of, say, say_warnings
 from master.errors import MasterError, RequestError
 from master.fmu.fmu_provision import write_runtime
 from master.report.terminal_summary import tolerance_words
@@ -23,25 +23,8 @@ _RESOURCES: Final = "resources"
 _RUNTIME: Final = f"{_RESOURCES}/runtime"
 
 
-def add_validate(verbs: Any) -> None:
-    """Declare ``validate`` and its options."""
-    parser = add_verb(verbs, "validate", "check a scenario without running it", _validate, scenario=True)
-    add_overrides(parser)
-    add_tolerance(parser)
-
-
-def add_pack(verbs: Any) -> None:
-    """Declare ``pack`` and its options."""
-    parser = add_verb(verbs, "pack", "write a scenario as a .ssp archive, FMUs included", _pack, scenario=True)
-    parser.add_argument("--out", type=Path, metavar="FILE", help="default: dist/NAME.ssp")
-    parser.add_argument(
-        "--standalone",
-        action="store_true",
-        help=f"include the Python that the FMUs run in, as {_RUNTIME}, for tools where OPENPANTO_RUNTIME names it",
-    )
-
-
-def _validate(options: argparse.Namespace) -> int:
+def validate_verb(options: argparse.Namespace) -> int:
+    """Check a scenario and say what a run would be."""
     with open_scenario(
         options.scenario, overrides_of(options), say, build=not options.no_build, is_check=True
     ) as scenario:
@@ -56,7 +39,8 @@ def _validate(options: argparse.Namespace) -> int:
     return 0
 
 
-def _pack(options: argparse.Namespace) -> int:
+def pack_verb(options: argparse.Namespace) -> int:
+    """Write a scenario as an archive."""
     with open_scenario(options.scenario, tell=say, build=not options.no_build) as scenario:
         say_warnings(scenario.system)
         archive = options.out or Path("dist") / f"{scenario.system.name}.ssp"

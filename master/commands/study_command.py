@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
@@ -16,37 +15,13 @@ from master.batch.study.study_outcome import VariantResult
 from master.batch.study.study_session import CSV, JSON, PAGE, study
 from master.batch.study.study_table import list_table, show
 from master.batch.study.variants import calibrate_variant
-from master.commands.command_options import add_verb, batch_runner
+from master.commands.command_options import batch_runner
 from master.errors import UsageError
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
 from master.scenario.scenario_place import refuse_installed
 
 
-def add_study(verbs: Any) -> None:
-    """Declare ``study`` and its options."""
-    parser = add_verb(verbs, "study", "run a family of variants of a scenario and report them side by side", _study)
-    parser.add_argument("name", nargs="?", metavar="NAME", help="study, or folder of its scenario; not with --list")
-    parser.add_argument("--list", action="store_true", help="list the studies and their variants and run nothing")
-    parser.add_argument(
-        "--only",
-        action="append",
-        default=[],
-        metavar="VARIANT",
-        help="run only this variant; may be repeated",
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: results/study/NAME")
-    parser.add_argument("--again", action="store_true", help="run again what an earlier study finished")
-    parser.add_argument(
-        "--calibrate",
-        action="store_true",
-        help="first find and store the static forces for the wanted mean",
-    )
-    parser.add_argument("--quiet", action="store_true", help="no progress, no tables; files and exit code only")
-    parser.add_argument("--json", action="store_true", help=f"print {JSON} instead of tables")
-    parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
-
-
-def _study(options: argparse.Namespace) -> int:
+def study_verb(options: argparse.Namespace) -> int:
     """Run a study; return 0 if every variant was run, 1 if not."""
     if options.list:
         names = [options.name] if options.name else family_names()

@@ -5,32 +5,17 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from functools import partial
-from pathlib import Path
-from typing import Any, Final
 
 from master.batch.verification.case import find_cases, load_cases
 from master.batch.verification.case_runs import RUNS, Runs
 from master.batch.verification.verification_outcome import CaseOutcome
 from master.batch.verification.verification_session import JSON, PAGE, verify
 from master.batch.verification.verification_table import list_table, show_case
-from master.commands.command_options import add_verb, batch_runner
+from master.commands.command_options import batch_runner
 from master.report.terminal_summary import WIDTH, Terminal, printable_json
 
-_DEFAULT_FOLDER: Final = Path("results") / "verify"
 
-
-def add_verify(verbs: Any) -> None:
-    """Declare ``verify`` and its options."""
-    parser = add_verb(verbs, "verify", "run reference cases and judge every figure", _verify)
-    parser.add_argument("cases", nargs="*", metavar="CASE", help="name of a case, or a case file; default: all")
-    parser.add_argument("--list", action="store_true", help="list the cases and run nothing")
-    parser.add_argument("--out", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help="default: results/verify")
-    parser.add_argument("--quiet", action="store_true", help="no progress, no tables; page and exit code only")
-    parser.add_argument("--json", action="store_true", help=f"print {JSON} instead of tables")
-    parser.add_argument("--no-build", action="store_true", help="do not build missing or stale FMUs")
-
-
-def _verify(options: argparse.Namespace) -> int:
+def verify_verb(options: argparse.Namespace) -> int:
     """Verify; return 0 if every row that must hold does, 1 if not."""
     cases = load_cases(find_cases(options.cases))
     if options.list:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
-from master.errors import MasterError, one_line
+from master.errors import MasterError, one_line, said
 from master.evaluation.contact_signals import Signals
 from master.evaluation.filters import low_pass
 
@@ -161,7 +161,7 @@ def _rows(path: Path) -> list[_Row]:
         reader = csv.reader(lines, delimiter=mark)
         return [_Row(reader.line_num, cells, mark != ",") for cells in reader if any(cell.strip() for cell in cells)]
     except OSError as error:
-        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
+        raise MasterError(f"{path} cannot be read ({said(error)})") from error
     except UnicodeDecodeError as error:
         raise MasterError(f"{path} is not UTF-8 text (byte {error.start})") from error
     except csv.Error as error:

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import fmpy
 
+from master.errors import one_line
 from master.fmu.fmu_provision import definition_of
 from master.ssp.archive import read_member
 from master.ssp.ssp_units import BASE_UNITS, Unit
@@ -35,18 +36,21 @@ def read_fmu(path: Path) -> Fmu:
     """
     try:
         root = safe_root(read_member(path, _DESCRIPTION))
-        _check_variables(root)
+        version = root.get("fmiVersion") or "(no version stated)"
+        if version == "2.0":  # others describe their variables otherwise
+            _check_variables(root)
     except XmlError as error:
         raise ValueError(f"is not a readable FMU ({_DESCRIPTION}:{error.line}: {error})") from error
     except ValueError as error:
         raise ValueError(f"is not a readable FMU ({error})") from error
+    if version != "2.0":
+        text = "an FMI 2.0 co-simulation FMU is needed: let the tool that made it export one"
+        raise ValueError(f"is an FMU of FMI {one_line(version)}; {text}")
     try:
         description = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:  # FMPy raises bare exceptions of many kinds
         why = "it lacks what FMI 2.0 demands" if isinstance(error, _UNWORDED) else error
         raise ValueError(f"is not a readable FMU ({_DESCRIPTION}: {why})") from error
-    if description.fmiVersion != "2.0":
-        raise ValueError(f"is an FMI {description.fmiVersion} FMU; FMI 2.0 is needed")
     if description.coSimulation is None:
         raise ValueError("has no co-simulation interface")
     identifier = description.coSimulation.modelIdentifier

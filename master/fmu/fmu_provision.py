@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import json
 import os
 import subprocess
 import sys
+import time
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -18,6 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
+
+from master.fmu.kept_fingerprints import Answer, keep_answer, kept_answer
 
 #: Seconds after which asking for a fingerprint, or building, is given up.
 _ASK_SECONDS: Final = 60
@@ -27,6 +31,8 @@ _MARK: Final = "resources/openpanto.txt"
 _LONGEST_MARK: Final = 1 << 16
 #: How what ``python -m fmus`` only remarks begins.
 _NOTE: Final = "note: "
+#: How a line begins that names what a fingerprint depends on.
+_WATCHED: Final = "watched: "
 #: What a damaged, encrypted or exotically compressed archive raises.
 _UNREADABLE: Final = (
     OSError,
@@ -188,17 +194,38 @@ def fingerprint(lookup: Lookup, tell: Callable[[str], None] = lambda _: None) ->
     ValueError
         With the builder's own words, if it knows the name but cannot say.
     """
-    try:
-        answer = _fmus("fingerprint", "--if-known", *lookup.arguments, seconds=_ASK_SECONDS)
-    except subprocess.TimeoutExpired:
-        return None
-    if answer.returncode != 0:
-        raise ValueError(f"cannot be built: {_last_line(answer)}")
-    for line in answer.stderr.splitlines():
-        if line.startswith(_NOTE):
-            tell(line.removeprefix(_NOTE))
-    lines = answer.stdout.split()
-    return lines[-1] if lines else None
+    arguments = ("fingerprint", "--if-known", "--watched", *lookup.arguments)
+    question = (*arguments, *_surroundings(lookup))
+    answer = kept_answer(question)
+    if answer is None:
+        asked = time.time()
+        try:
+            said = _fmus(*arguments, seconds=_ASK_SECONDS)
+        except subprocess.TimeoutExpired:
+            return None
+        if said.returncode != 0:
+            raise ValueError(f"cannot be built: {_last_line(said)}")
+        answer, watched = _understood(said)
+        keep_answer(question, answer, watched, asked)
+    for note in answer.notes:
+        tell(note)
+    return answer.fingerprint
+
+
+def _surroundings(lookup: Lookup) -> tuple[str, ...]:
+    """Return what an answer of ``python -m fmus`` may depend on besides its arguments and files."""
+    library = "" if lookup.library is None else os.path.realpath(lookup.library)
+    named = os.environ.get("OPENPANTO_LIBRARY", "")
+    return str(Path.cwd()), library, named, sys.executable, sys.version, *_places()
+
+
+def _understood(said: subprocess.CompletedProcess[str]) -> tuple[Answer, list[str]]:
+    """Return an answer, and the places that it depends on."""
+    lines = said.stdout.splitlines()
+    watched = [json.loads(line.removeprefix(_WATCHED)) for line in lines if line.startswith(_WATCHED)]
+    found = [line.strip() for line in lines if line.strip() and not line.startswith(_WATCHED)]
+    notes = tuple(line.removeprefix(_NOTE) for line in said.stderr.splitlines() if line.startswith(_NOTE))
+    return Answer(found[-1] if found else None, notes), watched
 
 
 def definition_of(path: Path) -> str:

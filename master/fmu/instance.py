@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
+from contextlib import chdir
 from ctypes import byref, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
+from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
 
@@ -291,12 +293,13 @@ class Instance:
         except Exception as error:
             raise self._unloadable(error) from error
         try:
-            slave = FMU2Slave(
-                instanceName=self.name,
-                guid=fmu.guid,
-                modelIdentifier=fmu.identifier,
-                unzipDirectory=extracted.folder,
-            )
+            with chdir(Path.cwd()):  # FMPy goes into the library's folder, and stays there if that cannot be loaded
+                slave = FMU2Slave(
+                    instanceName=self.name,
+                    guid=fmu.guid,
+                    modelIdentifier=fmu.identifier,
+                    unzipDirectory=extracted.folder,
+                )
             slave.instantiate(callbacks=fmi_log.CALLBACKS, loggingOn=True)
         except Exception as error:  # FMPy raises bare exceptions
             extracted.remove()

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
+from master.batch.sweep.sensitivity import SensitivityMethod
+from master.batch.sweep.sensitivity_table import sensitivity_heads, sensitivity_rows
 from master.batch.sweep.sweep_plan import Engine, Keep, SweepRequest
-from master.batch.sweep.sweep_session import PreparedSweep, SweepOutcome
+from master.batch.sweep.sweep_session import PAGE, PreparedSweep, SweepOutcome
 from master.batch.sweep.sweep_session import sweep as run_sweep
 from master.batch.sweep.sweep_table import columns
 from master.errors import RequestError
@@ -49,11 +51,24 @@ class Sweep:
         return self.outcome.failures
 
     @property
+    def page(self) -> Path:
+        """The page of its charts, a single HTML file."""
+        return self.folder / PAGE
+
+    @property
     def table(self) -> pandas.DataFrame:
         """Inputs and figures, a row for each run and pantograph (needs pandas)."""
         rows = self.outcome.rows
         heads = columns(rows)
         return table_frame(heads, [tuple(row.get(head) for head in heads) for row in rows])
+
+    @property
+    def sensitivity(self) -> pandas.DataFrame:
+        """Indices of every figure with their intervals, a row for each figure and parameter (needs pandas).
+
+        It has no rows if none were asked for, or no figure varies.
+        """
+        return table_frame(sensitivity_heads(), sensitivity_rows(self.outcome.sensitivity))
 
     def results(self, run: int) -> Results:
         """Return the results of a run by its number, if all of it was kept.
@@ -80,8 +95,10 @@ def sweep(
     vary: Mapping[str, str] | None = None,
     samples: int | None = None,
     seed: int = 1,
-    method: Method = "lhs",
+    method: Method | None = None,
+    sensitivity: SensitivityMethod | None = None,
     table: str | Path | None = None,
+    faults: Sequence[int] = (),
     static_force: str | None = None,
     mean_force: str | None = None,
     keep: Keep = "figures",
@@ -105,9 +122,13 @@ def sweep(
     vary : mapping, optional
         Distributions by parameter: ``{"catenary.contact_wire.tension": "normal(20 kN, 0.2 kN)"}``.
     samples, seed, method
-        How many samples of the distributions, from which seed, and how: ``lhs`` or ``sobol``.
+        How many samples of the distributions, from which seed, and how: ``lhs`` (default) or ``sobol``.
+    sensitivity : str, optional
+        ``sobol`` or ``morris``: as many blocks of runs as ``samples`` says, for indices of what matters.
     table : str or Path, optional
         CSV file with a row for each run.
+    faults : sequence of int
+        Spans of the line whose droppers break one after the other; the first run has none broken.
     static_force, mean_force : str, optional
         Static force over the speed, ``70 N + 0.00097 v^2`` with v in km/h; or the mean force that it is found for.
     keep : str
@@ -130,22 +151,31 @@ def sweep(
     """
     chosen = scenario if isinstance(scenario, Scenario) else open_scenario(scenario)
     grid = {name: _listed(values) for name, values in (over or {}).items()}
-    asked = {"over": grid, "vary": dict(vary or {}), "samples": samples, "seed": seed, "method": method}
-    given = {"table": table, "static_force": static_force, "mean_force": mean_force, "keep": keep}
-    made = {"engine": engine, "check": check}
-    request = SweepRequest.read({**asked, **given, **made, "stop": chosen.overrides.stop})
+    asked: dict[str, object] = {"over": grid, "vary": dict(vary or {}), "samples": samples, "seed": seed}
+    asked |= {} if method is None else {"method": method}
+    given = {
+        "sensitivity": sensitivity,
+        "table": table,
+        "faults": tuple(faults),
+        "static_force": static_force,
+        "mean_force": mean_force,
+        "keep": keep,
+        "engine": engine,
+        "check": check,
+    }
+    request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
     console = Terminal(stderr=True)
 
     def tell(text: object) -> None:
         if progress:
             console.print(str(text), markup=False, highlight=False)
 
-    with scenario_files.open_scenario(chosen.path, chosen.overrides) as opened:
+    overrides = replace(chosen.overrides, faults=request.faults)
+    with scenario_files.open_scenario(chosen.path, overrides) as opened:
         folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name
         keep_apart(folder, opened.package)
         prepared = PreparedSweep.of(opened.system, request)
-        chosen_engine = engine_of(jobs, scheduler, tell, request=request)
-        return Sweep(folder, run_sweep(prepared, folder, chosen_engine, tell, tell))
+        return Sweep(folder, run_sweep(prepared, folder, engine_of(jobs, scheduler, tell, request=request), tell, tell))
 
 
 def _listed(values: Values) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.errors import RequestError
+from master.errors import RequestError, hint
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_quality import assess
 from master.evaluation.contact_signals import Signals
@@ -166,7 +166,8 @@ class Results:
         Parameters
         ----------
         *patterns : str
-            Names, in which ``*`` stands for anything; all variables if there is none.
+            Names, in which ``*`` stands for anything; all variables if there is none. ``*[N]`` takes those of a unit,
+            ``contact*[N]`` those of such a name in it.
         every : float, optional
             Interval of the recording [s]; by default the first, finest one that has variables of these names.
 
@@ -185,7 +186,12 @@ class Results:
                 units = [recording.units[recording.names.index(n)] for n in names]
                 return time_frame(header(names, units), [recording.time, *(recording[n] for n in names)])
         wanted = ", ".join(f"'{p}'" for p in patterns)
-        raise RequestError(f"no recorded variable is named {wanted}; 'variables' lists them all")
+        there = [name for recording in chosen for name in recording.names]
+        recorded = {f"[{unit}]" for recording in chosen for unit in recording.units if unit}
+        asked = any(p.endswith("]") and not p[:-1].rpartition("[")[2].isdigit() for p in patterns)
+        unit = f"; units are {', '.join(sorted(recorded)) or 'not known'}" if asked else ""
+        near = hint(patterns[0], there, 3) if patterns else ""
+        raise RequestError(f"no recorded variable is named {wanted}{unit}{near}; 'variables' lists them all")
 
     def contact_force(self, contact: int = 1) -> pandas.DataFrame:
         """Return the force of a contact over time, raw and filtered, with the position (needs pandas).
@@ -383,8 +389,17 @@ def contact_figures(
 
 def _names(recording: Recording, patterns: Iterable[str]) -> list[str]:
     """Return the names that fit any of the patterns, in the order of the recording; all of them if there is none."""
-    fitting = {n for p in patterns for n in recording.matching(p)}
+    fitting = {n for p in patterns for n in (recording.matching(p) or _of_unit(recording, p))}
     return [n for n in recording.names if n in fitting] if patterns else list(recording.names)
+
+
+def _of_unit(recording: Recording, pattern: str) -> list[str]:
+    """Return the names that fit a pattern with a unit, ``name [N]``: the index of an array is a number instead."""
+    found = re.fullmatch(r"(.*?) ?\[([^\[\]*]*[^\[\]*\d][^\[\]*]*)\]", pattern)
+    if found is None:
+        return []
+    units = dict(zip(recording.names, recording.units, strict=True))
+    return [name for name in recording.matching(found[1]) if units[name] == found[2]]
 
 
 def _interval(recording: Recording) -> float:

@@ -123,11 +123,14 @@ class Scenario:
         RequestError
             If there is no such parameter, several components have it, or it cannot take the value.
         """
+        if values is not None and not isinstance(values, Mapping):
+            text = "write set(static_force='120 N') or set({'pantograph.static_force': '120 N'})"
+            raise RequestError(f"set({values!r}) says no parameter with its value: {text}")
         given = {**(values or {}), **{self._full(name): value for name, value in parameters.items()}}
         texts = {**self.overrides.parameters, **{name: _text(name, value) for name, value in given.items()}}
         components = with_values(self.system.components, texts)
         changed = replace(self.overrides, parameters=texts)
-        return replace(self, system=replace(self.system, components=components), overrides=changed)
+        return replace(self, system=replace(self.system, components=components, changes=texts), overrides=changed)
 
     def _full(self, name: str) -> str:
         owners = [c.name for c in self.system.components if name in c.fmu.variables]
@@ -181,6 +184,8 @@ def open_scenario(
     ...
     master.errors.ScenarioError: no_such.ssp...
     """
+    if not isinstance(scenario, str | Path) or not str(scenario).strip():
+        raise RequestError(f"open_scenario({scenario!r}): give the path of a scenario, or a name in the library")
     stop_time, time_step = _seconds("stop", stop), _seconds("step", step)
     overrides = Overrides(stop_time, time_step, scheme, energy=energy, may_stop_early=stop is not None)
     with scenario_files.open_scenario(Path(scenario), overrides, build=build) as opened:

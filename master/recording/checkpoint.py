@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 import numpy as np
 
 from master.arrays import FloatArray
-from master.errors import MasterError, RunError, one_line
+from master.errors import MasterError, RunError, one_line, said
 from master.safety import array_container
 from master.safety.safe_files import write_atomically
 from master.system.components import System
@@ -107,7 +107,7 @@ def read(path: Path) -> Checkpoint:
     try:
         return unpack(path.read_bytes())
     except OSError as error:
-        raise MasterError(f"{path} cannot be read ({error.strerror})") from error
+        raise MasterError(f"{path} cannot be read ({said(error)})") from error
     except ValueError as error:
         raise MasterError(f"{path} {error}") from error
 

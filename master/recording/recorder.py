@@ -12,7 +12,7 @@ from typing import Final
 
 from master.arrays import FloatArray
 from master.coupling.network import Network
-from master.errors import ForeignResultsError, MasterError
+from master.errors import ForeignResultsError, MasterError, said
 from master.recording.recording import NUMBER_FORMAT, Recording, header, load
 from master.safety.safe_files import AppendOnlyFile, safe_cell
 
@@ -177,7 +177,7 @@ def _end_of_rows(path: Path, titles: str, rows: int) -> int:
             same = file.readline() == titles.encode()
             sizes = [len(line) for line in itertools.islice(file, rows) if line.endswith(b"\n")]
     except OSError as error:
-        raise MasterError(f"{path} cannot be read ({error.strerror})") from error
+        raise MasterError(f"{path} cannot be read ({said(error)})") from error
     if not same:
         raise MasterError(f"{path} records other variables than this run does and cannot be continued")
     if len(sizes) < rows:

@@ -73,9 +73,11 @@ def write_film(movie: Movie, path: Path, options: FilmOptions) -> Path:
 
 
 def check_name(path: Path) -> None:
-    """Refuse a name that does not say of which of the two kinds a film is."""
+    """Refuse a name that does not say of which of the two kinds a film is, or that leads nowhere."""
     if path.suffix not in (".gif", ".mp4"):
         raise MasterError(f"{path}: a film must be named .gif or .mp4")
+    if not path.parent.is_dir():
+        raise MasterError(f"{path}: there is no folder {path.parent}; make it, or name another place")
 
 
 def _writer(path: Path) -> AbstractMovieWriter:

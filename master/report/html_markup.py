@@ -28,7 +28,7 @@ _SEALED: Final = (
 )
 
 
-def document(title: str, body: Iterable[str], charts: Sequence[Chart], movie: Movie | None = None) -> str:
+def document(title: str, body: Sequence[str], charts: Sequence[Chart], movie: Movie | None = None) -> str:
     """Return a complete page that needs no other file."""
     parts = [
         "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>",
@@ -43,6 +43,8 @@ def document(title: str, body: Iterable[str], charts: Sequence[Chart], movie: Mo
         parts += [_script("plotly-basic.min.js"), _script("charts.js")]
     if movie is not None:
         parts += [_data("movie-data", as_json(movie)), _script("movie.js")]
+    if any("<table class='sortable'>" in part for part in body):
+        parts.append(_script("table_sort.js"))
     return "\n".join([*parts, "</body></html>\n"])
 
 
@@ -76,23 +78,34 @@ def signs(limit: str) -> str:
     return text(limit.replace("+-", "\u00b1").replace("<=", "\u2264"))
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: bool = True) -> str:
-    """Return a table; the columns after the first hold numbers, or text."""
+def table(
+    heads: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    numbers: bool = True,
+    leading: int = 1,
+    is_sortable: bool = False,
+) -> str:
+    """Return a table; the columns after the leading ones hold numbers, or text. The reader may sort a sortable one."""
     kind = "n" if numbers else "text"
     right = " class='n'" if numbers else ""
-    head = "".join(f"<th{right if i else ''}>{text(h)}</th>" for i, h in enumerate(heads))
+    head = "".join(f"<th{right if i >= leading else ''}>{text(h)}</th>" for i, h in enumerate(heads))
     body = "".join(
-        f"<tr><td>{text(r[0])}</td>" + "".join(f"<td class='{kind}'>{text(c)}</td>" for c in r[1:]) + "</tr>"
+        "<tr>"
+        + "".join(f"<td>{text(c)}</td>" for c in r[:leading])
+        + "".join(f"<td class='{kind}'>{text(c)}</td>" for c in r[leading:])
+        + "</tr>"
         for r in rows
     )
-    return f"<div class='scroll'><table><tr>{head}</tr>{body}</table></div>"
+    kind = " class='sortable'" if is_sortable else ""
+    return f"<div class='scroll'><table{kind}><tr>{head}</tr>{body}</table></div>"
 
 
 def chart(found: Chart) -> str:
     """Return the element into which a chart is drawn, with its caption."""
     note = f"<p class='note'>{text(found.note)}</p>" if found.note else ""
-    style = f"style='height:{found.height}px'"
-    place = f"<div class='chart' id='chart-{text(found.key)}' {style}></div>"
+    least = f";min-width:{found.least_width}px" if found.least_width else ""
+    place = f"<div class='chart' id='chart-{text(found.key)}' style='height:{found.height}px{least}'></div>"
+    place = f"<div class='scroll'>{place}</div>" if least else place
     return f"<figure><figcaption><h3>{text(found.title)}</h3>{note}</figcaption>{place}</figure>"
 
 

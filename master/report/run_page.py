@@ -65,6 +65,7 @@ def page(done: Results, measured: MeasuredComparison | None = None) -> str:
     ]
     contents = "".join(f"<a href='#{k}'>{t}</a>" for k, t in _CONTENTS if any(f"id='{k}'" in part for part in body))
     title = f"{summary.get('scenario', '')}: {summary.get('title') or _subject(is_coupling)}"
+    title += "".join(f", {key} = {value}" for key, value in (summary.get("changes") or {}).items())
     return html_markup.document(title, [f"<nav>{contents}</nav>", *body], [*charts, *extra], movie)
 
 
@@ -97,6 +98,8 @@ def _title(summary: dict[str, Any], is_coupling: bool) -> str:
     head = summary.get("title") or f"{name}: {_subject(is_coupling)}"
     parts = [f"scenario {name}"] if summary.get("title") else []
     parts += [f"{component}: {model}" for component, model in coupled_models(summary)]
+    if changes := summary.get("changes"):  # the title is the scenario's, which does not know of them
+        parts.append("with " + ", ".join(f"{key} = {value}" for key, value in changes.items()))
     note = f"<p class='note'>{html_markup.text('; '.join(parts))}</p>" if parts else ""
     return f"<h1>{html_markup.text(head)}</h1>{note}"
 

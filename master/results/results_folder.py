@@ -33,10 +33,12 @@ GEOMETRY: Final = "geometry.json"
 FORCES: Final = "contact_force.csv"
 REPORT: Final = "report.html"
 _TABLES: Final = ("timeseries*.csv", "timeseries*.parquet", FORCES, "contact_force.parquet")
-_OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg")
+_OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg", "definition_*.toml")
 #: What a run, a study or a verification may leave half written if it is killed, and what is no result.
 _PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT)), f".*{PART}")
 _LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)
+#: How folders begin that hold nothing of worth once the process is gone that made them.
+WORK: Final = ".work-"
 #: Format of numbers that are to be read back to the last bit.
 _EXACT: Final = "%.17g"
 _NOT_OURS: Final = "exists and is {kind} of this tool; it is left alone, choose another with --out"
@@ -143,11 +145,25 @@ def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator
     MasterError
         If it exists and is no ``kind`` of this tool, or cannot be made.
     """
-    if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
-        raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
+    check_free(folder, marker, generator, kind)
     with _alone_in(folder, "folder"):
         _remove(folder, _PARTS)
         yield
+
+
+def check_free(folder: Path, marker: str, generator: str, kind: str) -> None:
+    """Refuse a folder that `taken_over` would, but for one that cannot be made.
+
+    Raises
+    ------
+    MasterError
+        If it exists and is no ``kind`` of this tool.
+    """
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise MasterError(f"the folder {folder} cannot be made: {there} is a file; choose another with --out")
+    if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
+        raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
 
 
 @contextmanager
@@ -206,7 +222,7 @@ def _holds_nothing(folder: Path) -> bool:
     """Whether a folder does not exist, or holds only what a run that was killed at once has left."""
     if not folder.is_dir():
         return not folder.exists()
-    return all(any(path.match(p) for p in (*_PARTS, *_LOCKS)) for path in folder.iterdir())
+    return all(any(path.match(p) for p in (*_PARTS, *_LOCKS, f"{WORK}*")) for path in folder.iterdir())
 
 
 def is_ours(folder: Path) -> bool:

@@ -31,6 +31,7 @@ def describe(system: System, run: str) -> dict[str, Any]:
         "run": run,
         "scenario": system.name,
         "title": system.title,
+        **({"changes": dict(system.changes)} if system.changes else {}),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": versions(),
         "settings": {

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from master.errors import MasterError, one_line
+from master.errors import MasterError, one_line, said
 from master.evaluation.en50367_limits import OwnLimits, Supply
 
 
@@ -178,7 +178,7 @@ def _read(path: Path, shape: TypeAdapter[Any]) -> dict[str, Any]:
         where = ".".join(map(str, first["loc"])) or "the whole"
         raise MasterError(f"{path} is damaged: {one_line(where)}: {first['msg']}; run the scenario again") from error
     except OSError as error:
-        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
+        raise MasterError(f"{path} cannot be read ({said(error)})") from error
     except (ValueError, RecursionError) as error:
         raise MasterError(f"{path} is damaged: {one_line(str(error))}; run the scenario again") from error
     return data

@@ -48,8 +48,10 @@ def atomic_file(path: Path, elsewhere: str = _ELSEWHERE) -> Iterator[Path]:
     MasterError
         If it cannot be written; the old one is still there then.
     """
+    if path.is_dir():
+        raise MasterError(f"{path} is a folder; choose {elsewhere}")
     # A device, such as /dev/null, would be replaced by a file for all users of the computer.
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    if path.exists() and not path.is_file():
         raise MasterError(f"{path} is not a file and is left alone; choose {elsewhere}")
     # Hidden, so that no archive includes it; one per process, so that two writers do not mix.
     temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -91,7 +92,7 @@ def load_system(
     if structure is EMPTY:  # without it everything would be missing
         raise ScenarioError(reader.problems)
     provision = _Provision(build and package.writable, tell, scratch, package.root)
-    fmus = _fmus(sources, structure.components, reader.problems, provision)
+    fmus = _fmus(sources, structure.components, reader.problems, provision, overrides)
     checker = ScenarioChecks(structure, fmus, reader.problems, reader.warnings)
     connections = checker.connections()
     components = checker.components(connections)
@@ -108,7 +109,9 @@ def load_system(
         components, settings = with_energy(components, settings)
     warnings = tuple(str(w) for w in _sorted(reader.warnings))
     may_stop, title = overrides.may_stop_early, structure.title
-    system = System(package.name, components, connections, *times, settings, warnings, may_stop, title)
+    system = System(
+        package.name, components, connections, *times, settings, warnings, may_stop, title, overrides.parameters
+    )
     text = value_checks.empty_cells(system, overrides.empty)
     if text := text or value_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)
@@ -146,6 +149,7 @@ def _fmus(
     components: Iterable[SsdComponent],
     problems: list[Problem],
     provision: _Provision,
+    overrides: Overrides,
 ) -> dict[str, Fmu]:
     found: dict[str, Fmu] = {}
     by_path: dict[Path, Fmu | str] = {}
@@ -154,7 +158,8 @@ def _fmus(
             if not any(p.line == c.line and "'source'" in p.text for p in problems):
                 problems.append(Problem(SSD_NAME, c.line, "source", f"component '{c.name}' has an empty source"))
             continue
-        path = sources.find(c.source)
+        source = overrides.source(c.source)
+        path = sources.find(source)
         if path is None:
             text = f"'{c.source}' does not lie inside the scenario; --allow-outside DIR allows a folder beside it"
             problems.append(Problem(SSD_NAME, c.line, "source", text))
@@ -164,10 +169,20 @@ def _fmus(
             by_path[path] = _provide(path, replace(provision, build=may_build))
         fmu = by_path[path]
         if isinstance(fmu, str):
-            problems.append(Problem(SSD_NAME, c.line, "fmu", f"component '{c.name}': {c.source} {fmu}"))
+            problems.append(_unprovided(c.name, source, c.line, fmu))
         else:
             found[c.name] = fmu
     return found
+
+
+def _unprovided(name: str, source: str, line: int, why: str) -> Problem:
+    """Return why a component has no FMU; a mistake in a definition is told with its place there first."""
+    found = re.fullmatch(r"(?:could not|cannot) be built: (?P<file>[^\n]*?\.toml): (?P<text>[^\n]+)", why)
+    if found is None:
+        return Problem(SSD_NAME, line, "fmu", f"component '{name}': {source} {why}")
+    at = re.search(r"\(at line (\d+),", found["text"])
+    text = f"{found['text']}; so {source} of component '{name}' ({SSD_NAME}:{line}) cannot be built"
+    return Problem(found["file"], int(at[1]) if at else 0, "definition", text)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from master.errors import MasterError
+from master.errors import MasterError, said
 from master.safety.safe_files import atomic_file, cannot_write
 from master.ssp.archive import SSD_NAME, Sources
 from master.ssp.ssp_xml import XmlError, safe_root
@@ -64,7 +64,7 @@ def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise MasterError(f"{path} cannot be read ({error.strerror or error})") from error
+        raise MasterError(f"{path} cannot be read ({said(error)})") from error
 
 
 def _members(root: Path) -> list[Path]:

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from master.errors import Problem
+from master.errors import Problem, said
 
 SSC: Final = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSD: Final = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -104,7 +104,7 @@ class Reader:
         try:
             return _in_first_words(safe_root(path.read_bytes()))
         except OSError as error:
-            self.report(0, "file", f"cannot be read ({error.strerror})")
+            self.report(0, "file", f"cannot be read ({said(error)})")
         except XmlError as error:
             self.report(error.line, "xml", str(error))
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -132,6 +132,8 @@ class System:
         Whether the stop time may lie before the end of the interval of interest: nothing is judged then.
     title : str
         What the scenario says that it is.
+    changes : mapping
+        Parameter values that are not the scenario's own, as they were given.
     """
 
     name: str
@@ -144,6 +146,7 @@ class System:
     warnings: tuple[str, ...] = ()
     may_stop_early: bool = False
     title: str = ""
+    changes: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def contacts(self) -> tuple[Contact, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from models.arrays import FloatArray, IntArray, Snapshot
 from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.exchange.strip_exchange import StripExchange, make_exchange, output_count
 from models.catenary.line_energy import LineBalance
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
@@ -15,9 +16,7 @@ from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.statics.elasticity import elasticity
 from models.catenary.statics.wire_waves import contact_wire_wave_speed
 from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
-from models.contact_law import application_point
 from models.numerics.energy_ledger import NO_BALANCE
-from models.numerics.extrapolation import StripExtrapolation
 from models.numerics.newmark import steps_within
 
 #: Force for which a line's elasticity is given [N].
@@ -76,6 +75,8 @@ class CatenaryPart:
 
     Attributes
     ----------
+    outputs : ndarray, shape (n,)
+        The four that follow, one after the other, the forces per wire only if there are several.
     contact_force : ndarray, shape (P,)
         Resultant force on the strip [N].
     contact_point : ndarray, shape (P, 3)
@@ -93,11 +94,14 @@ class CatenaryPart:
         self.supports = _sites(mesh, mesh.support_nodes)
         self.droppers = _sites(mesh, mesh.droppers[:, 0])
         self.time = 0.0
-        self.contact_force = np.zeros(pantographs)
-        self.contact_point = np.zeros((pantographs, 3))
-        self.section_force = np.zeros((pantographs, self.section_count))
-        self.support_uplift = np.zeros(len(self.supports))
-        self._strips = [StripExtrapolation(definition.extrapolation_order) for _ in range(pantographs)]
+        P, S, supports = pantographs, self.section_count, len(self.supports)
+        self.outputs = np.zeros(output_count(P, S, supports))
+        self.contact_force = self.outputs[:P]
+        self.contact_point = self.outputs[P : 4 * P].reshape(P, 3)
+        forces = self.outputs[4 * P : (4 + S) * P] if S > 1 else self.contact_force
+        self.section_force = forces.reshape(P, S)
+        self.support_uplift = self.outputs[len(self.outputs) - supports :]
+        self._exchange: StripExchange | None = None
         self._motion = StripMotion(np.zeros((pantographs, 2, 2, 3)), np.zeros(pantographs))
         self._model: CatenaryModel | None = None
         self._state: CatenaryState | None = None
@@ -120,8 +124,15 @@ class CatenaryPart:
     def state(self) -> CatenaryState:
         """Return the line's state; at rest before the first initialisation."""
         if self._state is None:
-            self._state = self.model.initial_state(len(self._strips))
+            self._state = self.model.initial_state(len(self.contact_force))
         return self._state
+
+    @property
+    def exchange(self) -> StripExchange:
+        """Return what continues the strips and hands out the resultants; made when first needed."""
+        if self._exchange is None:
+            self._exchange = make_exchange(len(self.contact_force), self.definition.extrapolation_order)
+        return self._exchange
 
     @property
     def dropper_force(self) -> FloatArray:
@@ -141,7 +152,7 @@ class CatenaryPart:
     @property
     def contact_work(self) -> FloatArray:
         """Return the work of the strips against the contacts [J], shape (P,); 0 if the balance is not kept."""
-        return np.zeros(len(self._strips)) if self._balance is None else self._balance.contact_work
+        return np.zeros(len(self.contact_force)) if self._balance is None else self._balance.contact_work
 
     @property
     def geometry(self) -> LineGeometry:
@@ -211,10 +222,9 @@ class CatenaryPart:
             Pantograph; end A, B; position, velocity; x, y, z.
         """
         self.time = time
-        self._state = self.model.initial_state(len(self._strips))
+        self._state = self.model.initial_state(len(self.contact_force))
         self.model.rehearse(self.definition.time_step, strips)
-        for extrapolation, strip in zip(self._strips, strips, strict=True):
-            extrapolation.start(time, strip)
+        self.exchange.start(time, strips)
         contacts = self.model.contact_at_rest(self._state, strips)
         self._balance = LineBalance(self.model, strips, contacts) if self.definition.monitor_energy else None
         self._publish(strips, contacts)
@@ -226,14 +236,13 @@ class CatenaryPart:
         ----------
         strips : ndarray, shape (P, 2, 2, 3)
         """
-        for extrapolation, strip in zip(self._strips, strips, strict=True):
-            extrapolation.receive(self.time, strip, step)
         count = steps_within(step, self.definition.time_step)
         start, h = self.time, step / count
-        motion, advance = self._motion, (self._balance or self.model).step
-        for k in range(1, count + 1):
-            for extrapolation, strip in zip(self._strips, motion.strip, strict=True):
-                extrapolation.at(start + k * h, strip)
+        motion, exchange, advance = self._motion, self.exchange, (self._balance or self.model).step
+        exchange.receive(start, step, strips, start + h, motion.strip)
+        result = advance(self.state, h, motion)
+        for k in range(2, count + 1):
+            exchange.at(start + k * h, motion.strip)
             result = advance(self.state, h, motion)
         self.time = start + step
         self._publish(motion.strip, result)
@@ -242,8 +251,7 @@ class CatenaryPart:
         """Return the whole state, bit for bit."""
         result: Snapshot = {"time": np.array([self.time])}
         result |= {f"line.{name}": value for name, value in self.state.snapshot().items()}
-        for p, extrapolation in enumerate(self._strips):
-            result |= {f"{p}.{name}": value for name, value in extrapolation.snapshot().items()}
+        result |= self.exchange.snapshot()
         if self._balance is not None:
             result |= self._balance.snapshot()
         outputs = ("contact_force", "contact_point", "section_force", "support_uplift")
@@ -253,19 +261,15 @@ class CatenaryPart:
         """Restore a snapshot."""
         self.time = float(snapshot["time"][0])
         self.state.restore({n.removeprefix("line."): v for n, v in snapshot.items() if n.startswith("line.")})
-        for p, extrapolation in enumerate(self._strips):
-            extrapolation.restore({n.removeprefix(f"{p}."): v for n, v in snapshot.items() if n.startswith(f"{p}.")})
+        self.exchange.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
         for name in ("contact_force", "contact_point", "section_force", "support_uplift"):
             getattr(self, name)[...] = snapshot[name]
 
     def _publish(self, strips: FloatArray, result: ContactResult) -> None:
-        self.section_force[...] = result.force
-        result.force.sum(axis=1, out=self.contact_force)
-        for place, *contact in zip(self.contact_point, result.force, result.point, strips, strict=True):
-            place[...] = application_point(*contact)
-        self.support_uplift[...] = self.model.uplift(self.state)
+        attached, places = self.state.motion.attached, self.model.uplift_places
+        self.exchange.publish(result, strips, attached, places, self.outputs)
 
 
 def wires_at_rest(model: CatenaryModel) -> tuple[WireAtRest, ...]:

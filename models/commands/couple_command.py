@@ -17,12 +17,9 @@ from models.arrays import FloatArray
 from models.catenary.line_model import CatenaryModel
 from models.commands.physics_files import write_csv
 from models.commands.physics_options import (
-    add_filter,
-    add_settings,
+    check_folder,
     chosen_filter,
-    finite,
     new_folder,
-    positive,
     print_table,
     settings,
     warn,
@@ -41,32 +38,13 @@ from models.interface.coupled_run import (
 from models.library.catalogue import doubts, load_line, load_lumped
 
 
-def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Register the verb."""
-    parser = subparsers.add_parser(
-        "couple", help="run a lumped pantograph on a line as one system, without co-simulation"
-    )
-    parser.add_argument("line", help="name in the library, or a definition file")
-    parser.add_argument("pantograph", help="name in the library, or a definition file")
-    parser.add_argument("--speed", type=positive, default=300.0, help="km/h (default 300)")
-    parser.add_argument("--start", type=finite, default=None, help="where the pantograph is raised [m]")
-    parser.add_argument("--end", type=finite, default=None, help="where the run ends [m]")
-    text = f"interval of interest [m] (default: from {SETTLING:g} s after the first contact to the end)"
-    parser.add_argument("--interval", type=finite, nargs=2, metavar=("FROM", "TO"), help=text)
-    parser.add_argument("--step", type=positive, default=1e-3, help="time step [s] (default 0.001)")
-    parser.add_argument("--out", type=Path, default=None, help="folder for timeseries.csv")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    add_filter(parser)
-    add_settings(parser)
-    parser.set_defaults(run=run)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Run and print the contact-force figures."""
+    check_folder(arguments.out)
     check_step(arguments.step)
     chosen = chosen_filter(arguments)
     definition = load_line(arguments.line)
-    warn([doubts("lines", arguments.line), doubts("pantographs", arguments.pantograph)])
+    warn([*doubts("lines", arguments.line), *doubts("pantographs", arguments.pantograph)])
     definition = definition.with_values(settings(arguments.set, "line", definition))
     line = CatenaryModel(definition)
     way, speed = travelled(line, arguments.start, arguments.end), arguments.speed / 3.6

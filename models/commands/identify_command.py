@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.commands.physics_files import write_figure
+from models.commands.physics_files import check_figure, write_figure
 from models.commands.physics_options import print_table
 from models.definition_files.parameter import ParameterError
 from models.pantograph.identification import (
-    RESPONSE_KINDS,
     IdentifiedModel,
     Response,
     identify,
@@ -25,26 +23,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Register the verb."""
-    parser = subparsers.add_parser("identify", help="fit a lumped pantograph to a frequency response")
-    parser.add_argument("response", type=Path, help="CSV file: frequency [Hz], real part, imaginary part")
-    parser.add_argument("--kind", choices=RESPONSE_KINDS, default="receptance", help="what the two parts are of")
-    parser.add_argument("--stages", type=int, default=3, help="number of masses (default 3)")
-    parser.add_argument(
-        "--fix",
-        action="append",
-        default=[],
-        type=_fixed,
-        metavar="NAME=VALUE",
-        help="known value: m3=7.75 (m, c, k; 1 is lowest)",
-    )
-    parser.add_argument("--plot", type=Path, default=None, help="PNG file for measured and fitted response")
-    parser.set_defaults(run=run)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Identify and print the values with their standard deviations."""
+    if arguments.plot is not None:
+        check_figure(arguments.plot)
     response = read_response(arguments.response, arguments.kind)
     try:
         model = identify(response, arguments.stages, _all_fixed(arguments.fix))
@@ -62,16 +44,6 @@ def _all_fixed(given: Sequence[tuple[str, float]]) -> dict[str, float]:
     if twice := [name for name, _ in given if sum(name == other for other, _ in given) > 1]:
         raise ParameterError(f"--fix {twice[0]}: is given twice")
     return dict(given)
-
-
-def _fixed(text: str) -> tuple[str, float]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise argparse.ArgumentTypeError(f"'{text}': write NAME=VALUE")
-    try:
-        return name, float(value)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"'{text}': '{value}' is not a number") from error
 
 
 def _rows(model: IdentifiedModel) -> list[tuple[str, str, str]]:

@@ -29,15 +29,6 @@ _GEOMETRY = {
 }
 
 
-def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Register the verb."""
-    parser = subparsers.add_parser("lanes", help="make many runs of one line side by side (a sweep's engine)")
-    parser.add_argument("job", type=Path, help="JSON file that openpanto sweep --engine lanes writes")
-    text = "folder for line.arrays and a lane_N.arrays for every run that has ended"
-    parser.add_argument("--out", type=Path, required=True, help=text)
-    parser.set_defaults(run=run)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Make the runs of a job; a line of output says what has become of each, as soon as its file is there."""
     job = read_job(arguments.job)

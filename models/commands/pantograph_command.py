@@ -13,12 +13,13 @@ import numpy.typing as npt
 
 from models.arrays import FloatArray
 from models.commands.physics_files import write_csv, write_figure
-from models.commands.physics_options import add_settings, finite, new_folder, print_table, settings, warn
+from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import doubts, load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
+from models.pantograph.multibody.mechanism_advice import inertia_warning
 from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
 
 if TYPE_CHECKING:
@@ -38,7 +39,9 @@ class Characteristics:
     static_columns : tuple of str
         Names with units, strip height first.
     statics : ndarray, shape (h, len(static_columns))
-    modes : tuple of (frequency [Hz], damping ratio)
+    modes : tuple of (frequency [Hz], damping ratio, motion, remark)
+    freedom : int
+        Independent motions that the joints allow; 0 of a lumped model, whose masses say it.
     frequency : ndarray, shape (f,)
     apparent_mass : ndarray of complex, shape (f,)
         [kg]
@@ -47,29 +50,17 @@ class Characteristics:
     title: str
     static_columns: tuple[str, ...]
     statics: FloatArray
-    modes: tuple[tuple[float, float], ...]
+    modes: tuple[tuple[float, float, str, str], ...]
     frequency: FloatArray
     apparent_mass: npt.NDArray[np.complex128]
-
-
-def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Register the verb."""
-    parser = subparsers.add_parser("pantograph", help="statics over height, modes, apparent mass of a pantograph")
-    parser.add_argument("pantograph", help="name in the library, or a definition file")
-    parser.add_argument("--force", type=finite, default=157.5, help="contact force of the working point [N]")
-    parser.add_argument(
-        "--heights", type=finite, nargs=2, default=None, metavar=("FROM", "TO"), help="strip heights above rail [m]"
-    )
-    parser.add_argument("--height", type=finite, default=None, help="strip height of the working point [m]")
-    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
-    add_settings(parser)
-    parser.set_defaults(run=run)
+    freedom: int = 0
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
+    check_folder(arguments.out)
     definition = load_pantograph(arguments.pantograph)
-    warn([doubts("pantographs", arguments.pantograph)])
+    warn(doubts("pantographs", arguments.pantograph))
     definition = definition.with_values(settings(arguments.set, "pantograph", definition))
     result = (
         _multibody(definition, arguments)
@@ -79,9 +70,12 @@ def run(arguments: argparse.Namespace) -> int:
     print_table(
         f"{arguments.pantograph}: {result.title}",
         result.static_columns,
-        ([f"{v:.3f}" if i == 0 else f"{v:.2f}" for i, v in enumerate(row)] for row in result.statics),
+        ([f"{v:.3f}" if i == 0 else f"{round(v, 2) + 0.0:.2f}" for i, v in enumerate(row)] for row in result.statics),
     )
-    print_table("Modes, strip free", ("frequency [Hz]", "damping [%]"), _mode_rows(result))
+    freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
+    print_table(
+        f"Modes, strip free{freedom}", ("frequency [Hz]", "damping [%]", "motion", "remark"), _mode_rows(result)
+    )
     response_columns = ("frequency [Hz]", "magnitude [kg]", "phase [deg]")
     print_table("Apparent mass of the strip", response_columns, _response_rows(result))
     if arguments.out is not None:
@@ -119,7 +113,7 @@ def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Char
         definition.title,
         ("strip height [m]", "contact force [N]"),
         np.column_stack([heights, lumped.contact_force_over_height(definition, heights)]),
-        tuple((m.frequency, m.damping) for m in lumped.modes(definition)),
+        tuple((m.frequency, m.damping, "", "") for m in lumped.modes(definition)),
         frequency,
         lumped.apparent_mass(definition, frequency),
     )
@@ -131,6 +125,7 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
     statics = rig.statics(_heights(arguments, reference), arguments.force)
     height = arguments.height if arguments.height is not None else reference
     dynamics = rig.dynamics(height, _frequencies(), arguments.force)
+    warn([inertia_warning(definition), rig.warning(arguments.force)])
     warn([friction_warning(definition, dynamics, lambda d: Rig(d).dynamics(height, _frequencies(), arguments.force))])
     unit = rig.lift_unit
     columns = (
@@ -143,9 +138,10 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         definition.title,
         columns,
         np.column_stack([statics.height, statics.balance, statics.lift, statics.contact_force]),
-        tuple((m.frequency, m.damping) for m in dynamics.modes if m.eigenvalue.imag >= 0.0),
+        tuple((m.frequency, m.damping, m.name, m.remark) for m in dynamics.motions if m.eigenvalue.imag >= 0.0),
         dynamics.frequency,
         dynamics.apparent_mass,
+        rig.freedom,
     )
 
 
@@ -182,8 +178,11 @@ def _frequencies_of(dynamics: Dynamics) -> list[float]:
     return [m.frequency for m in dynamics.modes if m.frequency > 0.0]
 
 
-def _mode_rows(result: Characteristics) -> list[tuple[str, str]]:
-    return [(f"{f:.3f}" if f > 0.0 else "-", f"{100.0 * d:.2f}") for f, d in result.modes]
+def _mode_rows(result: Characteristics) -> list[tuple[str, str, str, str]]:
+    return [
+        (f"{f:.3f}" if f > 0.0 else "-", "-" if remark.startswith("neutral") else f"{100.0 * d:.2f}", motion, remark)
+        for f, d, motion, remark in result.modes
+    ]
 
 
 def _response_rows(result: Characteristics) -> list[tuple[str, str, str]]:

@@ -70,10 +70,25 @@ def write_figure(path: Path, figure: Figure, dpi: int) -> None:
     ParameterError
         If there is no such format.
     """
-    known = figure.canvas.get_supported_filetypes()
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=check_figure(path), dpi=dpi)
+    write_atomically(path, buffer.getvalue())
+
+
+def check_figure(path: Path) -> str:
+    """Return the format of a figure that the ending of its name says.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format, or no folder to write the figure into.
+    """
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    known = FigureCanvasBase.get_supported_filetypes()
     kind = path.suffix.lower().removeprefix(".")
     if kind not in known:
         raise ParameterError(f"{path}: a figure must be named .png or .svg, or another of {', '.join(sorted(known))}")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=dpi)
-    write_atomically(path, buffer.getvalue())
+    if not path.parent.is_dir():
+        raise ParameterError(f"{path}: there is no folder {path.parent}; make it, or name another place")
+    return kind

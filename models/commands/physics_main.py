@@ -8,15 +8,15 @@ from collections.abc import Sequence
 
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
-from models.commands import couple_command, identify_command, lanes_command, pantograph_command, statics_command
-from models.definition_files.message_text import printable
+from models.commands.physics_verbs import add_couple, add_identify, add_lanes, add_pantograph, add_statics
+from models.definition_files.message_text import empty_argument, printable, said
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import UnknownNameError
 from models.numerics.kernel_cache import KernelError
 from models.pantograph.multibody.mechanism import MechanismError
 
-_VERBS = (couple_command, statics_command, pantograph_command, identify_command, lanes_command)
+_VERBS = (add_couple, add_statics, add_pantograph, add_identify, add_lanes)
 #: What a user can cause; everything else is a defect and keeps its traceback.
 _USER_ERRORS = (
     DefinitionError,
@@ -33,8 +33,10 @@ def main(argv: Sequence[str]) -> int:
     """Run ``python -m models``; return 0, 1 (failed or invalid) or 2 (a command line that was not understood)."""
     parser = argparse.ArgumentParser(prog="python -m models", description="Physics of lines and pantographs.")
     subparsers = parser.add_subparsers(dest="verb", required=True)
-    for verb in _VERBS:
-        verb.add(subparsers)
+    for add in _VERBS:
+        add(subparsers)
+    if empty := empty_argument(argv):
+        parser.error(empty)
     return carry_out(parser.parse_args(argv))
 
 
@@ -45,7 +47,7 @@ def carry_out(options: argparse.Namespace) -> int:
         if sys.stdout is not None:  # closed by the caller
             sys.stdout.flush()  # here, where an error can still be reported
     except OSError as error:
-        text = f"{error.filename or 'standard output'}: {error.strerror or error}"
+        text = f"{error.filename or 'standard output'}: {said(error)}"
         print(f"error: {printable(text)}", file=sys.stderr)
         return 1
     except _USER_ERRORS as error:

@@ -3,42 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
-from models.definition_files.given_value import in_si, number_advice
+from models.commands.physics_verbs import Setting
+from models.definition_files.given_value import in_si
 from models.definition_files.message_text import printable
 from models.definition_files.parameter import Definition, ParameterError
-from models.definition_files.toml_reader import LARGEST, SMALLEST
-
-_PARTS = ("line", "pantograph")
-
-
-def add_settings(parser: argparse.ArgumentParser) -> None:
-    """Add ``--set part.parameter=value``, repeatable."""
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=_setting,
-        metavar="PART.PARAMETER=VALUE",
-        help="change a parameter: line.damping.alpha=0.00275, line.contact_wire.tension='12 kN' (SI where no unit is)",
-    )
-
-
-def add_filter(parser: argparse.ArgumentParser) -> None:
-    """Add the choice of the contact force's low-pass."""
-    parser.add_argument("--filter", choices=("butterworth", "fft"), default=DEFAULT.kind, help="low-pass of the force")
-    parser.add_argument("--filter-order", type=int, metavar="N", help=f"of butterworth (default {DEFAULT.order})")
-    parser.add_argument("--filter-phase", choices=("zero", "causal"), help=f"of butterworth (default {DEFAULT.phase})")
-    parser.add_argument("--cutoff", type=positive, default=DEFAULT.cutoff, help=f"Hz (default {DEFAULT.cutoff:g})")
 
 
 def chosen_filter(arguments: argparse.Namespace) -> ForceFilter:
@@ -63,14 +39,6 @@ def chosen_filter(arguments: argparse.Namespace) -> ForceFilter:
 _HIGHEST_ORDER = 20
 
 
-class Setting(NamedTuple):
-    """A value from the command line: of the line or the pantograph, its parameter, and as text with or without unit."""
-
-    part: str
-    parameter: str
-    value: str
-
-
 def settings(given: Iterable[Setting], part: str, definition: Definition) -> dict[str, float]:
     """Return the ``--set`` values of one part [SI].
 
@@ -84,38 +52,11 @@ def settings(given: Iterable[Setting], part: str, definition: Definition) -> dic
     return {s.parameter: _value(s, units.get(s.parameter)) for s in own}
 
 
-def _setting(text: str) -> Setting:
-    name, equals, value = text.partition("=")
-    part, dot, parameter = name.partition(".")
-    if not (equals and dot and parameter and value) or part not in _PARTS:
-        raise argparse.ArgumentTypeError(f"'{text}': write line.PARAMETER=VALUE or pantograph.PARAMETER=VALUE")
-    return Setting(part, parameter, value)
-
-
 def _value(setting: Setting, wanted: str | None) -> float:
     try:
         return in_si(setting.value, wanted)  # the definition reports an unknown parameter
     except ValueError as error:
         raise ParameterError(f"--set {setting.part}.{setting.parameter}={setting.value}: {error}") from error
-
-
-def finite(text: str) -> float:
-    """Read a finite number from the command line; argparse reports what is wrong with another."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LARGEST or "_" in text or not text.isascii():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number (finite, at most {LARGEST:g}){number_advice(text)}")
-    return value
-
-
-def positive(text: str) -> float:
-    """Read a number greater than 0 from the command line."""
-    value = finite(text)
-    if value < SMALLEST:
-        raise argparse.ArgumentTypeError(f"'{text}' must be greater than 0")
-    return value
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -131,7 +72,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
 
 def warn(texts: Iterable[str]) -> None:
     """Print what deserves a second look; the command continues."""
-    for text in filter(None, texts):
+    for text in dict.fromkeys(filter(None, texts)):
         print(f"warning: {printable(text)}", file=sys.stderr)
 
 
@@ -139,3 +80,18 @@ def new_folder(path: Path) -> Path:
     """Create a folder for results (an existing one is used) and return it."""
     path.mkdir(parents=True, exist_ok=True)
     return path
+
+
+def check_folder(path: Path | None) -> None:
+    """Refuse, before anything is computed, a folder for results that cannot be made.
+
+    Raises
+    ------
+    ParameterError
+        If a file is in its way.
+    """
+    if path is None:
+        return
+    there = next(place for place in (path, *path.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise ParameterError(f"--out {path}: {there} is a file; name a folder, a new one or one of results")

@@ -11,26 +11,20 @@ import numpy as np
 from models.catenary.statics import rest_profile
 from models.commands import statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
-from models.commands.physics_options import add_settings, new_folder, positive, print_table, settings, warn
+from models.commands.physics_options import (
+    check_folder,
+    new_folder,
+    print_table,
+    settings,
+    warn,
+)
 from models.interface.line_statics import LineStatics, at_rest
 from models.library.catalogue import doubts, load_line
 
 
-def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Register the verb."""
-    parser = subparsers.add_parser("statics", help="static shape, droppers, elasticity and wave figures of a line")
-    parser.add_argument("line", help="name in the library, or a definition file")
-    parser.add_argument("--span", type=int, default=None, help="span in detail, from 1 (default: the middle one)")
-    parser.add_argument("--section", type=int, default=1, help="section of a line with overlaps, from 1 (default 1)")
-    parser.add_argument("--speed", type=positive, default=300.0, help="speed of the wave figures, km/h (default 300)")
-    parser.add_argument("--force", type=positive, default=100.0, help="force of the elasticity [N] (default 100)")
-    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
-    add_settings(parser)
-    parser.set_defaults(run=run)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
+    check_folder(arguments.out)
     result = analyse(arguments)
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
     print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
@@ -50,7 +44,7 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
         If the line has no such section or span.
     """
     definition = load_line(arguments.line)
-    warn([doubts("lines", arguments.line)])
+    warn(doubts("lines", arguments.line))
     definition = definition.with_values(settings(arguments.set, "line", definition))
     found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
     warn(found.warnings)

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from models.definition_files.message_text import hint, nearest, one_line, shown_value
+from models.definition_files.message_text import hint, nearest, one_line, said, shown_value
 from models.definition_files.si_units import shown, to_si
 
 #: Largest number of problems listed.
@@ -133,7 +133,7 @@ class Table:
             text = "there is no such file; a definition of the library is called by its name, without .toml"
             raise DefinitionError([Problem(name, "", text)]) from error
         except OSError as error:
-            raise DefinitionError([Problem(name, "", f"cannot be read ({error.strerror})")]) from error
+            raise DefinitionError([Problem(name, "", f"cannot be read ({said(error)})")]) from error
         except UnicodeDecodeError as error:
             raise DefinitionError([Problem(name, "", f"is not UTF-8 text (byte {error.start})")]) from error
         except RecursionError as error:

@@ -9,7 +9,8 @@ from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import load as load_line_file
 from models.definition_files.message_text import hint
 from models.definition_files.toml_reader import Table
-from models.library.search_path import LIBRARY, Kind, definition_files, definition_names, doubles, search_path
+from models.library import search_path
+from models.library.search_path import LIBRARY, Kind, definition_files, definition_names
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import read_mechanism
@@ -84,20 +85,24 @@ def load_lumped(name: str) -> LumpedDefinition:
     return definition
 
 
-def doubts(kind: Kind, name: str) -> str:
-    """Return which of several definitions of a name is used, empty if there is one or a file is named."""
-    return doubles(definition_files(kind, name, [*search_path(), LIBRARY]))
+def doubts(kind: Kind, name: str) -> list[str]:
+    """Return what deserves a second look when a definition is called by its name, or by its file."""
+    if name.lower().endswith(".toml"):
+        return [text for text in (search_path.named_otherwise(Path(name)),) if text]
+    return search_path.doubts(kind, name, [*search_path.search_path(), LIBRARY])
 
 
 def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:
     if name.lower().endswith(".toml"):
         return Path(name)
-    searched = [*(search_path() if folders is None else folders), LIBRARY]
+    searched = [*(search_path.search_path() if folders is None else folders), LIBRARY]
     found = definition_files(kind, name, searched)
     if not found:
         known = definition_names(kind, searched)
         other: Kind = "pantographs" if kind == "lines" else "lines"
         advice = f"; it is a {other[:-1]}" if definition_files(other, name, searched) else hint(name, known)
         text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{advice}"
+        if absent := search_path.absent_folders():
+            text += f"; {absent}"
         raise UnknownNameError(text)
     return found[0]

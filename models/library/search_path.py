@@ -6,9 +6,12 @@ Each folder may hold ``lines/NAME.toml`` and ``pantographs/NAME.toml``.
 from __future__ import annotations
 
 import os
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Final, Literal
+
+from models.definition_files.message_text import one_line
 
 Kind = Literal["lines", "pantographs"]
 #: The definitions that come along.
@@ -65,6 +68,33 @@ def doubles(files: list[Path]) -> str:
     rest = " and ".join(map(str, files[1:]))
     number = "two" if len(files) == 2 else f"{len(files)}"
     return f"{number} definitions are named '{files[0].stem}': {files[0]} is used, {rest} {_verb(files[1:])} not"
+
+
+def doubts(kind: Kind, name: str, folders: Iterable[Path]) -> list[str]:
+    """Return what deserves a second look when a definition is called by its name, a sentence each.
+
+    That are several definitions of the name, one whose ``name`` is another than its file's, and folders named in
+    ``OPENPANTO_LIBRARY`` that are not there.
+    """
+    found = definition_files(kind, name, folders)
+    return [text for text in (doubles(found), *map(named_otherwise, found[:1]), absent_folders()) if text]
+
+
+def named_otherwise(path: Path) -> str:
+    """Return that a definition is named otherwise than its file, empty if not or if it cannot be read."""
+    try:
+        name = tomllib.loads(path.read_text(encoding="utf-8")).get("name")
+    except (OSError, ValueError):
+        return ""  # reading the definition says why
+    if not isinstance(name, str) or name == path.stem:
+        return ""
+    return f"{path} is called '{path.stem}', as its file is, not {one_line(repr(name))}, its name: give both the same"
+
+
+def absent_folders() -> str:
+    """Return which folders in ``OPENPANTO_LIBRARY`` are not there, empty if all are."""
+    absent = [name for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name and not Path(name).is_dir()]
+    return f"{VARIABLE} names no folder with {', '.join(map(repr, absent))}: correct it" if absent else ""
 
 
 def _files(folder: Path) -> list[Path]:

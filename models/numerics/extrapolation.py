@@ -170,7 +170,7 @@ class StripExtrapolation:
         tau = time - self.time
         position, velocity = self.position, self.velocity
         if self.order >= 1 and tau != 0.0:
-            half, acceleration = 0.5 * tau**2, self.acceleration
+            half, acceleration = 0.5 * (tau * tau), self.acceleration
             position = [p + tau * v + half * a for p, v, a in zip(position, velocity, acceleration, strict=True)]
             velocity = [v + tau * a for v, a in zip(velocity, acceleration, strict=True)]
         out[...] = (position[:3], velocity[:3]), (position[3:], velocity[3:])

@@ -20,16 +20,21 @@ import importlib.util
 import logging
 import os
 import pickle
+import re
 import shutil
-import stat
 import sys
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
+from models.numerics.user_cache import cache_folder, check_owner
+
 #: Environment variable that chooses between compiled kernels and NumPy.
 SWITCH: Final = "OPENPANTO_KERNEL"
+#: An import of other kernels of the project, on one line or in brackets.
+_FROM_PROJECT: Final = re.compile(rb"^from models\.[\w.]+_kernels import (?:\([^)]*\)|[^(\n]*)$", re.MULTILINE)
 _LOG: Final = logging.getLogger("openpanto")
 #: Length of the checksum before the content of a file [bytes].
 _DIGEST: Final = hashlib.sha256().digest_size
@@ -39,6 +44,17 @@ _named: set[str] = set()
 
 class KernelError(RuntimeError):
     """Compiled kernels were requested and are not available."""
+
+
+def joined(files: Iterable[Path]) -> bytes:
+    """Return the source of kernels that are kept in several files, without the lines by which these import each other.
+
+    Parameters
+    ----------
+    files : iterable of Path
+        Each after those that it imports; no two may define the same name, unless for the same.
+    """
+    return b"\n".join(_FROM_PROJECT.sub(b"", path.read_bytes()) for path in files)
 
 
 def load_kernels(name: str, source: bytes) -> ModuleType:
@@ -67,6 +83,27 @@ def load_kernels(name: str, source: bytes) -> ModuleType:
     return _load(module_name, _kept_source(source, f"{name}-{key}")) if found is None else found
 
 
+def kernels_if_wanted(name: str, source: bytes) -> ModuleType | None:
+    """Return kernels as `load_kernels` does, None if there are none or `SWITCH` says to do without.
+
+    Raises
+    ------
+    KernelError
+        If the environment asks for kernels that cannot be had, or for ones that do not exist.
+    """
+    wanted = os.environ.get(SWITCH, "auto")
+    if wanted not in ("auto", "numpy", "numba"):
+        raise KernelError(f"{SWITCH} is '{wanted}'; use auto, numpy or numba")
+    if wanted == "numpy":
+        return None
+    try:
+        return load_kernels(name, source)
+    except ImportError as error:
+        if wanted == "numba":
+            raise KernelError(f"{SWITCH} is 'numba', but {error}") from error
+        return None
+
+
 def _load(name: str, path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
@@ -87,11 +124,11 @@ def _kept_source(source: bytes, folder: str) -> Path:
         If neither can be written to.
     """
     try:
-        home = _cache_folder()
+        home = cache_folder()
         copy = home / "openpanto" / folder / "kernels.py"
         copy.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         for place in (home / "openpanto", copy.parent, copy.parent / "__pycache__"):
-            _check_owner(place)
+            check_owner(place)
         _write(copy, source)
     except (OSError, RuntimeError) as error:  # RuntimeError: a user without a home
         _warn(f"compiled kernels are not kept, and have to be compiled in every run: {error}")
@@ -120,37 +157,6 @@ def _write(copy: Path, source: bytes) -> None:
         raise
 
 
-def _cache_folder() -> Path:
-    """Return the folder for data of this user's programs that can be regenerated.
-
-    A relative XDG_CACHE_HOME is to be ignored (XDG Base Directory Specification).
-    """
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
-    chosen = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return chosen if chosen.is_absolute() else Path("~/.cache").expanduser()
-
-
-def _check_owner(folder: Path) -> None:
-    """Reject a folder to which somebody else can write; one that does not exist yet is accepted.
-
-    Raises
-    ------
-    PermissionError
-        If it belongs to another user, or its mode lets others write. On Windows a user's folders are private.
-    """
-    if sys.platform == "win32":
-        return
-    try:
-        found = folder.stat()
-    except FileNotFoundError:
-        return
-    if found.st_uid != os.geteuid():
-        raise PermissionError(f"{folder} belongs to another user")
-    if stat.S_IMODE(found.st_mode) & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PermissionError(f"{folder} can be written by others; chmod go-w it")
-
-
 def _warn(text: str) -> None:
     """Log a warning once per process."""
     if text not in _named:
@@ -170,7 +176,7 @@ def _guard(module: ModuleType, folder: Path) -> None:
 def _leave_out_if_foreign(cache: Any) -> None:
     """Disable a cache where others may write; numba has further places, and an environment variable for more."""
     try:
-        _check_owner(Path(cache.cache_path))
+        check_owner(Path(cache.cache_path))
     except OSError as error:
         _warn(f"compiled kernels are not kept, and have to be compiled in every run: {error}")
         cache.disable()

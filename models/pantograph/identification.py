@@ -22,6 +22,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from models.arrays import ComplexArray, FloatArray
+from models.definition_files.message_text import hint, said
 from models.definition_files.toml_reader import LARGEST, SMALLEST, DefinitionError, Problem
 from models.pantograph.lumped.lumped_rig import chain_stiffness
 
@@ -113,7 +114,7 @@ def _read_lines(path: Path) -> list[list[str]]:
     try:
         return list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     except OSError as error:
-        raise DefinitionError([Problem(str(path), "", f"cannot be read ({error.strerror})")]) from error
+        raise DefinitionError([Problem(str(path), "", f"cannot be read ({said(error)})")]) from error
     except UnicodeDecodeError as error:
         raise DefinitionError([Problem(str(path), "", f"is not UTF-8 text (byte {error.start})")]) from error
     except csv.Error as error:
@@ -159,7 +160,9 @@ def identify(response: Response, stages: int = 3, fixed: Mapping[str, float] | N
     names = [f"{letter}{stage}" for letter in "mck" for stage in range(1, stages + 1)]
     unknown = sorted(set(given) - set(names))
     if unknown:
-        raise ValueError(f"there is no value {', '.join(unknown)} to fix (there are {', '.join(names)})")
+        raise ValueError(
+            f"there is no value {', '.join(unknown)} to fix (there are {', '.join(names)}){hint(unknown[0], names)}"
+        )
     for name, value in given.items():
         _check_fixed(name, value)
     free = [name for name in names if name not in given]

@@ -58,6 +58,7 @@ def study(
     MasterError
         If the folder holds something else.
     """
+    results_folder.check_free(folder, JSON, FILES.generator, FILES.kind)  # before the FMUs are built
     check(family, chosen, runner)
 
     def finish(state: StudyOutcome, variant: Variant) -> StudyOutcome:

@@ -29,9 +29,9 @@ import dask.utils
 from distributed import Client, Future, LocalCluster, WorkerPlugin, get_worker, wait
 
 from master.batch.sweep.sweep_engines import MakeRuns
-from master.batch.sweep.sweep_run import RunPlace, SweepResult, carry_out
+from master.batch.sweep.sweep_run import ATTEMPTS, DIED, RunPlace, SweepResult, carry_out
 from master.batch.sweep.swept_systems import SweepRun
-from master.errors import MasterError
+from master.errors import MasterError, one_line
 from master.system.components import System
 
 #: Seconds within which a scheduler has to answer, and between looks at its workers.
@@ -45,8 +45,6 @@ _ALONE: Final = 10.0
 _SETTINGS: Final = {"distributed.worker.daemon": True, "distributed.deploy.lost-worker-timeout": "120s"}
 #: Packages whose versions workers must share with the master: what computes a figure, and what carries it.
 _PACKAGES: Final = ("openpanto", "numpy", "scipy", "numba", "fmpy", "pythonfmu", "distributed")
-#: How often a run is made whose worker dies.
-_ATTEMPTS: Final = 2
 _ADDRESS: Final = re.compile(r"(?:[a-z]+://)?(?:\[[0-9a-f:]+\]|[^\s/:\[\]]+):\d+")
 #: What cuts a connection.
 _GONE: Final = (OSError, TimeoutError, RuntimeError, AttributeError, CancelledError)
@@ -153,20 +151,25 @@ class DaskEngine:
                 dask.utils.parse_bytes(self.memory_limit)
             except ValueError as error:
                 raise MasterError(f"'{self.memory_limit}' is no size of memory, such as 2GB or 'auto'") from error
-        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        with (
-            LocalCluster(
+        with self._cluster() as cluster, Client(cluster) as client:
+            yield client, lambda: cluster.scale(self.jobs)
+
+    def _cluster(self) -> LocalCluster:
+        try:
+            return LocalCluster(
                 n_workers=self.jobs,
                 threads_per_worker=1,
                 processes=True,
                 memory_limit=self.memory_limit,
                 dashboard_address=None,
                 host="127.0.0.1",
-                env=environment,
-            ) as cluster,
-            Client(cluster) as client,
-        ):
-            yield client, lambda: cluster.scale(self.jobs)
+                env={**os.environ, "OMP_NUM_THREADS": "1"},
+            )
+        except (OSError, TimeoutError, RuntimeError) as error:  # one was ended as it began, or there is no room for it
+            causes = error, error.__cause__, error.__context__
+            why = next((str(c) for c in reversed(causes) if c is not None and str(c)), type(error).__name__)
+            text = f"the {self.jobs} processes of --jobs cannot be started ({one_line(why)}); start the sweep again"
+            raise MasterError(text) from error
 
 
 @contextmanager
@@ -345,12 +348,12 @@ class _Crew:
         run, worker = errand.run, errand.worker.removeprefix("tcp://")
         del self._errands[run.key]
         self._deaths[run.key] += 1
-        if self._deaths[run.key] < _ATTEMPTS:
+        if self._deaths[run.key] < ATTEMPTS:
             self._engine.tell(f"worker {worker} died in run {run.number}; the run is made once more")
             waiting.append(run)
             return
         self._engine.tell(f"worker {worker} died in run {run.number} too; the run has failed")
-        yield SweepResult(run.key, reason=f"the worker's process died in this run, {_ATTEMPTS} times", worker=worker)
+        yield SweepResult(run.key, reason=DIED, worker=worker)
 
     def _arrived(self, waiting: list[SweepRun]) -> Iterator[SweepResult]:
         """Wait a little and yield what has come."""

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from scipy import stats
-from scipy.stats import qmc
 
 from master.arrays import FloatArray
 from master.batch.sweep.swept_parameter import ParameterReader, SweptParameter
@@ -43,9 +41,15 @@ class Distribution:
         numbers = ", ".join(f"{a:.12g}" for a in self.arguments)
         return f"{self.kind}({numbers}{' ' + self.parameter.unit if self.parameter.unit else ''})"
 
+    @property
+    def is_bounded(self) -> bool:
+        """Whether it has a least and a greatest value."""
+        return _KINDS[self.kind].is_bounded
+
     def quantile(self, share: FloatArray) -> FloatArray:
         """Return the values below which these shares of all values lie."""
-        return _KINDS[self.kind].quantile(np.clip(share, _LEAST, 1.0 - _LEAST), *self.arguments)
+        with np.errstate(all="ignore"):  # what is not finite is refused with its run
+            return _KINDS[self.kind].quantile(np.clip(share, _LEAST, 1.0 - _LEAST), *self.arguments)
 
 
 @dataclass(frozen=True)
@@ -56,19 +60,30 @@ class _Kind:
     widths: tuple[bool, ...]
     problem: Callable[..., str]
     quantile: Callable[..., FloatArray]
+    is_bounded: bool = True
+
+
+def _normal_quantile(share: FloatArray, mean: float, sd: float) -> FloatArray:
+    from scipy import stats  # here and below: it takes longer than all else that a command imports
+
+    return stats.norm.ppf(share, mean, sd)
 
 
 def _lognormal_quantile(share: FloatArray, mean: float, sd: float) -> FloatArray:
     """Return quantiles of the lognormal distribution whose own mean and standard deviation these are."""
     variance = np.log1p((sd / mean) ** 2)
-    return np.exp(stats.norm.ppf(share, np.log(mean) - 0.5 * variance, np.sqrt(variance)))
+    return np.exp(_normal_quantile(share, np.log(mean) - 0.5 * variance, np.sqrt(variance)))
 
 
 def _truncated_quantile(share: FloatArray, mean: float, sd: float, low: float, high: float) -> FloatArray:
+    from scipy import stats
+
     return stats.truncnorm.ppf(share, (low - mean) / sd, (high - mean) / sd, mean, sd)
 
 
 def _triangular_quantile(share: FloatArray, low: float, mode: float, high: float) -> FloatArray:
+    from scipy import stats
+
     return stats.triang.ppf(share, (mode - low) / (high - low), low, high - low)
 
 
@@ -89,9 +104,9 @@ def _truncated_problem(mean: float, sd: float, low: float, high: float) -> str:
 
 
 _KINDS: Final = {
-    "normal": _Kind("mean, sd", (False, True), _width_problem, stats.norm.ppf),
+    "normal": _Kind("mean, sd", (False, True), _width_problem, _normal_quantile, is_bounded=False),
     "uniform": _Kind("low, high", (False, False), _order_problem, lambda share, low, high: low + share * (high - low)),
-    "lognormal": _Kind("mean, sd", (False, True), _lognormal_problem, _lognormal_quantile),
+    "lognormal": _Kind("mean, sd", (False, True), _lognormal_problem, _lognormal_quantile, is_bounded=False),
     "truncnormal": _Kind("mean, sd, low, high", (False, True, False, False), _truncated_problem, _truncated_quantile),
     "triangular": _Kind("low, mode, high", (False, False, False), _order_problem, _triangular_quantile),
 }
@@ -119,6 +134,13 @@ def read_distribution(reader: ParameterReader, text: str) -> Distribution:
     return Distribution(parameter, name, arguments)
 
 
+def check_power_of_two(count: int) -> None:
+    """Raise a `RequestError` if a Sobol sequence of this length would not be balanced."""
+    if count & (count - 1):
+        near = 1 << max(0, round(np.log2(count)))
+        raise RequestError(f"a Sobol sequence has a power of two of samples, not {count}; take {near}")
+
+
 def draw(distributions: Sequence[Distribution], count: int, seed: int, method: Method = "lhs") -> FloatArray:
     """Return samples of independent parameters, shape (count, n_parameters), the same for the same seed.
 
@@ -136,11 +158,11 @@ def draw(distributions: Sequence[Distribution], count: int, seed: int, method: M
     RequestError
         If a Sobol sequence of this length would not be balanced.
     """
+    from scipy.stats import qmc
+
     generator = np.random.default_rng(seed)
     if method == "sobol":
-        if count & (count - 1):
-            near = 1 << max(0, round(np.log2(count)))
-            raise RequestError(f"a Sobol sequence has a power of two of samples, not {count}; take {near}")
+        check_power_of_two(count)
         shares = qmc.Sobol(len(distributions), seed=generator).random(count)
     else:
         shares = qmc.LatinHypercube(len(distributions), seed=generator).random(count)

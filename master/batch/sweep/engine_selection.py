@@ -1,9 +1,10 @@
-"""Which engine makes the runs of a sweep: this process, or the workers of Dask if they are asked for."""
+"""Which engine makes the runs of a sweep: one process beside this one, or the workers of Dask if they are asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from master.batch.sweep.child_engine import ChildEngine, can_start_processes
 from master.batch.sweep.lanes_engine import LanesEngine
 from master.batch.sweep.sweep_engines import HereEngine, SweepEngine
 from master.batch.sweep.sweep_plan import SweepRequest
@@ -45,7 +46,7 @@ def engine_of(
             raise UsageError("--engine lanes makes its runs in one process: leave --jobs and --scheduler out")
         return LanesEngine(request.check)
     if jobs is None and scheduler is None:
-        return HereEngine()
+        return ChildEngine(tell, renew_after) if can_start_processes() else HereEngine()
     if jobs is not None and scheduler is not None:
         raise UsageError("--jobs starts processes of this computer, --scheduler uses those of a cluster: give one")
     try:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
@@ -33,7 +31,8 @@ class SweepJournal:
         whole = data[: data.rfind(b"\n") + 1]  # a process that was killed may have left half a line
         self.found: dict[str, SweepResult] = {}
         for line in whole.splitlines():
-            if (result := _result(line)) is not None:
+            # A damaged line costs its run: it is made again.
+            if (result := SweepResult.of_line(line)) is not None:
                 self.found[result.key] = result
         self._size = len(whole)
         self._file: AppendOnlyFile | None = None  # a folder that holds nothing but a journal is not yet a sweep's
@@ -43,19 +42,10 @@ class SweepJournal:
         self.found[result.key] = result
         if self._file is None:
             self._file = AppendOnlyFile(self._path, self._size)
-        self._file.write((json.dumps(asdict(result)) + "\n").encode())
+        self._file.write(result.line())
 
     def close(self) -> None:
         """Wait until all is on the disk."""
         if self._file is not None:
             self._file.sync()
             self._file.close()
-
-
-def _result(line: bytes) -> SweepResult | None:
-    """Return the result in a line, None if it is damaged: its run is then made again."""
-    try:
-        data = json.loads(line)
-        return SweepResult(**{**data, "rows": tuple(data["rows"])})
-    except (ValueError, TypeError, KeyError, RecursionError):
-        return None

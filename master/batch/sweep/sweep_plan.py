@@ -15,13 +15,14 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
+from master.batch.sweep.sensitivity import SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
-from master.errors import MasterError, RequestError
+from master.errors import MasterError, RequestError, said
 from master.system.components import System
 
 Keep = Literal["all", "thinned", "figures", "failed"]
@@ -31,10 +32,33 @@ MOST_RUNS: Final = 100_000
 #: Column of a table that names its rows.
 VARIANT: Final = "variant"
 STUDY: Final = "study.toml"
+_FAULT: Final = re.compile(r"fault\[\d+\]\.active", re.ASCII)
 _HEAD: Final = re.compile(r"\s*(.+?)\s*(?:\[([^\]]*)\])?\s*")
 
 
-class SweepRequest(BaseModel):
+class PlainRequest(BaseModel):
+    """What a batch is asked for, read from plain data; unknown names and impossible values are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any], origin: str = "") -> Self:
+        """Return the request in plain data.
+
+        Raises
+        ------
+        RequestError
+            Naming the first thing that is wrong, and ``origin``.
+        """
+        try:
+            return cls.model_validate(dict(data))
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise RequestError(": ".join(filter(None, (origin, where, first["msg"])))) from error
+
+
+class SweepRequest(PlainRequest):
     """What a sweep is asked for: the options of the command, the table ``[sweep]`` of ``study.toml``.
 
     Attributes
@@ -48,8 +72,14 @@ class SweepRequest(BaseModel):
     seed : int
     method : str
         How they are drawn: ``lhs`` or ``sobol``.
+    sensitivity : str, optional
+        ``sobol`` or ``morris``: ``samples`` is the number of blocks of runs (`sensitivity`) from which it is found how
+        every figure depends on every parameter.
     table : Path, optional
         CSV file with a row for each run and a column for each parameter.
+    faults : tuple of int
+        Spans whose droppers break one after the other; the first run has none broken. The scenario must have been
+        opened with them.
     stop : float, optional
         Stop time of all runs [s]; it follows the speed if not given.
     static_force, mean_force : str, optional
@@ -66,14 +96,14 @@ class SweepRequest(BaseModel):
         How many runs ``lanes`` makes as FMUs as well, to compare.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     over: dict[str, str] = Field(default_factory=dict)
     vary: dict[str, str] = Field(default_factory=dict)
     samples: int | None = Field(None, gt=0, le=MOST_RUNS)
     seed: int = Field(1, ge=0)
     method: Method = "lhs"
+    sensitivity: SensitivityMethod | None = None
     table: Path | None = None
+    faults: tuple[int, ...] = ()
     stop: float | None = None
     static_force: str | None = None
     mean_force: str | None = None
@@ -81,22 +111,6 @@ class SweepRequest(BaseModel):
     keep: Keep = "figures"
     engine: Engine = "fmu"
     check: int = Field(1, ge=0)
-
-    @classmethod
-    def read(cls, data: Mapping[str, Any], origin: str = "") -> SweepRequest:
-        """Return the request in plain data.
-
-        Raises
-        ------
-        RequestError
-            Naming the first thing that is wrong, and ``origin``.
-        """
-        try:
-            return cls.model_validate(dict(data))
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise RequestError(": ".join(filter(None, (origin, where, first["msg"])))) from error
 
 
 def stored_request(folder: Path) -> dict[str, Any]:
@@ -168,24 +182,44 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     if bool(request.vary) != (request.samples is not None):
         missing = "--samples N: how many" if request.vary else "--vary NAME=DISTRIBUTION: of what"
         raise RequestError(f"samples need {missing}")
+    _check_sensitivity(request)
     table, names = (None, ()) if request.table is None else _read_table(system, request.table)
+    if request.faults:
+        if table is not None:
+            raise RequestError("--faults and --from-csv both list runs: leave one out")
+        table, names = broken_in_turn(system)
     grid = [_listed(system, name, text) for name, text in request.over.items()]
     distributions = tuple(read_distribution(ParameterReader(system, n), text) for n, text in request.vary.items())
     sizes = [len(part.rows) for part in (table, *grid) if part is not None]
-    if (count := math.prod(sizes) * (request.samples or 1)) > MOST_RUNS:
+    each_sample = block_size(request.sensitivity, len(distributions)) if request.sensitivity else 1
+    if (count := math.prod(sizes) * (request.samples or 1) * each_sample) > MOST_RUNS:
         raise RequestError(f"that makes {count} runs, more than {MOST_RUNS}")
     parts = [part for part in (table, *grid) if part is not None]
     parts += [_sample(distributions, request)] if distributions else []
     if not parts:
         raise RequestError("nothing is varied: give --over, --vary with --samples, or --from-csv")
     parameters = tuple(p for part in parts for p in part.parameters)
-    _check_distinct(parameters)
+    check_distinct(parameters)
     points = tuple(tuple(itertools.chain(*rows)) for rows in itertools.product(*(part.rows for part in parts)))
     each = len(points) // len(names) if names else 0
     return SweepPlan(parameters, points, distributions, tuple(name for name in names for _ in range(each)))
 
 
-def _check_distinct(parameters: Sequence[SweptParameter]) -> None:
+def _check_sensitivity(request: SweepRequest) -> None:
+    """Refuse what does not go together with a design for sensitivity indices."""
+    if request.sensitivity is None:
+        return
+    if not request.vary:
+        raise RequestError("--sensitivity needs --vary NAME=DISTRIBUTION, of what, and --samples N, how many blocks")
+    if request.over or request.table is not None or request.faults:
+        text = "leave out --over, --from-csv and --faults"
+        raise RequestError(f"--sensitivity looks at what --vary samples, alone: {text}")
+    if "method" in request.model_fields_set:
+        raise RequestError("--sensitivity has samples of its own: leave out --method")
+
+
+def check_distinct(parameters: Sequence[SweptParameter]) -> None:
+    """Raise a `RequestError` if a parameter is varied twice."""
     names = [name for p in parameters for name in (p.targets or (p.name,))]
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
@@ -198,23 +232,28 @@ def _listed(system: System, name: str, text: str) -> _Part:
 
 
 def _sample(distributions: Sequence[Distribution], request: SweepRequest) -> _Part:
-    values = draw(distributions, request.samples or 0, request.seed, request.method)
+    count, seed = request.samples or 0, request.seed
+    if request.sensitivity is not None:
+        values = designed(distributions, count, seed, request.sensitivity)
+    else:
+        values = draw(distributions, count, seed, request.method)
     return _Part(tuple(d.parameter for d in distributions), [tuple(map(float, row)) for row in values])
 
 
 def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
     """Return the values in a CSV file and the names of its rows."""
-    try:
-        rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise MasterError(f"{path} cannot be read: {why}") from error
-    if len(rows) < 2:
+    lines = _read_lines(path)
+    if len(lines) < 2:
         raise RequestError(f"{path} has no row under its head")
-    heads = rows[0]
-    for line, row in enumerate(rows[1:], 2):
+    heads = lines[0][1]
+    if len(heads) == 1 and ";" in heads[0]:
+        raise RequestError(
+            f"{path}: its cells are separated by semicolons; separate them by commas, decimals by points"
+        )
+    for number, row in lines[1:]:
         if len(row) != len(heads):
-            raise RequestError(f"{path}, row {line}: has {len(row)} cells, the head has {len(heads)}")
+            raise RequestError(f"{path}, line {number}: has {len(row)} cells, the head has {len(heads)}")
+    rows = [row for _, row in lines]
     columns = {head.strip(): [cell.strip() for cell in cells] for head, *cells in zip(*rows, strict=True)}
     if len(columns) < len(heads):
         raise RequestError(f"{path}: a column appears more than once")
@@ -227,6 +266,35 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
         raise RequestError(f"{path}: {error}") from error
     values = list(zip(*(cells for _, cells in read), strict=True))
     return _Part(tuple(p for p, _ in read), values), names or tuple(map(str, range(1, len(rows))))
+
+
+def broken_in_turn(system: System) -> tuple[_Part, tuple[str, ...]]:
+    """Return runs in which every fault that is not active becomes so in turn, the first without, and their names."""
+    found = [
+        (f"{c.name}.{v.name}", v.description)
+        for c in system.components
+        for v in c.fmu.variables.values()
+        if _FAULT.fullmatch(v.name) and float(v.start or 0.0) == 0.0
+    ]
+    if not found:
+        raise RequestError("--faults: no component is a line FMU of ours, Catenary_NAME.fmu, that could list faults")
+    count = len(found)
+    cells = [["1" if row == k + 1 else "0" for row in range(count + 1)] for k in range(count)]
+    read = [_column(system, name, column) for (name, _), column in zip(found, cells, strict=True)]
+    values = list(zip(*(column for _, column in read), strict=True))
+    return _Part(tuple(p for p, _ in read), values), ("healthy", *(name for name, _ in found))
+
+
+def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the rows of a CSV file that are not empty, each with the number of its last line."""
+    try:
+        reader = csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")))
+        return [(reader.line_num, row) for row in reader if any(row)]
+    except UnicodeDecodeError as error:
+        raise RequestError(f"{path} is not text in UTF-8 (byte {error.start}); save it as CSV in UTF-8") from error
+    except (OSError, csv.Error) as error:
+        why = said(error) if isinstance(error, OSError) else error
+        raise MasterError(f"{path} cannot be read: {why}") from error
 
 
 def _column(system: System, head: str, cells: Sequence[str]) -> tuple[SweptParameter, tuple[SweptValue | None, ...]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import json
 import math
 import os
 import shutil
@@ -11,7 +13,7 @@ import time
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -23,20 +25,24 @@ from master.errors import InterruptedRunError, MasterError, RunError, one_line
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_positions import leading_first
 from master.evaluation.output_figures import output_figures
-from master.results.results_folder import FORCES, GEOMETRY, SUMMARY
+from master.results.results_folder import FORCES, GEOMETRY, SUMMARY, WORK
 from master.results.run_results import Results
 from master.results.run_summary import peak_memory
-from master.run_session import run
+from master.run_session import RunOptions, run
 from master.system.components import System
 from master.system.pantograph_motion import pantographs, parameter_value
 
 #: What is in a cell of the table.
 Cell = float | str | None
 Row = Mapping[str, Cell]
+#: Figures of a recorded output, in runs without a pantograph.
+OUTPUT_KINDS: Final = ("end", "minimum", "maximum", "mean")
 #: Files of a run that stay if it is thinned.
 _THINNED: Final = (SUMMARY, GEOMETRY, FORCES)
-#: How the folder begins that a run is made in, until it is complete.
-WORK: Final = ".work-"
+#: How often a run is made whose process dies.
+ATTEMPTS: Final = 2
+#: Why a run has failed that no process survives: the same words wherever it was made.
+DIED: Final = f"the worker's process died in this run, {ATTEMPTS} times"
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,19 @@ class SweepResult:
         """Whether the run has failed."""
         return bool(self.reason)
 
+    def line(self) -> bytes:
+        """Return the result as a line of the journal."""
+        return (json.dumps(asdict(self)) + "\n").encode()
+
+    @classmethod
+    def of_line(cls, line: bytes) -> SweepResult | None:
+        """Return the result in a line, None if it is damaged."""
+        try:
+            data = json.loads(line)
+            return cls(**{**data, "rows": tuple(data["rows"])})
+        except (ValueError, TypeError, KeyError, RecursionError):
+            return None
+
 
 def carry_out(base: System, wanted: SweepRun, place: RunPlace) -> SweepResult:
     """Make a run and return its figures; one that fails is a result too.
@@ -104,10 +123,13 @@ def carry_out(base: System, wanted: SweepRun, place: RunPlace) -> SweepResult:
     began = time.perf_counter()
     stepping, reason = 0.0, ""
     rows: tuple[Row, ...] = ()
+    if wanted.is_rehearsal:
+        place = replace(place, keep="figures")
     with _working_folder(place) as folder:
         try:
             system = _calibrated(wanted.system(base), wanted, folder)
-            done = run(system, folder / "run")
+            # All runs have the same ones: only a folder that stays whole has a use for them.
+            done = run(system, folder / "run", (), RunOptions(keep_definitions=place.keep in ("all", "failed")))
             stepping = float(done.summary["performance"]["wall_time"])
             rows = tuple(figure_rows(done, system))
             _kept(folder / "run", place, wanted.key)
@@ -117,6 +139,8 @@ def carry_out(base: System, wanted: SweepRun, place: RunPlace) -> SweepResult:
             rows, reason = (), reason_of(error)
             with suppress(OSError):
                 _kept(folder / "run", place, wanted.key, failed=True)
+    # An FMU in Python leaves its model in cycles of references: before Python takes them for many, they are gigabytes.
+    gc.collect()
     return SweepResult(wanted.key, rows, reason, time.perf_counter() - began, stepping, peak_memory())
 
 
@@ -176,7 +200,8 @@ def _calibrated(system: System, wanted: SweepRun, folder: Path) -> System:
         )
 
     def means(values: tuple[float, ...]) -> tuple[float, ...]:
-        found = {a.contact.pantograph: a.quality.mean for a in run(with_forces(values), folder / "trial").assessments()}
+        trial = run(with_forces(values), folder / "trial", (), RunOptions(keep_definitions=False))
+        found = {a.contact.pantograph: a.quality.mean for a in trial.assessments()}
         if missing := [name for name in names if name not in found]:
             raise MasterError(f"{', '.join(missing)} has no contact in the interval of interest")
         return tuple(found[name] for name in names)
@@ -191,8 +216,7 @@ def figure_rows(done: Results, system: System) -> Iterator[Row]:
         yield _row(found[contact], system)
     if not done.contacts:
         figures = output_figures(done.recordings)
-        kinds = ("end", "minimum", "maximum", "mean")
-        yield {f"{f.name} {kind} [{f.unit or '1'}]": float(getattr(f, kind)) for f in figures for kind in kinds}
+        yield {f"{f.name} {kind} [{f.unit or '1'}]": float(getattr(f, kind)) for f in figures for kind in OUTPUT_KINDS}
     elif not found:
         yield {"verdict": done.not_judged or "nothing to judge"}
 

@@ -3,35 +3,41 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from master.batch.batch_session import BatchFiles, BatchState, run_tasks
+from master.batch.batch_session import BatchState, PacedFiles, run_tasks
+from master.batch.sweep.held_fmus import held_fmus
+from master.batch.sweep.pages import sweep_page
+from master.batch.sweep.pages.sweep_view import read_view, view_of
+from master.batch.sweep.sensitivity import SensitivityIndices, described
+from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, sensitivity_data, sensitivity_of
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
-from master.batch.sweep.sweep_run import WORK, Row, RunPlace, SweepResult
+from master.batch.sweep.sweep_run import Row, RunPlace, SweepResult
 from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
-from master.batch.sweep.swept_systems import SweepRun, make_runs
-from master.errors import InterruptedRunError, MasterError
+from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
+from master.errors import InterruptedRunError
+from master.report.report_files import write_charts
 from master.results import results_folder
-from master.run_session import run as run_system
 from master.system.components import System
 
 JSON: Final = "sweep.json"
 CSV: Final = "sweep.csv"
 PARQUET: Final = "sweep.parquet"
+PAGE: Final = "sweep.html"
+GENERATOR: Final = "openpanto sweep"
+SENSITIVITY_CSV: Final = "sensitivity.csv"
+SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
-#: Least time between two writings of the table [s], and most of the time that may be spent on writing.
-_LEAST_PAUSE: Final = 1.0
-_SHARE: Final = 0.05
 #: Steps of the rehearsal that the estimate of time comes from.
 _REHEARSED: Final = 100
 
@@ -73,6 +79,8 @@ class SweepOutcome(BatchState):
         All of the plan.
     found : dict
         What has become of runs, by key.
+    setting : dict
+        What the page needs to know of the scenario, as in ``sweep.json``.
     checks : sequence of dict
         Runs that were made in two ways, and by how much these differ; see `SweepEngine`.
     """
@@ -82,6 +90,7 @@ class SweepOutcome(BatchState):
     plan: SweepPlan
     runs: tuple[SweepRun, ...]
     found: Mapping[str, SweepResult] = field(default_factory=dict)
+    setting: Mapping[str, Any] = field(default_factory=dict)
     checks: Sequence[Mapping[str, Any]] = ()
 
     @property
@@ -99,6 +108,11 @@ class SweepOutcome(BatchState):
         """The table so far."""
         return table_rows(self.runs, self.found)
 
+    @cached_property
+    def sensitivity(self) -> tuple[SensitivityIndices, ...]:
+        """Indices of every figure that varies; none if they were not asked for, or as long as runs are missing."""
+        return sensitivity_of(self.request, self.plan, self.runs, self.found)
+
 
 def as_data(outcome: SweepOutcome) -> dict[str, Any]:
     """Return the contents of ``sweep.json``."""
@@ -109,6 +123,7 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
         "status": outcome.status,
         "date": outcome.date,
         "versions": dict(outcome.versions),
+        "setting": dict(outcome.setting),
         "request": outcome.request.model_dump(mode="json", exclude_none=True),
         "parameters": [
             {"name": p.name, "unit": p.unit, "column": p.title, "targets": p.targets, "sampled": sampled.get(p.name)}
@@ -121,23 +136,21 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
     }
 
 
-class SweepFiles(BatchFiles[SweepOutcome]):
-    """The files of a sweep: written after every run, but not so often that writing takes more than a share of time."""
+class SweepFiles(PacedFiles[SweepOutcome]):
+    """The files of a sweep."""
 
     def __init__(self) -> None:
-        super().__init__("sweep", "openpanto sweep", JSON, as_data, {CSV: lambda outcome: as_csv(outcome.rows)})
-        self.__dict__["_due"] = 0.0
+        super().__init__("sweep", GENERATOR, JSON, as_data, {CSV: lambda outcome: as_csv(outcome.rows)})
 
-    def write(self, state: SweepOutcome, folder: Path) -> None:
-        """Write the files of a state, unless they were written just now and more is to come."""
-        began = time.monotonic()
-        if state.status == "running" and began < self.__dict__["_due"]:
-            return
-        super().write(state, folder)
+    def write_now(self, state: SweepOutcome, folder: Path) -> None:
+        """Write the files of a state; the page at the end."""
+        super().write_now(state, folder)
         if has_parquet() and state.found:
             write_parquet(state.rows, folder / PARQUET)
-        now = time.monotonic()
-        self.__dict__["_due"] = now + max(_LEAST_PAUSE, (now - began) / _SHARE)
+        if state.status != "running":
+            indices = sensitivity_data(state.sensitivity)["indices"]
+            view = view_of(as_data(state), state.rows, folder, indices)
+            results_folder.write_text(folder / PAGE, sweep_page.page(view))
 
 
 @dataclass(frozen=True)
@@ -166,7 +179,15 @@ class PreparedSweep:
         """
         plan = make_plan(base, request)
         runs = make_runs(base, plan, request)
-        return cls(base, SweepOutcome(scenario=base.name, request=request, plan=plan, runs=runs))
+        return cls(base, SweepOutcome(base.name, request, plan, runs, setting=scenario_setting(base, plan)))
+
+    @property
+    def announced(self) -> str:
+        """Why there are as many runs as there are, empty if that is plain."""
+        request, plan = self.outcome.request, self.outcome.plan
+        if request.sensitivity is None:
+            return ""
+        return described(request.sensitivity, len(plan.parameters), request.samples or 0)
 
 
 def sweep(
@@ -208,7 +229,7 @@ def sweep(
     found: dict[str, SweepResult] = {}
     try:
         with results_folder.taken_over(folder, JSON, files.generator, files.kind):
-            _remove_leftovers(place)
+            _remove_leftovers(folder)
             with closing(SweepJournal(folder)) as journal:
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
                 found |= {r.key: old[r.key] for r in state.runs if r.key in old}
@@ -220,18 +241,49 @@ def sweep(
                     found[result.key] = result  # a copy each time would be long for many runs
                     return so_far
 
-                with chosen.opened(prepared.base, place) as make_runs_of:
-                    tell(_announcement(prepared.base, missing, len(state.runs), chosen))
+                if why := prepared.announced:
+                    tell(why)
+                with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
+                    tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
-                    return run_tasks(state, results, finish, files, folder)
+                    ended = run_tasks(state, results, finish, files, folder)
+                _write_sensitivity(ended, folder, tell)
+                return ended
     except (InterruptedRunError, KeyboardInterrupt) as error:
         done = f"{len([r for r in state.runs if r.key in found])} of {len(state.runs)} runs are finished"
         raise InterruptedRunError(f"interrupted. {done} and in {folder}; the same command makes the others") from error
 
 
-def _remove_leftovers(place: RunPlace) -> None:
-    for path in place.folder.glob(f"{WORK}*"):
-        shutil.rmtree(path, ignore_errors=True)
+def write_report(folder: Path, formats: Collection[str] = ()) -> list[Path]:
+    """Write the page of the sweep in a folder again, and its charts as files in some formats; return their paths.
+
+    Raises
+    ------
+    MasterError
+        If its files cannot be read.
+    """
+    view = read_view(folder / JSON, folder / CSV, folder / SENSITIVITY_JSON)
+    results_folder.write_text(folder / PAGE, sweep_page.page(view))
+    return [folder / PAGE, *write_charts(sweep_page.file_charts(view), folder, formats)]
+
+
+def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], None]) -> None:
+    """Write the indices of a finished sweep; those of an earlier one are not left beside its table."""
+    found = done.sensitivity
+    if not found:
+        for name in (SENSITIVITY_CSV, SENSITIVITY_JSON):
+            (folder / name).unlink(missing_ok=True)
+    else:
+        results_folder.write_text(folder / SENSITIVITY_CSV, sensitivity_csv(found))
+        results_folder.write_json(folder / SENSITIVITY_JSON, sensitivity_data(found))
+    if text := failed_note(done.request, found, len(done.failures)):
+        tell(text)
+
+
+def _remove_leftovers(folder: Path) -> None:
+    for place in (folder, folder / RUNS):
+        for path in place.glob(f"{results_folder.WORK}*"):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _is_there(result: SweepResult, place: RunPlace) -> bool:
@@ -258,39 +310,30 @@ def _shown(
         show(SweepProgress(done, failed, min(engine.width, open_runs), total, left))
 
 
-def _announcement(base: System, missing: Sequence[SweepRun], total: int, engine: SweepEngine) -> str:
+def _announcement(make: MakeRuns, start: float, missing: Sequence[SweepRun], total: int, engine: SweepEngine) -> str:
     """Return how many runs there are to make, and how long that may take."""
     if not missing:
         return f"{total} runs, all finished"
     begun = f"{total} runs" if len(missing) == total else f"{total} runs, {len(missing)} of them missing"
     if any(r.target is not None for r in missing):
         return f"{begun}; the static force of each is found in several trials"
-    width = min(engine.width, len(missing))
     if not engine.is_rehearsed:
-        return f"{begun}, {width} at a time"
-    try:
-        each = _rehearsed(base, missing)
-    except InterruptedRunError:
-        raise
-    except MasterError:  # the run itself will say so
+        return f"{begun}, {min(engine.width, len(missing))} at a time"
+    each = _rehearsed(make, start, missing)
+    if each is None:  # the runs themselves will say why
         return begun
-    about = duration(each * -(-len(missing) // width))
-    return f"{begun}, {width} at a time, about {about}"
+    about = duration(each * -(-len(missing) // engine.width))
+    return f"{begun}, {min(engine.width, len(missing))} at a time, about {about}"
 
 
-def _rehearsed(base: System, missing: Sequence[SweepRun]) -> float:
-    """Return about how long a run takes on average [s]: from the first steps of the middle one."""
-    middle = missing[len(missing) // 2]
-    system = middle.system(base)
-    steps = min(system.step_count, _REHEARSED)
-    short = replace(system, stop=system.start + steps * system.step, may_stop_early=True)
-    with tempfile.TemporaryDirectory(prefix="sweep-") as name:
-        began = time.perf_counter()
-        done = run_system(short, Path(name) / "rehearsal")
-        whole = time.perf_counter() - began
-    stepping = float(done.summary["performance"]["wall_time"])
-    mean = sum((r.stop - base.start) / r.step for r in missing) / len(missing)
-    return whole - stepping + stepping / steps * mean
+def _rehearsed(make: MakeRuns, start: float, missing: Sequence[SweepRun]) -> float | None:
+    """Return about how long a run takes on average [s], from the first steps of the middle one; None if they fail."""
+    short = missing[len(missing) // 2].rehearsal(start, _REHEARSED)
+    done = next(iter(make([short])))
+    if not done.stepping:
+        return None
+    mean = sum((r.stop - start) / r.step for r in missing) / len(missing)
+    return done.seconds - done.stepping + done.stepping * mean * short.step / (short.stop - start)
 
 
 def duration(seconds: float) -> str:

@@ -11,7 +11,7 @@ from master.errors import RequestError, hint
 from master.scenario.overrides import find_parameter
 from master.ssp.ssp_units import COMMON, Conversion, Unit, conversion, split_quantity
 from master.system.components import Fmu, System, Variable
-from master.system.pantograph_motion import pantographs
+from master.system.pantograph_motion import pantographs, parameter_value
 
 #: A value in the unit of its parameter, or the text of one that is no number.
 SweptValue = float | str
@@ -70,6 +70,7 @@ class ParameterReader:
 
     def __init__(self, system: System, name: str, unit: str = "") -> None:
         self.name = name
+        self._system = system
         self._found = () if name in OF_THE_RUN else _found(system, name)
         self._unit = unit or (_USUAL.get(name, "") if self._declared else "")
 
@@ -84,16 +85,31 @@ class ParameterReader:
         """
         parts = [part.strip() for part in text.split(",")]
         if not self._is_real:
-            return self.parameter(""), tuple(parts)
+            values = [v for part in parts for v in (self._whole_numbers(part) if self._is_whole else [part])]
+            self._check_distinct(values, text)
+            return self.parameter(""), tuple(values)
         pieces = [[self._number(piece) for piece in part.split(":")] for part in parts]
         unit = self._common_unit([quantity for part in pieces for quantity in part], text)
-        values: list[float] = []
+        numbers_found: list[float] = []
         for part, written in zip(pieces, parts, strict=True):
             numbers = [self._converted(*quantity, unit) for quantity in part]
-            values += numbers if len(numbers) == 1 else _range(numbers, f"{self.name}={written}")
+            numbers_found += numbers if len(numbers) == 1 else _range(numbers, f"{self.name}={written}")
+        self._check_distinct(numbers_found, text)
+        return self.parameter(unit), tuple(numbers_found)
+
+    def _whole_numbers(self, part: str) -> list[SweptValue]:
+        """Return the values of FIRST:LAST:STEP in whole numbers; any other text as it is."""
+        try:
+            numbers = [int(piece) for piece in part.split(":")]
+        except ValueError:
+            return [part]
+        if len(numbers) == 1:
+            return [part]
+        return [str(int(v)) for v in _range(numbers, f"{self.name}={part}")]
+
+    def _check_distinct(self, values: Sequence[SweptValue], text: str) -> None:
         if len(set(values)) < len(values):
             raise RequestError(f"{self.name}={text}: a value appears more than once")
-        return self.parameter(unit), tuple(values)
 
     def cells(self, texts: Sequence[str]) -> tuple[SweptParameter, tuple[SweptValue | None, ...]]:
         """Return the values in a table's column, None where a cell is empty."""
@@ -110,7 +126,9 @@ class ParameterReader:
     def arguments(self, text: str, widths: Sequence[bool]) -> tuple[SweptParameter, tuple[float, ...]]:
         """Return the arguments of a distribution; a width, such as a standard deviation, has no offset of its unit."""
         if not self._is_real:
-            raise RequestError(f"{self.name} takes no real numbers, so it has no distribution; list values with --over")
+            raise RequestError(
+                f"{self.name} takes no real numbers, so it has neither distribution nor bounds; list values with --over"
+            )
         parts = text.split(",") if text.strip() else []
         if len(parts) != len(widths):
             raise RequestError(f"{self.name}: {len(widths)} numbers are needed, '{text}' has {len(parts)}")
@@ -119,9 +137,21 @@ class ParameterReader:
         values = zip(quantities, widths, strict=True)
         return self.parameter(unit), tuple(self._converted(*q, unit, is_width=width) for q, width in values)
 
+    def present(self, unit: str) -> float | None:
+        """Return the value that the scenario has, in this unit; None if it has none. Of several the first counts."""
+        if not self._found:
+            return self._system.stop if self.name == "stop" else self._system.step
+        full, variable, _ = self._found[0]
+        value = parameter_value(self._system.component(full.partition(".")[0]), variable.name)
+        return None if value is None else self._converted(value, self._declared, unit)
+
     @property
     def _is_real(self) -> bool:
         return all(variable.type == "Real" for _, variable, _ in self._found)
+
+    @property
+    def _is_whole(self) -> bool:
+        return all(variable.type == "Integer" for _, variable, _ in self._found) and bool(self._found)
 
     @property
     def _declared(self) -> str:

@@ -18,6 +18,7 @@ from master.scenario.overrides import with_values
 from master.ssp.ssp_units import COMMON, conversion
 from master.ssp.ssv import Value
 from master.system.components import Component, System, without
+from master.system.contacts import find_contacts
 from master.system.pantograph_motion import pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
@@ -88,6 +89,8 @@ class SweepRun:
         The swept values by the titles of their columns.
     variant : str
         Name of its row, if the values come from a table.
+    is_rehearsal : bool
+        Whether it is only to show how long others take: it may stop before it can be judged.
     """
 
     number: int
@@ -100,12 +103,19 @@ class SweepRun:
     tolerance: float = 0.2
     inputs: Mapping[str, SweptValue | None] = field(default_factory=dict)
     variant: str = ""
+    is_rehearsal: bool = False
 
     def system(self, base: System) -> System:
         """Return the system of the run, from the scenario's own."""
         changed = tuple(replace(c, parameters=dict(self.parameters.get(c.name, c.parameters))) for c in base.components)
         whole = replace(base, name=f"{base.name}: run {self.number}", components=changed, stop=self.stop)
-        return without(replace(whole, step=self.step), self.absent)
+        changed_whole = replace(whole, step=self.step, may_stop_early=whole.may_stop_early or self.is_rehearsal)
+        return without(changed_whole, self.absent)
+
+    def rehearsal(self, start: float, steps: int) -> SweepRun:
+        """Return its first steps, as a run of its own that nothing is found for."""
+        stop = min(self.stop, start + steps * self.step)
+        return replace(self, key=f"rehearsal-{self.key}", stop=stop, target=None, is_rehearsal=True)
 
 
 def make_runs(base: System, plan: SweepPlan, request: SweepRequest) -> tuple[SweepRun, ...]:
@@ -140,6 +150,25 @@ def _runs(base: System, plan: SweepPlan, choices: _Choices) -> Iterator[SweepRun
             raise RequestError(f"run {number} ({_told(values)}): {problem}")
         variant = plan.variants[number - 1] if plan.variants else ""
         yield replace(run, key=_key(origin, run), variant=variant)
+
+
+def scenario_setting(base: System, plan: SweepPlan) -> dict[str, Any]:
+    """Return what the page of a sweep needs to know of its scenario, as plain data."""
+    settings = base.settings
+    limits = settings.limits.model_dump()
+    described = {
+        name: variable.description
+        for p in plan.parameters
+        for name in p.targets
+        if (variable := base.component(name.partition(".")[0]).fmu.variables[name.partition(".")[2]]).description
+    }
+    return {
+        "interval": [settings.interval.start, settings.interval.end],
+        "limits": {"supply": limits.pop("supply"), "own": limits},
+        "speeds": {c.name: v for c in pantographs(base) if (v := _speed(c)) is not None},
+        "contacts": {c.pantograph: c.prefix for c in reversed(find_contacts(base.connections))},
+        "places": described,
+    }
 
 
 @dataclass(frozen=True)

@@ -34,19 +34,24 @@ _PIECE: Final = 4096
 class Process:
     """A child process with a connection to it, its own folder for temporary files, and a thread for what it prints.
 
+    Parameters
+    ----------
+    module : str
+        What it runs, with the connection's file descriptor and the number of this process as arguments.
+
     Attributes
     ----------
     channel : Channel
         The master's end of the connection.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, module: str = "master.fmu.isolation") -> None:
         self._folder = tempfile.mkdtemp(prefix="isolated-")
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
                 # -P: nothing is imported from the working folder.
-                [sys.executable, "-P", "-m", "master.fmu.isolation", str(theirs.fileno()), str(os.getpid())],
+                [sys.executable, "-P", "-m", module, str(theirs.fileno()), str(os.getpid())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,

@@ -12,7 +12,7 @@ from typing import ClassVar, Final, Literal
 
 import numpy as np
 
-from master.arrays import FloatArray
+from master.arrays import BoolArray, FloatArray
 from master.report.charts.sample_packing import MOST_POINTS, kept_samples
 
 Dash = Literal["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"]
@@ -38,6 +38,8 @@ class Axis:
     is_logarithmic : bool
     ticks : tuple of float
         Positions of the numbers; left to the renderer if empty.
+    words : tuple of str
+        What stands there instead of the numbers.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Axis:
     limits: tuple[float, float] | None = None
     is_logarithmic: bool = False
     ticks: tuple[float, ...] = ()
+    words: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -88,6 +91,8 @@ class Curve:
         Whether all points are drawn, or only those that can be seen (`kept_samples`).
     most : int
         Largest number of points drawn, unless it is whole.
+    has_marks : bool
+        Whether its points are marked.
     """
 
     name: str
@@ -97,6 +102,7 @@ class Curve:
     is_shown: bool = True
     is_whole: bool = False
     most: int = MOST_POINTS
+    has_marks: bool = False
 
     @property
     def points(self) -> tuple[FloatArray, FloatArray]:
@@ -123,6 +129,10 @@ class Bars:
         In units of the abscissa.
     words : tuple of str
         Text that a page shows when a bar is pointed at, instead of its numbers.
+    interval : tuple of ndarray, optional
+        Low and high ends of an interval about each bar's end, drawn as a thin line.
+    is_lying : bool
+        Whether the bars lie: ``x`` is then along the ordinate and ``y`` along the abscissa.
     """
 
     name: str
@@ -131,6 +141,108 @@ class Bars:
     index: int = 0
     width: float | None = None
     words: tuple[str, ...] = ()
+    interval: tuple[FloatArray, FloatArray] | None = None
+    is_lying: bool = False
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """The area between two curves, shaded; interrupted where they are NaN.
+
+    Attributes
+    ----------
+    name : str
+        In the legend.
+    x, low, high : ndarray, shape (n,)
+    colour : str
+    """
+
+    name: str
+    x: FloatArray
+    low: FloatArray
+    high: FloatArray
+    colour: str
+    opacity: ClassVar = 0.22
+
+    @property
+    def outlines(self) -> list[tuple[FloatArray, FloatArray]]:
+        """The closed outlines of its pieces: x and y of each."""
+        there = np.isfinite(self.low) & np.isfinite(self.high)
+        pieces = np.split(np.arange(len(there)), np.flatnonzero(np.diff(there)) + 1)
+        return [
+            (np.concatenate((self.x[p], self.x[p][::-1])), np.concatenate((self.low[p], self.high[p][::-1])))
+            for p in pieces
+            if len(p) and there[p[0]]
+        ]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A map: a cell for each value of two parameters, coloured by a figure that is written in it.
+
+    The centres of the cells are 0, 1, 2 ... along both axes.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n_y, n_x)
+        NaN where there is none; such a cell stays empty.
+    words : tuple of tuple of str, shape (n_y, n_x)
+        What is written in the cells.
+    hatched : ndarray of bool, shape (n_y, n_x)
+        Which cells are hatched.
+    hints : tuple of tuple of str, shape (n_y, n_x)
+        Text that a page shows when a cell is pointed at.
+    span : (float, float), optional
+        Values of the palest and the darkest colour, for several maps to compare; the extremes of this one if None.
+    """
+
+    values: FloatArray
+    words: tuple[tuple[str, ...], ...]
+    hatched: BoolArray
+    hints: tuple[tuple[str, ...], ...]
+    span: tuple[float, float] | None = None
+
+    @property
+    def colours(self) -> list[list[str]]:
+        """The colour of each cell: pale for the least value, dark for the greatest."""
+        there = self.values[np.isfinite(self.values)]
+        low, high = self.span or ((float(there.min()), float(there.max())) if len(there) else (0.0, 0.0))
+        shares = (self.values - low) / (high - low if high > low else 1.0)
+        return [[_scale_colour(s) if np.isfinite(s) else "" for s in row] for row in shares]
+
+
+#: From pale to dark, in even steps of lightness; the hue turns from yellow to blue.
+_SCALE: Final = ((255, 247, 205), (199, 220, 170), (120, 190, 172), (62, 143, 171), (44, 90, 147), (37, 45, 100))
+
+
+def _scale_colour(share: float) -> str:
+    """Return the colour of a share from 0 to 1.
+
+    Examples
+    --------
+    >>> _scale_colour(0.0), _scale_colour(1.0)
+    ('#fff7cd', '#252d64')
+    """
+    place = min(max(share, 0.0), 1.0) * (len(_SCALE) - 1)
+    k = min(int(place), len(_SCALE) - 2)
+    mixed = (round(a + (place - k) * (b - a)) for a, b in zip(_SCALE[k], _SCALE[k + 1], strict=True))
+    return "#" + "".join(f"{c:02x}" for c in mixed)
+
+
+def ink_on(colour: str) -> str:
+    """Return black or white, whichever has the higher contrast to a colour (WCAG 2.1, relative luminance).
+
+    Examples
+    --------
+    >>> ink_on("#fff7cd"), ink_on("#252d64")
+    ('#000000', '#ffffff')
+    """
+    linear = (
+        v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4
+        for v in np.array([*bytes.fromhex(colour[1:])]) / 255
+    )
+    luminance = sum(w * v for w, v in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+    return "#000000" if (luminance + 0.05) ** 2 > 1.05 * 0.05 else "#ffffff"
 
 
 @dataclass(frozen=True)
@@ -182,7 +294,7 @@ class Level:
         return MARK if self.is_upright else LIMIT
 
 
-Part = Curve | Bars | Points | Ticks | Band | Level
+Part = Curve | Bars | Points | Ticks | Band | Level | Envelope | Cells
 
 
 @dataclass(frozen=True)
@@ -204,6 +316,8 @@ class Chart:
         Pixels.
     group : str
         Charts of one group on a page are zoomed together along the abscissa.
+    least_width : int
+        Pixels; on a narrower page the reader scrolls sideways.
     """
 
     key: str
@@ -214,6 +328,7 @@ class Chart:
     note: str = ""
     height: int = 380
     group: str = ""
+    least_width: int = 0
 
 
 def gapped(x: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:

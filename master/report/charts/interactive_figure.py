@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 
-from master.report.charts.chart import Axis, Band, Bars, Chart, Curve, Level, Points, Stroke, Ticks, fill, gapped
+from master.report.charts.chart import (
+    Axis,
+    Band,
+    Bars,
+    Cells,
+    Chart,
+    Curve,
+    Envelope,
+    Level,
+    Part,
+    Points,
+    Stroke,
+    Ticks,
+    fill,
+    gapped,
+    ink_on,
+)
 from master.report.charts.sample_packing import packed
 
 Trace = dict[str, Any]
@@ -20,30 +37,45 @@ _SHARES: Final = {"overlaying": "y", "range": [0, 1], "visible": False, "fixedra
 def interactive_figure(chart: Chart) -> dict[str, Any]:
     """Return ``data`` and ``layout`` of a chart for plotly.js."""
     shapes = [_shape(part) for part in chart.parts if isinstance(part, Band | Level)]
-    data = [_TRACES[type(part)](part) for part in chart.parts if not isinstance(part, Band | Level)]
+    data = [trace for part in chart.parts if not isinstance(part, Band | Level) for trace in _traces(part)]
     layout: dict[str, Any] = {"xaxis": _axis(chart.x), "yaxis": _axis(chart.y), "shapes": shapes}
     if any(isinstance(part, Ticks) for part in chart.parts):
         layout["yaxis2"] = _SHARES
     if any(isinstance(bars, Bars) and bars.width is None and not isinstance(bars.x, tuple) for bars in chart.parts):
         layout["bargap"] = 0.04
+    if any(isinstance(part, Cells) for part in chart.parts):
+        layout |= {"barmode": "overlay", "bargap": 0}
     if chart.group:
         layout["meta"] = {"sync": chart.group}
     return {"data": data, "layout": layout}
 
 
+def _traces(part: Part) -> list[Trace]:
+    return _cells(part) if isinstance(part, Cells) else [_TRACES[type(part)](part)]
+
+
 def _axis(axis: Axis) -> dict[str, Any]:
-    found: dict[str, Any] = {"title": {"text": axis.label}}
+    found: dict[str, Any] = {"title": {"text": _plain(axis.label)}}
     if axis.limits is not None:
         found["range"] = np.log10(axis.limits).tolist() if axis.is_logarithmic else list(axis.limits)
     if axis.is_logarithmic:
         found |= {"type": "log", "exponentformat": "power"}
     if axis.ticks:
         found["tickvals"] = list(axis.ticks)
+    if axis.words:
+        found["ticktext"] = [_plain(word) for word in axis.words]
     return found
+
+
+def _plain(text: str) -> str:
+    """Return text that plotly.js shows as it is: it takes a few elements of HTML for what they are."""
+    return html.escape(text, quote=False).replace("\n", "<br>")
 
 
 def _curve(curve: Curve) -> Trace:
     trace = _lines(curve.name, *curve.points, curve.stroke)
+    if curve.has_marks:
+        trace |= {"mode": "lines+markers", "marker": {"size": 6}}
     if curve.is_whole:
         trace["hoverinfo"] = "skip"
     return trace if curve.is_shown else {**trace, "visible": "legendonly"}
@@ -58,21 +90,78 @@ def _ticks(ticks: Ticks) -> Trace:
 def _bars(bars: Bars) -> Trace:
     colour, hatching = fill(bars.index)
     marker = {"color": colour, "pattern": {"shape": _PATTERNS[hatching], "solidity": 0.4}}
-    x = list(bars.x) if isinstance(bars.x, tuple) else packed(bars.x)
-    trace = {"type": "bar", "name": bars.name, "marker": marker, "x": x, "y": packed(bars.y), "width": bars.width}
-    said = {"text": list(bars.words), "textposition": "none", "hovertemplate": "%{text}"}
+    x = [_plain(name) for name in bars.x] if isinstance(bars.x, tuple) else packed(bars.x)
+    along, across = ("y", "x") if bars.is_lying else ("x", "y")
+    trace: Trace = {"type": "bar", "name": _plain(bars.name), "marker": marker, along: x, across: packed(bars.y)}
+    trace["width"] = bars.width
+    if bars.is_lying:
+        trace["orientation"] = "h"
+    if bars.interval is not None:
+        below, above = bars.y - bars.interval[0], bars.interval[1] - bars.y
+        ends = {"type": "data", "symmetric": False, "array": packed(above), "arrayminus": packed(below)}
+        trace[f"error_{across}"] = {**ends, "thickness": 1.4, "width": 4}
+    said = {"text": [_plain(w) for w in bars.words], "textposition": "none", "hovertemplate": "%{text}"}
     return {**trace, **said} if bars.words else trace
+
+
+def _envelope(envelope: Envelope) -> Trace:
+    gap = np.array([np.nan])
+    x, y = (np.concatenate([np.concatenate((o[k], gap)) for o in envelope.outlines] or [gap]) for k in (0, 1))
+    trace = _lines(envelope.name, x, y, Stroke(envelope.colour, width=0.0))
+    return {
+        **trace,
+        "fill": "toself",
+        "fillcolor": _transparent(envelope.colour, envelope.opacity),
+        "hoverinfo": "skip",
+    }
+
+
+def _cells(cells: Cells) -> list[Trace]:
+    """Return cells as bars that stand on each other's place: they need no other kind of trace, and have hatching.
+
+    The hatching lies over them, a trace for each ink: lines of one trace have one colour.
+    """
+    colours = {(r, c): colour for r, row in enumerate(cells.colours) for c, colour in enumerate(row) if colour}
+    whole = {
+        **_boxes(list(colours)),
+        "marker": {"color": list(colours.values()), "line": {"width": 0}},
+        "text": [_plain(cells.words[r][c]) for r, c in colours],
+        "hovertext": [_plain(cells.hints[r][c]) for r, c in colours],
+        "hoverinfo": "text",
+        "textposition": "inside",
+        "insidetextanchor": "middle",
+        "textangle": 0,
+        "insidetextfont": {"color": [ink_on(colour) for colour in colours.values()], "size": 12},
+    }
+    hatched: dict[str, list[tuple[int, int]]] = {}
+    for place, colour in colours.items():
+        if cells.hatched[place]:
+            hatched.setdefault(ink_on(colour), []).append(place)
+    return [whole, *(_hatching(places, ink) for ink, places in hatched.items())]
+
+
+def _hatching(places: list[tuple[int, int]], ink: str) -> Trace:
+    pattern = {"shape": "/", "size": 9, "solidity": 0.12, "fgcolor": ink, "fgopacity": 0.5, "bgcolor": "rgba(0,0,0,0)"}
+    return {**_boxes(places), "marker": {"color": ink, "pattern": pattern, "line": {"width": 0}}, "hoverinfo": "skip"}
+
+
+def _boxes(places: list[tuple[int, int]]) -> Trace:
+    """Return bars that fill the cells at these rows and columns."""
+    base = [row - 0.5 for row, _ in places]
+    box = {"x": [column for _, column in places], "y": [1] * len(places), "base": base, "width": 1}
+    return {"type": "bar", **box, "showlegend": False}
 
 
 def _points(points: Points) -> Trace:
     marker = {"color": points.colour, "size": points.size, "symbol": points.symbol}
     trace = {"type": "scatter", "mode": "markers", "x": packed(points.x), "y": packed(points.y), "marker": marker}
-    return {**trace, "name": points.name} | ({"text": list(points.words)} if points.words else {})
+    said = {"text": [_plain(word) for word in points.words]} if points.words else {}
+    return {**trace, "name": _plain(points.name), **said}
 
 
 def _lines(name: str, x: Any, y: Any, stroke: Stroke) -> Trace:
     line = {"color": stroke.colour, "dash": stroke.dash, "width": stroke.width}
-    return {"type": "scatter", "mode": "lines", "x": packed(x), "y": packed(y), "line": line, "name": name}
+    return {"type": "scatter", "mode": "lines", "x": packed(x), "y": packed(y), "line": line, "name": _plain(name)}
 
 
 def _shape(part: Band | Level) -> dict[str, Any]:
@@ -101,4 +190,6 @@ def _transparent(colour: str, opacity: float) -> str:
     return f"rgba({red},{green},{blue},{opacity})"
 
 
-_TRACES: Final[dict[type, Callable[[Any], Trace]]] = {Curve: _curve, Ticks: _ticks, Bars: _bars, Points: _points}
+_TRACES: Final[dict[type, Callable[[Any], Trace]]] = {
+    Curve: _curve, Ticks: _ticks, Bars: _bars, Points: _points, Envelope: _envelope
+}  # fmt: skip

@@ -7,7 +7,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from master.report.charts.chart import Axis, Band, Bars, Chart, Curve, Dash, Level, Points, Ticks, fill
+from master.report.charts.chart import (
+    Axis,
+    Band,
+    Bars,
+    Cells,
+    Chart,
+    Curve,
+    Dash,
+    Envelope,
+    Level,
+    Points,
+    Ticks,
+    fill,
+    ink_on,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,7 +89,8 @@ def _scale(axes: Any, which: str, axis: Axis) -> None:
     if axis.is_logarithmic:
         axes.set(**{f"{which}scale": "log"})
     if axis.ticks:
-        axes.set(**{f"{which}ticks": axis.ticks, f"{which}ticklabels": [f"{tick:g}" for tick in axis.ticks]})
+        words = axis.words or [f"{tick:g}" for tick in axis.ticks]
+        axes.set(**{f"{which}ticks": axis.ticks, f"{which}ticklabels": words})
     if axis.limits is not None:
         axes.set(**{f"{which}lim": axis.limits})
 
@@ -83,7 +98,8 @@ def _scale(axes: Any, which: str, axis: Axis) -> None:
 def _draw_curve(axes: Any, curve: Curve) -> None:
     if curve.is_shown:
         style = {"color": curve.stroke.colour, "linestyle": _PATTERNS[curve.stroke.dash]}
-        axes.plot(*curve.points, linewidth=_THINNER * curve.stroke.width, label=curve.name, **style)
+        mark = {"marker": "o", "markersize": 3.0} if curve.has_marks else {}
+        axes.plot(*curve.points, **mark, linewidth=_THINNER * curve.stroke.width, label=curve.name, **style)
 
 
 def _draw_points(axes: Any, points: Points) -> None:
@@ -119,12 +135,35 @@ def _draw_bars(axes: Any, bars: Bars, number: int, count: int) -> None:
     gap = float(np.diff(np.unique(x)).min()) if len(np.unique(x)) > 1 else 1.0
     width = (bars.width or 0.9 * gap) / count
     colour, hatching = fill(bars.index)
-    look = {"color": colour, "hatch": _HATCHES[hatching], "edgecolor": "white", "linewidth": 0.3}
-    axes.bar(x + (number - 0.5 * (count - 1)) * width, bars.y, width, label=bars.name, **look)
+    look: dict[str, Any] = {"color": colour, "hatch": _HATCHES[hatching], "edgecolor": "white", "linewidth": 0.3}
+    places = x + (number - 0.5 * (count - 1)) * width
+    if bars.interval is not None:
+        look["yerr" if not bars.is_lying else "xerr"] = (bars.y - bars.interval[0], bars.interval[1] - bars.y)
+        look["error_kw"] = {"linewidth": 0.8, "capsize": 2.5}
+    (axes.barh if bars.is_lying else axes.bar)(places, bars.y, width, label=bars.name, **look)
     if is_named:
-        axes.set_xticks(x, bars.x)
+        axes.set(**{"yticks" if bars.is_lying else "xticks": x})
+        axes.set(**{"yticklabels" if bars.is_lying else "xticklabels": bars.x})
+
+
+def _draw_envelope(axes: Any, envelope: Envelope) -> None:
+    look = {"color": envelope.colour, "alpha": envelope.opacity, "linewidth": 0}
+    axes.fill_between(envelope.x, envelope.low, envelope.high, label=envelope.name, **look)
+
+
+def _draw_cells(axes: Any, cells: Cells) -> None:
+    axes.grid(visible=False)
+    for (row, column), colour in np.ndenumerate(np.array(cells.colours, dtype=object)):
+        if colour:
+            look = {"facecolor": colour, "edgecolor": ink_on(colour), "linewidth": 0.0}
+            hatch = "//" if cells.hatched[row, column] else ""
+            axes.bar(column, 1.0, 1.0, row - 0.5, hatch=hatch, **look)
+            box = {"facecolor": colour, "edgecolor": "none", "pad": 1.0}
+            place = {"ha": "center", "va": "center", "fontsize": 8, "bbox": box}
+            axes.text(column, row, cells.words[row][column], color=ink_on(colour), **place)
 
 
 _DRAWN: Final[dict[type, Callable[[Any, Any], None]]] = {
-    Curve: _draw_curve, Points: _draw_points, Ticks: _draw_ticks, Band: _draw_band, Level: _draw_level
+    Curve: _draw_curve, Points: _draw_points, Ticks: _draw_ticks, Band: _draw_band, Level: _draw_level,
+    Envelope: _draw_envelope, Cells: _draw_cells,
 }  # fmt: skip

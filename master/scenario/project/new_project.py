@@ -23,7 +23,7 @@ from master.fmu.fmu_description import read_fmu
 from master.safety.safe_files import write_atomically
 from master.scenario.project.port_finding import ENDS, REPLY, Port, Side, check_given, find_ports, own_port
 from master.scenario.project.project_page import PROJECT_FILE, ProjectPage, project_text
-from master.scenario.project.stretch import Stretch, Wire, stretch
+from master.scenario.project.stretch import Stretch, Wire, contained, early, stretch
 from master.scenario.project.system_text import (
     WrittenComponent,
     WrittenConnection,
@@ -101,6 +101,10 @@ class Request:
         Of interest [m].
     maps : sequence of (str, str)
         Names of ports and parameters, and the variables of an FMU that they are.
+    supply : (str, str)
+        Supply system whose limits apply: as limits name it, and in words.
+    raised : float
+        How long after the start the leading pantograph has been raised [s].
     """
 
     folder: Path
@@ -113,6 +117,8 @@ class Request:
     mean_force: float
     interval: tuple[float, float] | None = None
     maps: Sequence[tuple[str, str]] = ()
+    supply: tuple[str, str] = ("AC", "AC")
+    raised: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -157,8 +163,9 @@ def check_folder(folder: Path) -> None:
     """Refuse a folder that a project cannot be written into."""
     if folder.is_symlink() and not folder.exists():  # to itself, too
         raise RequestError(f"{folder} is a link that leads nowhere: name a new folder")
-    if folder.exists() and not folder.is_dir():
-        raise RequestError(f"{folder} is a file: name a new folder")
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise RequestError(f"{there if there == folder else folder.parent} is a file: name a new folder")
     if folder.is_dir() and any(folder.iterdir()):
         raise RequestError(f"{folder} exists and is not empty: name a new folder, or empty it")
 
@@ -180,6 +187,12 @@ def new_project(request: Request) -> Path:
     for folder in ("lines", "pantographs"):
         (request.folder / folder).mkdir(exist_ok=True)
     return request.folder / f"{project_name(request.folder)}.ssp"
+
+
+def doubt(request: Request) -> str:
+    """Return what deserves a second look in a project that can be made, empty if nothing does."""
+    way = stretch(request.wire, request.speed, _separations(request), request.interval)
+    return early(way, request.speed, request.raised)
 
 
 def project_files(request: Request) -> dict[str, bytes]:
@@ -205,6 +218,8 @@ def project_files(request: Request) -> dict[str, bytes]:
         mean_force=request.mean_force,
         speed=request.speed,
         way=way,
+        supply=request.supply[1],
+        overlap=contained(request.wire, way),
         own_start=tuple(p.name for p in train if not p.is_placed),
     )
     return {**files, PROJECT_FILE: project_text(name).encode(), "README.md": said.text().encode()}
@@ -326,6 +341,7 @@ def _scenario(name: str, request: Request, way: Stretch, line: _Part, train: Seq
         until_end=all(p.variable(name) == name for p in train for name in ("start_position", "speed")),
         calibrated=_calibrated(train, request.lifts),
         mean_force=request.mean_force,
+        supply=request.supply[0],
     )
     return {"SystemStructure.ssd": ssd_text(system).encode(), **files}
 

@@ -6,8 +6,9 @@ A line has one or more *sections*, mechanically independent wires; each section 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from models.contact_law import CONTACT_LAWS
@@ -27,6 +28,7 @@ SHEAR_RATIO = 2.6
 SHORTEST_STEP = 1e-6
 #: Largest seed: the largest whole number of FMI.
 LARGEST_SEED = 2**31 - 1
+_ACTIVE = re.compile(r"fault\[(\d+)\]\.active")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -382,7 +384,18 @@ class CatenaryDefinition:
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return every tunable number of the line."""
-        return tuple(field_schema.parameters(self, self.provenance))
+        return tuple(map(self._with_place, field_schema.parameters(self, self.provenance)))
+
+    def _with_place(self, parameter: Parameter) -> Parameter:
+        """Return a parameter; the description of one that makes a fault act says which dropper it is of."""
+        match = _ACTIVE.fullmatch(parameter.name)
+        if match is None:
+            return parameter
+        fault = self.fault[int(match[1]) - 1]
+        x = self.sections[fault.section - 1].spans[fault.span - 1].droppers[fault.dropper - 1]
+        section = f" of section {fault.section}" if len(self.sections) > 1 else ""
+        place = f"dropper {fault.dropper} of span {fault.span}{section} at {x:.2f} m"
+        return replace(parameter, description=f"{parameter.description}; {place}")
 
     def with_values(self, values: Mapping[str, float]) -> CatenaryDefinition:
         """Return a copy with some parameters changed.

@@ -8,9 +8,11 @@ from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation
 from models.numerics.newmark import steps_within
+from models.pantograph.lumped.compiled_step import CompiledStep, compiled_step
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+from models.pantograph.operation import NO_DRIVE, Drive
 
 
 class LumpedPantographPart:
@@ -22,6 +24,8 @@ class LumpedPantographPart:
 
     Attributes
     ----------
+    outputs : ndarray, shape (12 + 3 n,)
+        The strip, then what is observed.
     strip : ndarray, shape (2, 2, 3)
         End A (left), B (right); position, velocity; x, y, z.
     observed : tuple of (name, unit, description)
@@ -31,19 +35,32 @@ class LumpedPantographPart:
     def __init__(self, definition: LumpedDefinition) -> None:
         self.definition = definition
         self.model = LumpedModel(definition)
-        self.state = self.model.initial_state()
         self.time = 0.0
         self._start_time = 0.0
+        # What the model's transition takes: the motion mass by mass, then the load.
+        n = self.model.size
+        self._values = np.zeros(4 * n)
+        self._motion, self._load = self._values[: 3 * n], self._values[3 * n :]
+        self.state = LumpedState(self._motion[0::3], self._motion[1::3], self._motion[2::3])
         # A step changes x, z and z's velocity alone.
         half, y = 0.5 * definition.strip_length, definition.strip_offset
         velocity = [definition.speed, 0.0, 0.0]
-        self.strip = np.array([[[0.0, y + side, 0.0], velocity] for side in (half, -half)])
+        self.outputs = np.zeros(12 + 3 * n)
+        self.strip = self.outputs[:12].reshape(2, 2, 3)
+        self.strip[...] = [[[0.0, y + side, 0.0], velocity] for side in (half, -half)]
+        self._rest = np.array([definition.reference_height, 0.0, 0.0] * n)
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._base = np.zeros(2)
+        self._roof = 0.0
+        self._shares = np.array(definition.air_shares)
+        self._own = np.zeros(n)
         self._balance: LumpedBalance | None = None
-        self.observed = _observed(len(definition.stage))
+        self._compiled: CompiledStep | None = None
+        self.observed = _observed(n)
 
-    def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
+    def initialise(
+        self, time: float, force: float, point: FloatArray, base: FloatArray, drive: Drive = NO_DRIVE
+    ) -> None:
         """Set the pantograph to rest at its reference height at ``time``.
 
         Parameters
@@ -54,29 +71,45 @@ class LumpedPantographPart:
             Its point of application [m]; unused by masses on a line.
         base : ndarray, shape (2,)
             Height and vertical velocity of the roof [m, m/s].
+        drive : Drive
+            What else acts.
         """
         del point
         self.time = self._start_time = time
-        load = self.model.load(0.0, base)
+        self._roof = float(base[0])
+        self.state.reference = -self._roof
+        load = self.model.load(0.0, base) + self._drive_loads(drive)
+        if self.model.follows:  # the reference starts where the mass is
+            load[0] -= self.definition.stage[0].stiffness * self._roof
         load[-1] -= force
-        self.state = self.model.initial_state(load)
+        self._motion[:] = 0.0
+        self.state.acceleration[:] = self.model.initial_state(load).acceleration
         self._balance = LumpedBalance(self.model, load, force) if self.definition.monitor_energy else None
         self._force.start(time, force)
-        self._base[...] = base
-        self._place_strip()
+        self._compile()
+        self._place()
 
-    def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
+    def step(self, force: float, point: FloatArray, base: FloatArray, step: float, drive: Drive = NO_DRIVE) -> None:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
-        self._force.receive_at(self.time, force, point.item(0), self._x(self.time), self.definition.speed, step)
-        count = steps_within(step, self.definition.time_step)
-        start, h = self.time, step / count
+        start, x, count = self.time, point.item(0), steps_within(step, self.definition.time_step)
+        self.time = start + step
+        self._own[:] = self._drive_loads(drive)
+        if self._compiled is not None:
+            when, contact = (self._start_time, start, step), (force, x)
+            hung = (self.state.reference, self._roof, drive.reference_rate)
+            self.state.reference = self._compiled.step(
+                self._values, when, count, contact, base, hung, self._own, self.outputs
+            )
+            self._roof = float(base[0]) + step * float(base[1])
+            return
+        self._force.receive_at(start, force, x, self._x(start), self.definition.speed, step)
+        h = step / count
         height, velocity = base.tolist()
         for k in range(1, count + 1):
             # Received for the step's beginning; the roof continues with its velocity.
             self._base[...] = height + k * h * velocity, velocity
-            self._substep(start + k * h, h)
-        self.time = start + step
-        self._place_strip()
+            self._substep(start + k * h, h, drive.reference_rate)
+        self._place()
 
     @property
     def energy(self) -> FloatArray:
@@ -90,20 +123,18 @@ class LumpedPantographPart:
 
     def observation_values(self) -> FloatArray:
         """Return height, velocity and acceleration of every mass, shape (3 n,)."""
-        values = np.empty((self.model.size, 3))
-        np.add(self.definition.reference_height, self.state.displacement, out=values[:, 0])
-        values[:, 1] = self.state.velocity
-        values[:, 2] = self.state.acceleration
-        return values.ravel()
+        return self.outputs[12:].copy()
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
+        if self._compiled is not None:
+            self._compiled.give(self._force)
         return {
             "time": np.array([self.time, self._start_time]),
             "displacement": self.state.displacement.copy(),
             "velocity": self.state.velocity.copy(),
             "acceleration": self.state.acceleration.copy(),
-            "base": self._base.copy(),
+            "reference": np.array([self.state.reference, self._roof]),
             **self._force.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
@@ -111,33 +142,71 @@ class LumpedPantographPart:
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
         self.time, self._start_time = (float(t) for t in snapshot["time"])
-        self.state = LumpedState(
-            *(np.array(snapshot[n], dtype=np.float64) for n in ("displacement", "velocity", "acceleration"))
-        )
-        self._base[...] = snapshot["base"]
+        for name in ("displacement", "velocity", "acceleration"):
+            getattr(self.state, name)[:] = snapshot[name]
+        self.state.reference, self._roof = (float(v) for v in snapshot["reference"])
         self._force.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
-        self._place_strip()
+        self._compile()
+        self._place()
 
-    def _substep(self, time: float, h: float) -> None:
-        load = self.model.load(time - self._start_time, self._base)
+    def _compile(self) -> None:
+        """Let kernels make the steps, if there are any; they keep no balance."""
+        if self._compiled is None and not self.definition.monitor_energy:
+            self._compiled = compiled_step(self.model)
+        if self._compiled is not None:
+            self._compiled.take(self._force)
+
+    def _substep(self, time: float, h: float, rate: float) -> None:
+        load = self.model.load(time - self._start_time, self._base) + self._own
         force = self._force.at(time)
         load[-1] -= force
-        before = self.state.displacement
-        self.model.advance(self.state, h, self.model.free_response(self.state, h, load))
+        outer = load.copy()
+        before = self._motion.item(0) - self._roof
+        if self.model.follows:
+            self._hang(load, outer, before, h, rate)
+        self._load[:] = load
+        after = self.model.transition(h).dot(self._values)
         if self._balance is not None:
-            self._balance.add(h, self.state.displacement - before, load, force)
+            self._balance.add(h, after[0::3] - self.state.displacement, outer, force)
+        if self.model.follows:
+            self._follow(before, float(after[0]) - self._base.item(0), h, rate)
+        self._roof = self._base.item(0)
+        self._motion[:] = after
+
+    def _hang(self, load: FloatArray, outer: FloatArray, before: float, h: float, rate: float) -> None:
+        """Let the lowest spring hang on the reference; its work is not that of an outer load."""
+        stiffness, height = self.definition.stage[0].stiffness, self._base.item(0)
+        load[0] += self.model.reference_load(self.state.reference, before, rate, h)
+        load[0] -= stiffness * self.model.following(h).after * height
+        outer[0] -= stiffness * height
+
+    def _follow(self, before: float, after: float, h: float, rate: float) -> None:
+        following = self.model.following(h)
+        if self._balance is not None:
+            motion, roof = (before - self.state.reference, (after - before) / h), (self._base.item(0) - self._roof) / h
+            self._balance.add_reference(following.integrals(*motion, rate, h), roof + rate)
+        self.state.reference = following.moved(self.state.reference, before, after, rate)
+        if self._balance is not None:
+            self._balance.stretch = after - self.state.reference
+
+    def _drive_loads(self, drive: Drive) -> FloatArray:
+        """Return what the air and a force from outside load the masses with, shape (n,) [N]."""
+        loads = self._shares * self.definition.aerodynamic_force(drive.air)
+        loads[0] += drive.uplift
+        return loads
 
     def _x(self, time: float) -> float:
         return self.definition.start_position + self.definition.speed * (time - self._start_time)
 
-    def _place_strip(self) -> None:
-        d = self.definition
-        height, velocity = d.reference_height + self.state.displacement.item(-1), self.state.velocity.item(-1)
-        self.strip[:, 0, 0] = self._x(self.time)
-        self.strip[:, 0, 2] = height
-        self.strip[:, 1, 2] = velocity
+    def _place(self) -> None:
+        """Write the strip and what is observed."""
+        outputs, height = self.outputs, self.definition.reference_height
+        outputs[0:12:6] = self._x(self.time)
+        outputs[2:12:6] = height + self._motion.item(-3)
+        outputs[5:12:6] = self._motion.item(-2)
+        np.add(self._motion, self._rest, out=outputs[12:])
 
 
 def _observed(stages: int) -> tuple[tuple[str, str, str], ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from models.arrays import FloatArray
+from models.pantograph.multibody.analysis.mechanism_freedom import freedom_warning
 from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
@@ -34,9 +35,30 @@ def working_height_warning(mechanism: Mechanism, standing: FloatArray, x: float,
     return raised.warning(z, _force(mechanism, standing, above + z - raised.reference), at_reference)
 
 
+def mechanism_warning(mechanism: Mechanism, standing: FloatArray) -> str:
+    """Say so if a mechanism has motions too many, or some that grow; empty if not.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Of a pantograph, its springs settled.
+    standing : ndarray, shape (13 n,)
+        State with the strip at the reference height.
+    """
+    force = _force(mechanism, standing, mechanism.strip_height(standing))
+    return freedom_warning(mechanism, standing, max(force or 0.0, 0.0))
+
+
+def inertia_warning(definition: MechanismDefinition) -> str:
+    """Say which bodies have a moment of inertia larger than the other two together, as no body has."""
+    wrong = [f"{b.name} by {100.0 * b.inertia_excess:.2g} %" for b in definition.bodies if b.inertia_excess > 1e-9]
+    text = "the largest moment of inertia exceeds the other two together, as no body's does"
+    return f"{text}: {', '.join(wrong)}; results hold for these numbers" if wrong else ""
+
+
 def _raised(definition: MechanismDefinition) -> Raised:
-    parameter, unit = ("static_moment", "N.m") if definition.lifts_by_moment else ("static_force", "N")
-    return Raised(parameter, definition.lift, unit, definition.reference_height, definition.start_position)
+    name, unit = definition.lift_parameter or "static_force", definition.lift_unit
+    return Raised(name, definition.lift, unit, definition.reference_height, definition.start_position)
 
 
 def _force(mechanism: Mechanism, standing: FloatArray, height: float) -> float | None:

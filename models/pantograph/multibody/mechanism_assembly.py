@@ -16,12 +16,15 @@ _ITERATIONS: Final = 300
 #: Weight of the kept coordinate among the gaps.
 _KEEP: Final = 1e3
 _LARGEST_STEP: Final = 0.2
+#: Least component across the track of a strip's direction.
+_ACROSS: Final = 0.9
 
 
 def assemble(mechanism: Mechanism) -> FloatArray:
     """Close all joints, starting from the configuration as written and keeping the chosen coordinate.
 
-    Bodies move as little as they must (metres and radians weigh the same).
+    Bodies move as little as they must (metres and radians weigh the same). Bushings are untwisted in what is found: as
+    written, bodies stand where the rounding of their tables puts them, which would be a preload that nobody meant.
 
     Returns
     -------
@@ -42,6 +45,7 @@ def assemble(mechanism: Mechanism) -> FloatArray:
     if violation > CLOSED * 10.0:
         raise MechanismError(_unassemblable(mechanism, y))
     _check_independence(mechanism, closed)
+    mechanism.forces.untwist(mechanism.kinematics(closed).frames[:, :3])
     return closed
 
 
@@ -86,6 +90,21 @@ def project(mechanism: Mechanism, y: FloatArray, tolerance: float = CLOSED) -> F
     s.v[:] += shifts
     s.w[:] += turns
     return y
+
+
+def check_strip(mechanism: Mechanism, y: FloatArray) -> None:
+    """Raise ``MechanismError`` if a collector strip does not lie across the track in a state, shape (13 n,)."""
+    if mechanism.strip_body < 0:
+        return
+    ends = mechanism.strip_ends(y)[:, 0]
+    across = ends[0] - ends[1]
+    share = abs(float(across[1])) / max(float(np.linalg.norm(across)), 1e-300)
+    if share < _ACROSS:
+        body = mechanism.names[mechanism.strip_body]
+        raise MechanismError(
+            f"{mechanism.definition.name}: the strip lies along the track, {np.degrees(np.arccos(share)):.0f} degrees "
+            f"from across it: check `euler` of body '{body}'"
+        )
 
 
 def null_space(mechanism: Mechanism, y: FloatArray) -> FloatArray:

@@ -10,14 +10,16 @@ import numpy as np
 from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
-from models.pantograph.multibody.analysis.mechanism_statics import equilibrium, settle_springs
+from models.pantograph.multibody.analysis.cam_design import fit_force
+from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_advice import working_height_warning
+from models.pantograph.multibody.mechanism_advice import mechanism_warning, working_height_warning
 from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
+from models.pantograph.operation import NO_DRIVE, Drive
 
 
 class MultibodyPantographPart:
@@ -25,7 +27,8 @@ class MultibodyPantographPart:
 
     At first it stands in its working configuration (the written one, assembled) with the strip at the reference
     height, held by the lifting value that balances the weights; the ramp of the raise leads from there to the full
-    value. The base stands at the height above the rails that this takes.
+    value. The base stands at the height above the rails that this takes, or where the definition says; the arms then
+    take the angle that the reference height needs, or the start height.
 
     Parameters
     ----------
@@ -50,6 +53,7 @@ class MultibodyPantographPart:
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._lateral = LateralExtrapolation()
         self._base = BaseMotion()
+        self._uplift = 0.0
         self._y = np.zeros(0)
         self._last: _Last | None = None
         self._history: History | None = None
@@ -58,7 +62,9 @@ class MultibodyPantographPart:
         self._built: _Built | None = None
         self._balance: MechanismBalance | None = None
 
-    def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
+    def initialise(
+        self, time: float, force: float, point: FloatArray, base: FloatArray, drive: Drive = NO_DRIVE
+    ) -> None:
         """Set the pantograph to rest (on its roof) at its reference height at ``time``.
 
         Parameters
@@ -71,6 +77,8 @@ class MultibodyPantographPart:
             Its point of application [m].
         base : ndarray, shape (2,)
             Height and vertical velocity of the roof [m, m/s].
+        drive : Drive
+            What else acts.
 
         Raises
         ------
@@ -78,6 +86,7 @@ class MultibodyPantographPart:
             If the mechanism cannot be assembled or balanced.
         """
         built = self._ready()
+        self._lift_besides(drive)
         self.time = self._start_time = time
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
@@ -93,7 +102,7 @@ class MultibodyPantographPart:
         watched = self.definition.monitor_energy
         self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
 
-    def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
+    def step(self, force: float, point: FloatArray, base: FloatArray, step: float, drive: Drive = NO_DRIVE) -> None:
         """Advance by ``step`` [s].
 
         Parameters
@@ -106,6 +115,8 @@ class MultibodyPantographPart:
             Height and vertical velocity of the roof at the beginning of the step [m, m/s].
         step : float
             [s]
+        drive : Drive
+            What else acts, held over the step.
 
         Raises
         ------
@@ -116,6 +127,7 @@ class MultibodyPantographPart:
         values = (force, *point.tolist(), *base.tolist())
         if not all(map(math.isfinite, values)):
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
+        self._lift_besides(drive)
         operation = self.definition
         expected = float(self.strip[:, 0, 0].mean())
         self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
@@ -149,7 +161,12 @@ class MultibodyPantographPart:
     def working_height_warning(self, x: float, z: float) -> str:
         """Say so if the wire above the start, at (x, z) [m], is higher than the lifting value is for."""
         built = self._ready()
-        return working_height_warning(built.mechanism, built.standing, x, z)
+        return working_height_warning(built.mechanism, built.reference, x, z)
+
+    def mechanism_warning(self) -> str:
+        """Say so if the mechanism has motions too many, or some that grow."""
+        built = self._ready()
+        return mechanism_warning(built.mechanism, built.reference)
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
@@ -205,7 +222,12 @@ class MultibodyPantographPart:
         acted, as far as they follow from the last inputs.
         """
         last, inputs, history = self._last, self._inputs(0.0), self._history
-        if last is None or last.inputs.lift != inputs.lift or last.inputs.base[:2] != inputs.base[:2]:
+        if (
+            last is None
+            or last.inputs.lift != inputs.lift
+            or last.inputs.uplift != inputs.uplift
+            or last.inputs.base[:2] != inputs.base[:2]
+        ):
             return None, None
         mechanism = self._ready().mechanism
         first, change = mechanism.with_inputs(self._y, last.acceleration, last.response, last.inputs, inputs)
@@ -225,7 +247,17 @@ class MultibodyPantographPart:
         """Return what acts ``tau`` [s] after the beginning of the step."""
         time = self.time + tau
         force = self._force.at(time)
-        return Inputs(self._base.at(tau), self._lift(time), force, self._lateral.at(time))
+        lift, uplift = self._lift(time), self._uplift
+        if self.definition.holds_force:
+            lift, uplift = lift + uplift, 0.0
+        return Inputs(self._base.at(tau), lift, force, self._lateral.at(time), uplift)
+
+    def _lift_besides(self, drive: Drive) -> None:
+        """Take the uplift of the air and of a controller."""
+        self._uplift = self.definition.aerodynamic_force(drive.air) + drive.uplift
+        if self._uplift != 0.0:
+            built = self._ready()
+            fit_force(built.mechanism, built.reference)
 
     def _lift(self, time: float) -> float:
         built = self._ready()
@@ -252,15 +284,19 @@ class MultibodyPantographPart:
         # Along the strip, which may roll and yaw.
         offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
         values = evaluation.constraints
-        self._observation[:-6] = bodies.ravel()
-        self._observation[-6:] = (
+        acting = self._inputs(0.0) if self._last is None else self._last.inputs
+        held = (acting.lift,) if operation.holds_force else ()
+        own = (
             roll,
             roll_rate,
             offset,
-            self._lift(self.time),
+            mechanism.lift_value(self._y, acting),
+            *held,
             np.abs(values.violation).max(initial=0.0),
             np.abs(values.rate).max(initial=0.0),
         )
+        self._observation[: bodies.size] = bodies.ravel()
+        self._observation[bodies.size :] = own
 
 
 class _Last(NamedTuple):
@@ -280,8 +316,8 @@ class _Last(NamedTuple):
         """Return what a snapshot holds."""
         if "last.inputs" not in snapshot:
             return None
-        z, vz, az, lift, force, lateral = snapshot["last.inputs"].tolist()
-        inputs = Inputs((z, vz, az), lift, force, lateral)
+        z, vz, az, *others = snapshot["last.inputs"].tolist()
+        inputs = Inputs((z, vz, az), *others)
         acceleration, response = (snapshot[f"last.{name}"].astype(np.float64) for name in ("acceleration", "response"))
         return cls(acceleration, response, inputs)
 
@@ -306,10 +342,11 @@ class _Built:
             raise MechanismError(f"{definition.name}: a pantograph needs a [strip]")
         self.mechanism = Mechanism(definition)
         self.integrator = Integrator(self.mechanism, definition.tolerance, definition.time_step)
-        working = equilibrium(self.mechanism, start=settle_springs(self.mechanism))
-        self.standing = project(self.mechanism, working.y)
-        self.balance = working.lift
-        self.base_height = definition.reference_height - working.strip_height
+        posture = take_posture(self.mechanism)
+        self.standing = project(self.mechanism, posture.start.y)
+        self.reference = posture.reference
+        self.balance = posture.start.lift
+        self.base_height = posture.base_height
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 
 
@@ -321,6 +358,7 @@ def _observed(definition: MechanismDefinition) -> tuple[tuple[str, str, str], ..
         if b.name not in definition.driven
         for key, unit, text in kinds
     ]
+    held = (("uplift.force", "N", "force on the strip that the cam holds"),) if definition.holds_force else ()
     return (
         *bodies,
         ("strip.roll", "rad", "roll of the collector strip, left end up"),
@@ -329,6 +367,7 @@ def _observed(definition: MechanismDefinition) -> tuple[tuple[str, str, str], ..
         ("lift.moment", "N.m", "lifting moment")
         if definition.lifts_by_moment
         else ("lift.force", "N", "lifting force"),
+        *held,
         ("joints.violation", "m", "largest constraint violation"),
         ("joints.violation_rate", "m/s", "largest rate of constraint violation"),
     )

@@ -12,6 +12,7 @@ from fmus.builder.fmu_build import build
 from fmus.builder.recipe import MARK, BuildError, content_hash, fingerprint, recipe
 from master.fmu import fmu_provision
 from models.library.catalogue import line_path, pantograph_path
+from models.library.definition_copy import renamed
 from tests.fmus.support import Instance, toy_recipe, toy_variant
 
 
@@ -74,7 +75,7 @@ def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("none.toml", None, "cannot be read (No such file or directory)"),
+        ("none.toml", None, "cannot be read (there is no such file or folder: check the name)"),
         ("broken.toml", "type = ", "is not a TOML file"),
         ("other.toml", 'type = "boat"', "defines neither a line"),
         ("two words.toml", 'type = "lumped"', "may hold letters, digits and _ only"),
@@ -140,7 +141,7 @@ def project(tmp_path):
     folder = tmp_path / "demo"
     for kind, path, name in (("lines", line_path("C270"), "LN2"), ("pantographs", pantograph_path("CX"), "Mine")):
         (folder / kind).mkdir(parents=True)
-        shutil.copy(path, folder / kind / f"{name}.toml")
+        (folder / kind / f"{name}.toml").write_text(renamed(path.read_text(), name))
     (folder / "openpanto.toml").write_text("")
     (folder / "demo.ssp").mkdir()
     return folder

@@ -118,7 +118,7 @@ def test_what_is_no_fmu(tmp_path, content):
     path = tmp_path / "x.fmu"
     path.write_bytes(content)
     assert "is not an FMU of this kind" in _said(path)["missing"]
-    assert "is not an FMU of this kind" in _said(tmp_path / "none.fmu")["missing"]
+    assert "none.fmu cannot be read (there is no such file" in _said(tmp_path / "none.fmu")["missing"]
 
 
 def test_the_probe_answers_line_by_line():

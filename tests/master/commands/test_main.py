@@ -11,6 +11,8 @@ import pytest
 
 from master.commands import scenario_commands
 from master.commands.main import main
+from master.report import report_files
+from master.report.charts.run_charts import file_charts
 from master.results import run_results
 
 ROOT = Path(__file__).parents[3]
@@ -59,7 +61,8 @@ def test_run_says_figures_and_verdict_in_80_columns(toy, in_folder, capsys):
     folder = in_folder / "results" / "toy"
     text = (folder / "report.html").read_text()
     assert "EN 50367" in text
-    assert len(list(folder.glob("*.png"))) == len(list(folder.glob("*.svg"))) == 5
+    assert len(list(folder.glob("*.png"))) == 5
+    assert not list(folder.glob("*.svg"))
     assert "Incomplete" not in text
     assert "static_force" in text
     assert "time in catenary" in text
@@ -260,7 +263,24 @@ def test_report_is_written_again(toy, in_folder, capsys):
     main([str(toy), "--out", "a", "--quiet", "--no-report", "--no-build"])
     assert main(["report", "a"]) == 0
     assert (in_folder / "a/report.html").is_file()
-    assert (in_folder / "a/contact_force.svg").is_file()
+    assert (in_folder / "a/contact_force.png").is_file()
+
+
+def test_charts_are_written_in_the_formats_that_are_asked_for_or_already_there(toy, in_folder, capsys, monkeypatch):
+    monkeypatch.setattr(report_files, "file_charts", lambda done: {"uplift": file_charts(done)["uplift"]})
+    main([str(toy), "--out", "a", "--quiet", "--no-build", "--figures", "svg"])
+    assert not list((in_folder / "a").glob("*.png"))
+    drawn = in_folder / "a/uplift.svg"
+    before = drawn.read_bytes()
+    assert b"</svg>" in before
+    drawn.write_text("old")
+    assert main(["report", "a"]) == 0  # none that is older than the report
+    assert drawn.read_bytes() == before
+    assert not list((in_folder / "a").glob("*.png"))
+    assert main(["report", "a", "--figures", "png"]) == 0
+    assert [p.name for p in sorted((in_folder / "a").glob("*.[ps][nv]g"))] == ["uplift.png", "uplift.svg"]
+    assert main([str(toy), "--no-report", "--figures", "svg", "--no-build"]) == 2
+    assert "--no-report leaves out" in capsys.readouterr().err
 
 
 def test_report_with_a_measurement_a_film_and_parquet(toy, in_folder, capsys):

@@ -116,7 +116,7 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     fmu_provision.provide_fmu(path, reported.append)
     assert reported == []
     ports = ("--built-from", f"{tmp_path}/lines/Mine.toml", "--pantographs", "2", "--", "Mine")
-    assert builder.orders[-1] == ("fingerprint", "--if-known", *ports)
+    assert builder.orders[-1] == ("fingerprint", "--if-known", "--watched", *ports)
     builder.fingerprint = "CD-34"
     fmu_provision.provide_fmu(path, reported.append)
     assert reported == ["building Mine.fmu again: its sources have changed"]
@@ -129,7 +129,7 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
 
 def test_definitions_are_looked_up_where_the_scenario_lies(builder, tmp_path):
     fmu_provision.provide_fmu(tmp_path / "X.fmu", print, library=tmp_path)
-    assert builder.orders[0] == ("fingerprint", "--if-known", "--library", str(tmp_path), "--", "X")
+    assert builder.orders[0] == ("fingerprint", "--if-known", "--watched", "--library", str(tmp_path), "--", "X")
     assert builder.orders[1][3:] == ("--library", str(tmp_path), "--", "X")
 
 

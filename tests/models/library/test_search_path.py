@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from models.library.catalogue import UnknownNameError, line_path, load_line, pantograph_path
+from models.library.catalogue import UnknownNameError, doubts, line_path, load_line, pantograph_path
 from models.library.search_path import LIBRARY, definition_files, definition_names, doubles, project_folder, search_path
 
 
@@ -53,6 +53,20 @@ def test_the_nearest_of_several_counts_and_the_others_are_named(project):
     assert doubles(found) == f"two definitions are named 'Mine': {near} is used, {far} is not"
     assert doubles([near]) == ""
     assert doubles([near, far, far]).endswith(f"{near} is used, {far} and {far} are not")
+
+
+def test_a_folder_that_is_not_there_is_told_and_a_name_that_its_file_does_not_have(project, monkeypatch):
+    own = define(project, "lines", "Mine")
+    renamed = own.read_text().replace('name = "LN2"', 'name = "Mine"')
+    monkeypatch.chdir(project)
+    told = f"{own} is called 'Mine', as its file is, not 'LN2', its name: give both the same"
+    assert doubts("lines", "Mine") == doubts("lines", str(own)) == [told]
+    own.write_text(renamed)
+    assert doubts("lines", "Mine") == doubts("lines", str(own)) == []
+    monkeypatch.setenv("OPENPANTO_LIBRARY", os.pathsep.join([str(project), "nowhere"]))
+    assert doubts("lines", "Mine") == ["OPENPANTO_LIBRARY names no folder with 'nowhere': correct it"]
+    with pytest.raises(UnknownNameError, match="OPENPANTO_LIBRARY names no folder with 'nowhere'"):
+        line_path("Other")
 
 
 def test_a_name_that_is_not_there_is_answered_by_the_known_ones(project):

@@ -15,7 +15,14 @@ from models.pantograph.multibody.analysis.linearisation import (
     modes,
     receptance,
 )
-from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium, settle_springs
+from models.pantograph.multibody.analysis.mechanism_freedom import (
+    FreeMotion,
+    degrees_of_freedom,
+    freedom_warning,
+    name_motions,
+)
+from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium
+from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 
@@ -51,6 +58,8 @@ class Dynamics:
     height, contact_force, lift : float
         The equilibrium: strip height above top of rail [m], contact force [N], lifting value [N or N.m].
     modes : tuple of Mode
+    motions : tuple of FreeMotion
+        The modes in words.
     frequency : ndarray, shape (f,)
         [Hz]
     receptance, apparent_mass, base_transmission : ndarray, shape (f,)
@@ -61,6 +70,7 @@ class Dynamics:
     contact_force: float
     lift: float
     modes: tuple[Mode, ...]
+    motions: tuple[FreeMotion, ...]
     frequency: FloatArray
     receptance: ComplexArray
     apparent_mass: ComplexArray
@@ -88,13 +98,23 @@ class Rig:
     def __init__(self, definition: MechanismDefinition) -> None:
         self.definition = definition
         self.mechanism = Mechanism(definition)
-        self._start = settle_springs(self.mechanism)
-        self.base_height = definition.reference_height - self.mechanism.strip_height(self._start)
+        posture = take_posture(self.mechanism)
+        self._start = posture.reference
+        self.base_height = posture.base_height
+
+    @property
+    def freedom(self) -> int:
+        """Number of independent motions that the joints allow."""
+        return degrees_of_freedom(self.mechanism, self._start)
+
+    def warning(self, contact_force: float) -> str:
+        """Say so if there are motions too many, or some that grow, under a contact force [N]; empty if not."""
+        return freedom_warning(self.mechanism, self._start, contact_force)
 
     @property
     def lift_unit(self) -> str:
         """Unit of the lifting value."""
-        return "N.m" if self.definition.lifts_by_moment else "N"
+        return self.definition.lift_unit
 
     def statics(self, heights: FloatArray, contact_force: float = 157.5) -> Statics:
         """Return the statics at strip heights above top of rail [m], going up and down from the reference height."""
@@ -146,11 +166,13 @@ class Rig:
         )
         try:
             model = linearise(self.mechanism, found.y, found.inputs)
+            free = modes(self.mechanism, model)
             return Dynamics(
                 height,
                 contact_force,
                 found.lift,
-                modes(self.mechanism, model),
+                free,
+                name_motions(self.mechanism, free),
                 np.asarray(frequencies, dtype=np.float64),
                 receptance(model, frequencies),
                 apparent_mass(model, frequencies),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -11,13 +12,22 @@ import numpy as np
 from models.arrays import FloatArray
 from models.pantograph.multibody.analysis.linearisation import stiffness
 from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_assembly import assemble, coordinate, null_space, project
+from models.pantograph.multibody.mechanism_assembly import assemble, check_strip, coordinate, null_space, project
 
 _ITERATIONS: Final = 60
 #: Largest change of height from one solution to the next on the way to a distant one [m].
 _STAGE: Final = 0.05
+#: Degrees of freedom of a pantograph that is one: raise, heave and roll of the head.
+USUAL_FREEDOM: Final = 3
+#: How far from its assembled place the strip's body may come to rest [m, rad].
+_NEAR: Final = 0.1
+_UPRIGHT: Final = 0.2
 #: Residual load at which an equilibrium is accepted, relative to the weights.
 _BALANCED: Final = 1e-11
+
+
+#: A condition: state -> value that must vanish.
+Condition = Callable[[FloatArray], float]
 
 
 @dataclass(frozen=True)
@@ -42,10 +52,6 @@ class Equilibrium:
     def lift(self) -> float:
         """Lifting force or moment [N or N.m]."""
         return self.inputs.lift
-
-
-#: A condition: state -> value that must vanish.
-Condition = Callable[[FloatArray], float]
 
 
 def equilibrium(
@@ -85,6 +91,28 @@ def equilibrium(
         y, lift = _solve(mechanism, y, inputs, 0.0, _kept(mechanism, y))
     else:
         y, lift = _approach(mechanism, y, inputs, 0.0, strip_height)
+    return Equilibrium(y, inputs(lift), mechanism.strip_height(y))
+
+
+def equilibrium_where(
+    mechanism: Mechanism, condition: Condition, start: FloatArray, *, contact_force: float = 0.0, lift: float = 0.0
+) -> Equilibrium:
+    """Find the lifting value that balances the mechanism where a condition on its configuration holds.
+
+    Parameters
+    ----------
+    condition : callable
+        Takes a state, returns what must vanish there.
+    start : ndarray, shape (13 n,)
+        A state nearby.
+    lift : float
+        The lifting value to begin with [N or N.m].
+    """
+
+    def inputs(value: float) -> Inputs:
+        return Inputs(lift=value, force=contact_force)
+
+    y, lift = _solve(mechanism, start, inputs, lift, condition)
     return Equilibrium(y, inputs(lift), mechanism.strip_height(y))
 
 
@@ -151,12 +179,55 @@ def weight_carrying_lengths(mechanism: Mechanism, y: FloatArray) -> FloatArray:
 
 
 def settle_springs(mechanism: Mechanism) -> FloatArray:
-    """Give the springs that carry the weights their free lengths; return the working configuration at rest."""
-    y = assemble(mechanism)
+    """Give the springs that carry the weights their free lengths; return the working configuration at rest.
+
+    Raises
+    ------
+    MechanismError
+        If there is none, or if the strip then is far from where the assembly has it.
+    """
+    assembled = assemble(mechanism)
+    check_strip(mechanism, assembled)
     lines = mechanism.forces.lines
     if len(lines.carries):
-        lines.free_length[lines.carries] = weight_carrying_lengths(mechanism, y)
-    return equilibrium(mechanism, start=y).y
+        lines.free_length[lines.carries] = weight_carrying_lengths(mechanism, assembled)
+    found = equilibrium(mechanism, start=assembled).y
+    _check_nearness(mechanism, assembled, found)
+    return found
+
+
+def _check_nearness(mechanism: Mechanism, assembled: FloatArray, found: FloatArray) -> None:
+    """Refuse an equilibrium in which the strip hangs elsewhere, although the kept coordinate is where it should be.
+
+    The strip's body alone counts: a link that hangs from one end is a fault, but the strip may stand on the rest.
+    """
+    k = mechanism.strip_body
+    if k < 0:
+        return
+    was, now = mechanism.split(assembled), mechanism.split(found)
+    distance = float(np.linalg.norm(now.r[k] - was.r[k]))
+    angle = 2.0 * float(np.arccos(min(1.0, abs(float(now.p[k] @ was.p[k])))))
+    if distance <= _NEAR and angle <= _UPRIGHT:
+        return
+    kept = mechanism.definition.assembly
+    raise MechanismError(
+        f"{mechanism.definition.name}: with {kept.body}.{kept.coordinate} as written, the equilibrium has the strip's "
+        f"body '{mechanism.names[k]}' {distance:.3g} m and {np.degrees(angle):.3g} degrees from where it was put "
+        f"together, {mechanism.strip_height(found):.3g} m above the base: {_suspicion(mechanism, assembled)}"
+    )
+
+
+def _suspicion(mechanism: Mechanism, y: FloatArray) -> str:
+    """Return what the number of motions that the joints allow says about them."""
+    freedom = null_space(mechanism, y).shape[1]
+    if freedom <= USUAL_FREEDOM:
+        return f"check places, springs and lift ({freedom} degrees of freedom, as a pantograph has)"
+    rows = Counter(joint.name for joint in mechanism.joint_of_row)
+    listed = ", ".join(f"{name} {count}" for name, count in sorted(rows.items(), key=lambda item: item[1]))
+    return (
+        f"a joint is missing or too free ({freedom} degrees of freedom, a pantograph has {USUAL_FREEDOM}; "
+        f"joints with few constraints first: {listed})"
+    )
 
 
 def _approach(
@@ -199,7 +270,8 @@ def _solve(
         unknown += float(limit * step[-1])
     raise MechanismError(
         f"{mechanism.definition.name}: no static equilibrium found; strip at {mechanism.strip_height(y):.4g} m above "
-        f"the base, {abs(gap):.3g} m from where it is wanted, residual load {np.abs(load).max():.3g} N"
+        f"the base, {abs(gap):.3g} m from where it is wanted, residual load {np.abs(load).max():.3g} N: "
+        f"{_suspicion(mechanism, y)}"
     )
 
 

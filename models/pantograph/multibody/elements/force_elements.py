@@ -12,12 +12,14 @@ from typing import Final, NamedTuple, get_args
 import numpy as np
 
 from models.arrays import FloatArray
+from models.numerics.cubic_curve import CubicCurve
+from models.pantograph.multibody.elements.angle_elements import AngleStops, BodyAngle, Cam, PointDistance
 from models.pantograph.multibody.elements.moving_vectors import Handle, Kinematics, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross
 from models.pantograph.multibody.mechanism_definition import (
     ActuatorForce,
     ActuatorMoment,
-    AxisMoment,
+    AngleStop,
     BumpStop,
     Bushing,
     Force,
@@ -44,6 +46,7 @@ KNOWN: Final = (
     LiftingForce,
     ActuatorMoment,
     LiftingMoment,
+    AngleStop,
     Bushing,
     *get_args(JointFriction),
 )
@@ -60,7 +63,7 @@ class ForceElements:
     numbers : dict
         Body name -> number.
     orientations : ndarray, shape (n, 3, 3)
-        Orientations as written: where a bushing is untwisted.
+        Orientations as written: where a bushing is untwisted until ``untwist`` is told those as assembled.
     pool : VectorPool
         Takes the vectors of the elements; to be closed before ``compile``.
 
@@ -84,10 +87,15 @@ class ForceElements:
         rubbing = [(f, by_name[f.joint]) for f in forces if isinstance(f, JointFriction)]
         slides = [(f, j) for f, j in rubbing if isinstance(j, Prismatic)]
         self.lines = LineElements([f for f in forces if isinstance(f, LineForce)], numbers, pool)
-        self._moments = _Moments([f for f in forces if isinstance(f, AxisMoment)], numbers, pool)
+        turning = [f for f in forces if isinstance(f, ActuatorMoment | LiftingMoment)]
+        self._moments = _Moments(turning, numbers, pool)
         self._slides = _Lines([_Line.of(j, j.axis_i, numbers) for _, j in slides], len(numbers), pool)
         self._friction = np.array([f.level for f, _ in slides])
         self._transition = np.array([f.transition for f, _ in slides])
+        self.stops = AngleStops([f for f in forces if isinstance(f, AngleStop)], numbers, orientations)
+        self.cam: Cam | None = None
+        self.per_force: CubicCurve | None = None
+        self.lift_place = self._place_of_lift(forces, numbers, orientations)
         self._others: list[_Friction | _Bushing] = []
         for f in forces:
             if isinstance(f, JointFriction) and not isinstance(by_name[f.joint], Prismatic):
@@ -95,10 +103,27 @@ class ForceElements:
             elif isinstance(f, Bushing):
                 self._others.append(_Bushing(f, numbers, orientations))
 
+    @staticmethod
+    def _place_of_lift(
+        forces: Sequence[Force], numbers: dict[str, int], orientations: FloatArray
+    ) -> BodyAngle | PointDistance | None:
+        lifting = next((f for f in forces if isinstance(f, LiftingForce | LiftingMoment)), None)
+        if lifting is None:
+            return None
+        if isinstance(lifting, LiftingMoment):
+            return BodyAngle(lifting, numbers, orientations)
+        return PointDistance(lifting, numbers)
+
     def compile(self, pool: VectorPool) -> None:
         """Work out where everything comes from."""
         for elements in (self.lines, self._moments, self._slides):
             elements.compile(pool)
+
+    def untwist(self, orientations: FloatArray) -> None:
+        """Take the bodies' orientations, shape (n, 3, 3), as those in which no bushing is twisted."""
+        for element in self._others:
+            if isinstance(element, _Bushing):
+                element.untwist(orientations)
 
     def loads(self, kinematics: Kinematics, vectors: MovingVectors, w: FloatArray, lift: float) -> FloatArray:
         """Return the loads of all elements.
@@ -118,12 +143,33 @@ class ForceElements:
         if self._slides.count:
             speed = self._slides.lengths(vectors).rate
             total += self._slides.spread(self._friction * np.tanh(speed / self._transition), vectors)
+        if self.stops.stops:
+            self.stops.add_loads(total, kinematics.frames, w)
         for element in self._others:
             total += element.loads(kinematics, w)
         return total
 
+    def lift_value(self, kinematics: Kinematics, lift: float, uplift: float = 0.0) -> float:
+        """Return the force or moment of the lifting element [N or N.m].
+
+        Parameters
+        ----------
+        kinematics : Kinematics
+        lift : float
+            What is set of it [N, N.m or 1]: with a cam, what the cam makes of it acts.
+        uplift : float
+            Force that it brings to the strip besides [N]; a force that lifts takes it as it is.
+        """
+        if self.lift_place is None or (self.cam is None and uplift == 0.0):
+            return lift
+        if self.cam is None and self.per_force is None:
+            return lift + uplift
+        place = self.lift_place.at(kinematics)
+        value = lift if self.cam is None else self.cam.value(place, lift)
+        return value if self.per_force is None else value + uplift * self.per_force.at(place)
+
     def energy(self, vectors: MovingVectors) -> float:
-        """Return the potential energy of springs and bump stops [J]."""
+        """Return the potential energy of springs and bump stops [J]; that of angle stops is with ``stops``."""
         return self.lines.energy(vectors)
 
 
@@ -275,7 +321,9 @@ class _Stops:
 class _Moments:
     """Actuator moments: +M on body j and -M on body i about an axis of body i."""
 
-    def __init__(self, forces: Sequence[AxisMoment], numbers: dict[str, int], pool: VectorPool) -> None:
+    def __init__(
+        self, forces: Sequence[ActuatorMoment | LiftingMoment], numbers: dict[str, int], pool: VectorPool
+    ) -> None:
         self.count = len(forces)
         self._handles = [pool.vector(Vector(numbers[f.body_i], f.axis_i)) for f in forces]
         self._values = np.array([f.moment if isinstance(f, ActuatorMoment) else 0.0 for f in forces])
@@ -330,9 +378,13 @@ class _Bushing:
     def __init__(self, force: Bushing, numbers: dict[str, int], orientations: FloatArray) -> None:
         self._i, self._j = numbers[force.body_i], numbers[force.body_j]
         self._s_i, self._s_j = np.array(force.point_i), np.array(force.point_j)
-        self._rest = orientations[self._i].T @ orientations[self._j]
+        self.untwist(orientations)
         self._k, self._c = np.array(force.translation_stiffness), np.array(force.translation_damping)
         self._kr, self._cr = np.array(force.rotation_stiffness), np.array(force.rotation_damping)
+
+    def untwist(self, orientations: FloatArray) -> None:
+        """Take the relative orientation in which the bushing carries no moment."""
+        self._rest = orientations[self._i].T @ orientations[self._j]
 
     def loads(self, kinematics: Kinematics, w: FloatArray) -> FloatArray:
         frames, origins = kinematics.frames, kinematics.origins

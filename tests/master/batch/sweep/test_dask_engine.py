@@ -3,20 +3,16 @@
 import json
 import os
 import re
-import shutil
 import signal
 import socket
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 
 import pytest
-from pythonfmu.builder import FmuBuilder
 
 from master.errors import MasterError
+from tests import forked_commands
 from tests.master.batch.sweep.conftest import GRID, ROOT, ended, journal
-from tests.master.conftest import CATENARY
 
 distributed = pytest.importorskip("distributed")
 
@@ -42,10 +38,9 @@ class Cluster:
         self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
 
     def _start(self, kind, *options):
-        code = f"from distributed.cli.dask_{kind} import main; main()"
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment, "cwd": self.folder}
-        return subprocess.Popen([sys.executable, "-c", code, *options], **quiet)
+        command = (f"distributed.cli.dask_{kind}", *options)
+        return forked_commands.start(*command, cwd=self.folder, env=environment, crew="sweep")
 
     def add_worker(self):
         options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--death-timeout", "60")
@@ -105,17 +100,6 @@ def test_the_same_bits_here_with_processes_and_through_a_scheduler(swept, tmp_pa
     assert len(used["one"]) >= 2, "a process is renewed after two runs"
     assert len(used["two"]) == 2
     assert len(used["cluster"]) == 2
-
-
-@pytest.fixture
-def exiting_toy(toy, tmp_path):
-    """The toy scenario with a line whose FMU ends its process instead of failing."""
-    source = CATENARY.replace('raise RuntimeError("the wire broke at 100 percent load")', "import os; os._exit(3)")
-    assert source != CATENARY
-    script = tmp_path / "exiting_toy.py"
-    script.write_text(source)
-    shutil.copy(FmuBuilder.build_FMU(script, dest=tmp_path), toy / "resources" / "ToyCatenary.fmu")
-    return toy
 
 
 def test_a_run_whose_worker_always_dies_is_a_row_and_the_others_go_on(exiting_toy, command, tmp_path):
@@ -179,6 +163,17 @@ def test_an_interruption_ends_the_processes_and_leaves_what_is_finished(command,
     assert data["finished"] >= 2
     assert ended(command(*GRID, "--jobs", "1")) == (0, "")
     assert (tmp_path / "out" / "sweep.csv").read_bytes() == whole_table
+
+
+def test_processes_that_cannot_be_started_are_one_sentence(swept, tmp_path, monkeypatch):
+    def ended(**_):
+        raise RuntimeError("Nanny failed to start.") from OSError("Cannot allocate memory")
+
+    monkeypatch.setattr(dask_engine, "LocalCluster", ended)
+    text = "the 2 processes of --jobs cannot be started (Cannot allocate memory); start the sweep again"
+    with pytest.raises(MasterError, match=re.escape(text)):
+        swept("out", DaskEngine(jobs=2), **SMALL)
+    assert journal(tmp_path / "out") == []
 
 
 def test_a_scheduler_that_does_not_answer_is_one_sentence(command, tmp_path):

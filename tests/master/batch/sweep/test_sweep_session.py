@@ -8,9 +8,14 @@ import time
 
 import pytest
 
+from master import run_session
+from master.batch.sweep.pages import grid_charts
 from master.batch.sweep.sweep_engines import HereEngine
-from master.batch.sweep.sweep_run import WORK
+from master.batch.sweep.sweep_plan import SweepRequest
+from master.batch.sweep.sweep_session import PreparedSweep, sweep, write_report
+from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError
+from master.results.results_folder import WORK
 from tests.master.batch.sweep.conftest import GRID, ended, journal
 
 STIFFNESSES = {"over": {"catenary.stiffness": "4000,5000,6000"}}
@@ -35,7 +40,8 @@ class Backwards(HereEngine):
 
                 def made(runs):
                     for run in reversed(runs):
-                        self.made.append(run.number)
+                        if not run.is_rehearsal:
+                            self.made.append(run.number)
                         yield from make([run])
 
                 yield made
@@ -117,10 +123,33 @@ def test_what_is_kept(swept, tmp_path, keep, kept):
     assert list((tmp_path / "out").glob(f"runs/{WORK}*")) == []
 
 
+@pytest.mark.parametrize(("keep", "copied"), [("figures", 0), ("thinned", 0), ("failed", 2), ("all", 2)])
+def test_definitions_are_copied_only_into_folders_that_stay_whole(swept, monkeypatch, keep, copied):
+    calls = []
+    monkeypatch.setattr(run_session, "write_definitions", lambda folder, components: calls.append(folder))
+    swept(over={"catenary.stiffness": "4000,8000"}, keep=keep)
+    assert len(calls) == copied
+
+
 def test_the_static_force_is_found_for_the_mean_force(swept):
     done = swept(over={"catenary.stiffness": "4000,8000"}, mean_force="150 N", tolerance=0.5)
     assert [row["mean [N]"] for row in done.rows] == pytest.approx([150.0, 150.0], abs=0.5)
     assert all(row["static force [N]"] != 140.0 for row in done.rows)
+
+
+def test_fmus_that_are_built_anew_meanwhile_change_no_run(toy, toy_system, swept, tmp_path):
+    swept("whole", **STIFFNESSES)
+    prepared = PreparedSweep.of(toy_system, SweepRequest.read(STIFFNESSES))
+
+    def build(progress):
+        for path in (toy / "resources").glob("*.fmu"):
+            path.write_bytes(b"half an FMU")
+
+    sweep(prepared, tmp_path / "out", show=build)
+    assert (tmp_path / "out" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()
+    assert not any((tmp_path / "out").glob(f"{WORK}*"))
+    with pytest.raises(MasterError, match="has been built anew just now; start the sweep again"):
+        sweep(prepared, tmp_path / "late")
 
 
 def test_equal_runs_are_made_once(swept, tmp_path):
@@ -152,6 +181,22 @@ def test_an_interruption_leaves_what_is_finished(swept, tmp_path):
     with pytest.raises(InterruptedRunError, match="1 of 3 runs are finished"):
         swept("out", Impatient(), **STIFFNESSES)
     assert [row["run"] for row in table(tmp_path / "out")] == ["1"]
+    page = (tmp_path / "out" / "sweep.html").read_text()
+    assert "Interrupted. The runs so far follow." in page
+    assert "1 of 3 runs finished, 0 of them failed" in page
+
+
+def test_the_page_is_written_at_the_end_and_again_on_demand(swept, tmp_path, monkeypatch):
+    monkeypatch.setattr(grid_charts, "MOST_CHARTS", 1)  # drawing all takes seconds
+    swept(**STIFFNESSES)
+    folder = tmp_path / "out"
+    page = (folder / "sweep.html").read_text()
+    assert "3 of 3 runs finished" in page
+    (folder / "sweep.html").unlink()
+    written = write_report(folder)
+    assert (folder / "sweep.html").read_text() == page
+    assert [p.name for p in written] == ["sweep.html", "sweep_curves.png"]
+    assert all(p.stat().st_size > 5000 for p in written)
 
 
 def test_a_folder_of_something_else_is_left_alone(swept, tmp_path):
@@ -178,3 +223,18 @@ def test_a_command_that_is_ended_goes_on_where_it_was(command, tmp_path, number,
     assert ended(command(*GRID)) == (0, "")
     assert len(journal(tmp_path / "out")) == 9
     assert (tmp_path / "out" / "sweep.csv").read_bytes() == whole_table
+
+
+def test_the_verb_report_knows_a_sweep(swept, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(grid_charts, "MOST_CHARTS", 1)
+    swept(**STIFFNESSES)
+    folder = tmp_path / "out"
+    (folder / "sweep.html").unlink()
+    assert main(["report", str(folder), "--figures", "svg"]) == 0
+    assert capsys.readouterr().out.split() == [str(folder / n) for n in ("sweep.html", "sweep_curves.svg")]
+    assert "3 of 3 runs finished" in (folder / "sweep.html").read_text()
+    assert main(["report", str(folder), "--film", "a.gif"]) == 2
+    assert "holds a sweep; --measured, --film and --parquet are of a single run" in capsys.readouterr().err
+    (folder / "sweep.csv").write_text("run\n1,2\n")
+    assert main(["report", str(folder)]) == 1
+    assert "holds no sweep that can be read" in capsys.readouterr().err

@@ -45,6 +45,7 @@ def line_and_pantograph(tmp_path):
         ("stop", "2,3", "s", (2.0, 3.0)),
         ("line.law", "soft,hard", "", ("soft", "hard")),
         ("train.count", "1,2", "", ("1", "2")),
+        ("train.count", "1:7:3,9", "", ("1", "4", "7", "9")),
     ],
 )
 def test_values(line_and_pantograph, name, text, unit, values):
@@ -73,6 +74,9 @@ def test_a_name_without_component_is_that_of_every_pantograph(line_and_pantograp
         ("line.tension", "1:2:0N", "never lead from 1 to 2"),
         ("line.tension", "0:1:1e-9N", "more than 100000"),
         ("line.tension", "1N,1N", "appears more than once"),
+        ("train.count", "1:3:1,2", "appears more than once"),
+        ("train.count", "1:3", "a range is written FIRST:LAST:STEP"),
+        ("train.count", "0:1000000:1", "more than 100000"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(line_and_pantograph, name, text, said):
@@ -80,6 +84,19 @@ def test_what_cannot_be_is_one_sentence(line_and_pantograph, name, text, said):
         ParameterReader(line_and_pantograph, name).listed(text)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_cell_without_a_unit_where_one_is_needed_is_one_sentence(line_and_pantograph):
+    with pytest.raises(RequestError, match=r"^line\.tension: '18' needs a unit, as in '18 N'$"):
+        ParameterReader(line_and_pantograph, "line.tension").cells(("20 kN", "18"))
+    assert ParameterReader(line_and_pantograph, "line.tension", "kN").cells(("20", "18"))[1] == (20.0, 18.0)
+
+
+def test_the_value_of_the_scenario_comes_in_the_unit_that_is_asked_for(line_and_pantograph):
+    line_and_pantograph.component("line").parameters["tension"] = 19000.0
+    assert ParameterReader(line_and_pantograph, "line.tension").present("kN") == pytest.approx(19.0)
+    assert ParameterReader(line_and_pantograph, "line.temperature").present("degC") == 1.0
+    assert ParameterReader(line_and_pantograph, "stop").present("s") == 1.0
 
 
 def test_a_width_has_no_offset_of_its_unit(line_and_pantograph):

@@ -9,8 +9,25 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex, to_rgb
 
-from master.report.charts.chart import COLOURS, DASHES, GREY, MARK, Axis, Bars, Chart, Curve, Level, Ticks, stroke
+from master.report.charts.chart import (
+    COLOURS,
+    DASHES,
+    GREY,
+    MARK,
+    Axis,
+    Bars,
+    Cells,
+    Chart,
+    Curve,
+    Envelope,
+    Level,
+    Points,
+    Ticks,
+    ink_on,
+    stroke,
+)
 from master.report.charts.interactive_figure import interactive_figure
+from master.report.charts.sample_packing import packed
 from master.report.charts.static_figure import static_figure
 from master.report.html_markup import asset
 
@@ -118,3 +135,86 @@ def test_a_logarithmic_axis_is_one_in_both():
 def test_the_limits_that_are_not_met_wrap_on_a_narrow_page():
     rule = next(line for line in asset("style.css").splitlines() if line.startswith(".fail {"))
     assert "nowrap" not in rule  # several limits are one line too long for 400 px
+
+
+MAP = Cells(
+    np.array([[1.0, 2.0], [np.nan, 4.0]]),
+    (("1", "2"), ("", "4")),
+    np.array([[False, True], [False, False]]),
+    (("one", "two"), ("", "four")),
+)
+
+
+def test_a_map_has_its_values_in_their_cells_on_a_page_and_in_a_file():
+    whole, hatching = interactive_figure(chart(MAP))["data"]
+    cells = {(x, base + 0.5): k for k, (x, base) in enumerate(zip(whole["x"], whole["base"], strict=True))}
+    assert {place: whole["text"][k] for place, k in cells.items()} == {(0, 0): "1", (1, 0): "2", (1, 1): "4"}
+    assert (hatching["x"], hatching["base"]) == ([1], [-0.5])
+    assert hatching["marker"]["pattern"]["shape"] == "/"
+    (axes,) = static_figure([chart(MAP)]).axes
+    drawn = {t.get_position(): t.get_text() for t in axes.texts}
+    assert drawn == {(0, 0): "1", (1, 0): "2", (1, 1): "4"}
+    boxes = {(p.get_x() + 0.5, p.get_y() + 0.5): p for p in axes.patches}
+    assert {place for place, p in boxes.items() if p.get_hatch()} == {(1.0, 0.0)}
+    colours = whole["marker"]["color"]
+    assert {place: to_hex(p.get_facecolor()) for place, p in boxes.items()} == {p: colours[k] for p, k in cells.items()}
+
+
+def test_what_is_written_in_a_cell_can_be_read():
+    """The contrast is at least 4.5, as the accessibility guidelines of the web ask for (WCAG 2.1, 1.4.3)."""
+    values = np.linspace(0.0, 1.0, 201)[None, :]
+    blank = (("",) * 201,)
+    (colours,) = Cells(values, blank, values > 2.0, blank).colours
+
+    def luminance(colour):
+        v = np.array(to_rgb(colour))
+        return np.where(v > 0.03928, ((v + 0.055) / 1.055) ** 2.4, v / 12.92) @ (0.2126, 0.7152, 0.0722)
+
+    for colour in colours:
+        low, high = sorted((luminance(colour), luminance(ink_on(colour))))
+        assert (high + 0.05) / (low + 0.05) > 4.5
+    lightness = [luminance(c) for c in colours]
+    assert lightness == sorted(lightness, reverse=True)
+
+
+def test_bars_that_lie_have_their_intervals_along_the_abscissa():
+    bars = Bars(
+        "b",
+        np.array([0.0, 1.0]),
+        np.array([2.0, -3.0]),
+        interval=(np.array([1.0, -5.0]), np.array([2.5, -1.0])),
+        is_lying=True,
+    )
+    (trace,) = interactive_figure(chart(bars))["data"]
+    assert trace["orientation"] == "h"
+    assert trace["error_x"]["array"] == packed(np.array([0.5, 2.0]))
+    assert trace["error_x"]["arrayminus"] == packed(np.array([1.0, 2.0]))
+    (axes,) = static_figure([chart(bars)]).axes
+    assert [(p.get_y() + 0.5 * p.get_height(), p.get_width()) for p in axes.patches] == [(0.0, 2.0), (1.0, -3.0)]
+    (lines,) = (c for c in axes.collections if len(c.get_segments()) == 2)
+    assert [s[:, 0].tolist() for s in lines.get_segments()] == [[1.0, 2.5], [-5.0, -1.0]]
+
+
+def test_an_envelope_goes_forth_below_and_back_above_and_has_gaps():
+    low = np.array([0.0, 1.0, np.nan, 3.0, 4.0])
+    envelope = Envelope("e", np.arange(5.0), low, low + 1.0, COLOURS[0])
+    assert [x.tolist() for x, _ in envelope.outlines] == [[0.0, 1.0, 1.0, 0.0], [3.0, 4.0, 4.0, 3.0]]
+    assert [y.tolist() for _, y in envelope.outlines] == [[0.0, 1.0, 2.0, 1.0], [3.0, 4.0, 5.0, 4.0]]
+    (trace,) = interactive_figure(chart(envelope))["data"]
+    assert trace["fill"] == "toself"
+    nothing = Envelope("e", np.arange(2.0), np.full(2, np.nan), np.full(2, np.nan), COLOURS[0])
+    interactive_figure(chart(nothing))
+    static_figure([chart(nothing, envelope)])
+
+
+def test_names_are_text_on_a_page():
+    name = "<b>a</b> & b"
+    parts = (
+        Curve(name, X, X, stroke(0)),
+        Points(name, X, X, "x"),
+        Bars(name, (name,), np.ones(1)),
+        Bars("b", X, X, words=(name,) * len(X)),
+    )
+    drawn = interactive_figure(chart(*parts, x=Axis(name, ticks=(0.0,), words=(name,))))
+    assert "<b>" not in str(drawn)
+    assert drawn["data"][0]["name"] == "&lt;b&gt;a&lt;/b&gt; &amp; b"

@@ -281,7 +281,7 @@ def test_a_line_without_mass_is_one_sentence(line_maker, monkeypatch):
         matrices = dataclasses.replace(state.shape.matrices, M=0.0 * state.shape.matrices.M)
         return dataclasses.replace(state, shape=dataclasses.replace(state.shape, matrices=matrices))
 
-    monkeypatch.setattr("models.catenary.line_model.find_form", weightless)
+    monkeypatch.setattr("models.catenary.line_model.kept_form", weightless)
     with pytest.raises(EquilibriumError, match=r"line 'short' cannot move in modes .*not positive"):
         CatenaryModel(line_maker(spans=3))
 

@@ -6,10 +6,17 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 from models.definition_files.parameter import ParameterError
+from models.numerics.kernel_cache import SWITCH
 from models.pantograph.lumped.lumped_model import LumpedModel
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
 
 POINT, BASE = np.zeros(3), np.zeros(2)
+
+
+@pytest.fixture(params=["numpy", "auto"], autouse=True)
+def kernel(request, monkeypatch):
+    """Do everything twice: to be read, and in compiled kernels where numba is installed."""
+    monkeypatch.setenv(SWITCH, request.param)
 
 
 def test_equations_are_those_of_three_masses(cx):
@@ -207,3 +214,42 @@ def test_snapshots_continue_identically(cx):
 def test_wrong_parameters_are_refused_by_name(cx, name, value):
     with pytest.raises(ParameterError, match=name.replace("[", r"\[").replace("]", r"\]")):
         cx.with_values({name: value})
+
+
+@pytest.mark.parametrize("step", [1e-4, 1e-3, 1e-2])
+def test_the_transition_is_the_step_in_displacements(cx, step):
+    """Solved for accelerations in one place, for displacements in the other."""
+    model, rng = LumpedModel(cx), np.random.default_rng(2)
+    state, load = model.initial_state(), 100.0 * rng.standard_normal(3)
+    state.displacement, state.velocity, state.acceleration = rng.standard_normal((3, 3)) * [[1e-2], [1e-1], [1.0]]
+    before = np.column_stack([state.displacement, state.velocity, state.acceleration]).ravel()
+    after = model.transition(step) @ np.concatenate([before, load])
+    model.advance(state, step, model.free_response(state, step, load))
+    assert after[0::3] == pytest.approx(state.displacement, rel=1e-12)
+    assert after[1::3] == pytest.approx(state.velocity, rel=1e-10)
+    assert after[2::3] == pytest.approx(state.acceleration, rel=1e-8)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("lead", [0.0, 1.0])
+def test_kernels_make_the_same_steps(monkeypatch, cx, order, lead):
+    """Also values valid at a step's end, a moving roof, several steps in one, contact lost and found again."""
+    pytest.importorskip("numba")
+    found = []
+    for kernel in ("numpy", "numba"):
+        monkeypatch.setenv(SWITCH, kernel)
+        definition = cx.with_values({"extrapolation_order": order, "raise_start": 0.01, "raise_duration": 0.05})
+        part = LumpedPantographPart(definition)
+        part.initialise(0.5, 20.0, POINT, BASE)
+        rows = [part.outputs.copy()]
+        for n in range(60):
+            h = 2.5e-3 if n % 3 == 0 else 1e-3
+            t = part.time
+            point = np.array([definition.start_position + definition.speed * (t - 0.5 + lead * h), 0.0, 0.0])
+            base = np.array([1e-2 * np.sin(9.0 * t), 9e-2 * np.cos(9.0 * t)])
+            part.step(0.0 if 20 < n < 30 else _force(t + lead * h), point, base, h)
+            rows.append(part.outputs.copy())
+        found.append(np.array(rows))
+    # Accelerations jump with the force, so they stay large; the sums are in another order, nothing else differs.
+    assert found[1] == pytest.approx(found[0], rel=1e-12, abs=1e-12)
+    assert np.abs(np.diff(found[0], axis=0)[:, 12:]).max() > 1.0

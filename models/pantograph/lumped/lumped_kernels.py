@@ -1,0 +1,159 @@
+"""A macro step of a lumped pantograph, for numba; see `lumped_part.LumpedPantographPart.step`.
+
+The same arithmetic; only the sums of the product with the transition matrix are in another order. This module imports
+nothing of the project: it is compiled from a copy in the user's cache, which cannot see other files.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+from numba import njit
+
+#: Of the contact force: number of values known, their times, the values, latest first.
+WIDTH = 7
+_KNOWN, _TIME, _FORCE = 0, 1, 4
+#: As in `models.numerics.extrapolation`.
+_STAMP_TOLERANCE = 0.25
+_LEAST_TRAVEL = 1e-9
+#: What does not change in a run: the order of the extrapolation, then values of the definition and of its lowest stage.
+Constants = namedtuple(
+    "Constants",
+    (
+        "order",
+        "static_force",
+        "raise_start",
+        "raise_duration",
+        "stiffness",
+        "damping",
+        "start_position",
+        "speed",
+        "reference_height",
+    ),
+)
+
+_compiled = njit(cache=True, error_model="numpy")
+
+
+@_compiled
+def step(
+    known, values, transition, constants, began, time, duration, count, force, x, base,
+    reference, roof, rate, following, own, outputs,
+):  # fmt: skip
+    """Step from ``time`` over ``duration`` in ``count`` equal steps.
+
+    Parameters
+    ----------
+    known : ndarray, shape (7,)
+        What is known of the contact force, replaced.
+    values : ndarray, shape (4 n,)
+        Motion, replaced, and work space for the load; see `LumpedModel.transition`.
+    transition : ndarray, shape (3 n, 4 n)
+        Of a step of ``duration / count``.
+    constants : ndarray, shape (9,)
+        See `Constants`.
+    began, time, duration : float
+        When the run began, when the step does, how long it is [s].
+    count : int
+    force, x : float
+        Contact force [N] and place along the track [m] where it acts, as received.
+    base : ndarray, shape (2,)
+        Height and velocity of the roof [m, m/s].
+    reference, roof, rate : float
+        What the lowest spring hangs on, height of the roof before, rate given from outside [m, m, m/s].
+    following : ndarray, shape (5,)
+        Stiffness of a spring that follows (0: none), keep, before, after, lead; see `FollowingReference`.
+    own : ndarray, shape (n,)
+        Loads that do not change in the step [N].
+    outputs : ndarray, shape (12 + 3 n,)
+        Result: ends of the strip and what is observed of the masses.
+
+    Returns
+    -------
+    float
+        The reference after the step [m].
+    """
+    c = Constants(*constants_of(constants))
+    rows, columns = transition.shape
+    n = columns - rows
+    h, result = duration / count, np.empty(rows)
+    receive(known, time, force, x, c.start_position + c.speed * (time - began), c.speed, duration)
+    for k in range(1, count + 1):
+        end = time + k * h
+        height, velocity = base[0] + k * h * base[1], base[1]
+        values[rows:] = own
+        uplift = c.static_force * raised(end - began, c.raise_start, c.raise_duration)
+        values[rows] += uplift + (c.stiffness * height + c.damping * velocity)
+        before = values[0] - roof
+        reference = following[1] * reference + following[2] * before + following[4] * rate
+        values[rows] += following[0] * (reference - following[3] * height)
+        values[rows + n - 1] -= at(known, c.order, end)
+        for i in range(rows):
+            total = 0.0
+            for j in range(columns):
+                total += transition[i, j] * values[j]
+            result[i] = total
+        values[:rows] = result
+        reference += following[3] * (values[0] - height)
+        roof = height
+    place(values, c.start_position + c.speed * (time + duration - began), c.reference_height, n, outputs)
+    return reference
+
+
+@_compiled
+def constants_of(array):
+    """Return the constants as a tuple."""
+    return array[0], array[1], array[2], array[3], array[4], array[5], array[6], array[7], array[8]
+
+
+@_compiled
+def place(values, x, reference_height, n, outputs):
+    """Write where the ends of the strip are and what is observed of the masses."""
+    for side in range(0, 12, 6):
+        outputs[side] = x
+        outputs[side + 2] = reference_height + values[3 * n - 3]
+        outputs[side + 5] = values[3 * n - 2]
+    for i in range(0, 3 * n, 3):
+        outputs[12 + i] = reference_height + values[i]
+        outputs[13 + i], outputs[14 + i] = values[i + 1], values[i + 2]
+
+
+@_compiled
+def raised(time, start, duration):
+    """Return the share of the uplift that acts; see `Operation.raised`."""
+    if time < start:
+        return 0.0
+    if duration == 0.0:
+        return 1.0
+    return min(1.0, (time - start) / duration)
+
+
+@_compiled
+def receive(known, time, force, x, expected, speed, step):
+    """Take a force for a step that begins at ``time``; see `ForceExtrapolation.receive_at`."""
+    travel = speed * step
+    if abs(travel) >= _LEAST_TRAVEL and abs((x - expected) / travel - 1.0) < _STAMP_TOLERANCE:
+        time = time + step
+    if known[_KNOWN] > 0.0 and time <= known[_TIME] + 1e-12:
+        known[_FORCE] = force
+        return
+    for k in range(2, 0, -1):
+        known[_TIME + k], known[_FORCE + k] = known[_TIME + k - 1], known[_FORCE + k - 1]
+    known[_TIME], known[_FORCE] = time, force
+    known[_KNOWN] = min(known[_KNOWN] + 1.0, 3.0)
+
+
+@_compiled
+def at(known, order, time):
+    """Return the force at ``time``; see `ForceExtrapolation.at`."""
+    t0, t1, t2 = known[_TIME], known[_TIME + 1], known[_TIME + 2]
+    f0, f1, f2 = known[_FORCE], known[_FORCE + 1], known[_FORCE + 2]
+    if f0 == 0.0 and time > t0:
+        return 0.0
+    degree, result = min(order, known[_KNOWN] - 1.0), f0
+    if degree >= 1.0:
+        first = (f0 - f1) / (t0 - t1)
+        result += first * (time - t0)
+        if degree >= 2.0:
+            second = (first - (f1 - f2) / (t1 - t2)) / (t0 - t2)
+            result += second * (time - t0) * (time - t1)
+    return result if result > 0.0 else 0.0

@@ -1,0 +1,96 @@
+"""Which dropper matters: each fault alone against the healthy line."""
+
+import math
+
+import numpy as np
+import pytest
+
+from master.batch.sweep.pages.criticality import criticalities, criticality_charts, ranking_rows
+from master.batch.sweep.pages.sweep_page import chapters, page
+from tests.master.batch.sweep.pages.conftest import failure, row, view
+
+FAULTS = [f"line.fault[{k}].active" for k in (1, 2, 3)]
+PLACES = {
+    f: f"whether the fault acts: 1 yes, 0 no; dropper {d} of span 14 at {x} m"
+    for f, d, x in zip(FAULTS, (3, 1, 2), (618.70, 605.20, 611.95), strict=True)
+}
+
+
+def acting(*numbers):
+    return {f: "1" if k in numbers else "0" for k, f in enumerate(FAULTS, 1)}
+
+
+ROWS = [
+    row(1, acting(), maximum=200.0, sigma=40.0),
+    row(2, acting(1), maximum=210.0, sigma=39.0),
+    row(3, acting(2), maximum=230.0, sigma=44.0),
+    row(4, acting(3), maximum=190.0, sigma=41.0),
+    row(5, acting(1, 2), maximum=900.0, sigma=90.0),
+]
+
+
+def faults(rows, places=PLACES):
+    setting = {"limits": None, "speeds": {}, "places": places}
+    whole = view(rows, dict.fromkeys(FAULTS, ""), setting=setting)
+    return criticalities(whole, whole.rows_of("front"), [])
+
+
+def test_each_fault_alone_is_compared_with_the_healthy_line():
+    (found,) = faults(ROWS)
+    assert [d.position for d in found.droppers] == [605.20, 611.95, 618.70]
+    assert found.droppers[0].name == "span 14, dropper 1"
+    assert [f.name for f in found.figures] == ["maximum", "sigma", "uplift"]
+    assert found.healthy[:2] == (200.0, 40.0)
+    assert found.faulty[:, 0].tolist() == [230.0, 190.0, 210.0]
+
+
+def test_bars_stand_at_the_droppers():
+    chart = criticality_charts(faults(ROWS), "f")[0]
+    (bars,) = chart.parts
+    assert bars.x.tolist() == [605.20, 611.95, 618.70]
+    assert bars.y.tolist() == [30.0, -10.0, 10.0]
+
+
+def test_the_ranking_begins_with_the_greatest_maximum():
+    rows = ranking_rows(faults(ROWS))
+    assert rows[0][:3] == ["none, the healthy line", "", "200.0"]
+    assert [r[0] for r in rows[1:]] == ["span 14, dropper 1", "span 14, dropper 3", "span 14, dropper 2"]
+    assert rows[1][1:4] == ["605.20", "230.0 (+15.0 %)", "44.0 (+10.0 %)"]
+
+
+def test_without_places_droppers_have_the_names_of_their_faults():
+    (found,) = faults(ROWS, {})
+    assert math.isnan(found.droppers[0].position)
+    (bars,) = criticality_charts([found], "f")[0].parts
+    assert bars.x == ("line.fault[1]", "line.fault[2]", "line.fault[3]")
+
+
+def test_a_fault_whose_run_failed_is_not_drawn_as_harmless():
+    rows = [*ROWS[:3], failure(4, acting(3), "no")]
+    (found,) = faults(rows)
+    assert [d.name for d in found.droppers] == ["span 14, dropper 1", "span 14, dropper 3"]
+    missing = [*ROWS[:3], row(4, acting(3), maximum=None, sigma=None, mean=None)]
+    (found,) = faults(missing)
+    assert np.isnan(found.faulty[1, 0])
+    assert ranking_rows([found])[-1][2] == "-"
+
+
+@pytest.mark.parametrize("rows", [ROWS[1:], ROWS[:1], []], ids=["no healthy line", "no fault", "nothing"])
+def test_without_a_comparison_there_is_none(rows):
+    assert faults(rows) == []
+
+
+def test_the_page_shows_what_acts_and_mixes_no_faults_into_its_other_charts():
+    rows = [
+        row(10 * i + r["run"], {**{f: r[f] for f in FAULTS}, "speed [km/h]": v}, maximum=r["maximum [N]"] + v)
+        for i, v in enumerate((200.0, 300.0))
+        for r in ROWS
+    ]
+    whole = view(rows, {**dict.fromkeys(FAULTS, ""), "speed [km/h]": ""}, over=("speed",), setting={"places": PLACES})
+    faults, curves = chapters(whole)
+    assert [b.name for b in faults.charts[0].parts] == ["speed 200 km/h", "speed 300 km/h"]
+    maximum = next(c for c in curves.charts if c.title == "Maximum")
+    assert [p.y.tolist() for p in maximum.parts] == [[400.0, 500.0]]
+    html = page(whole)
+    assert "<td>span 14, dropper 3; span 14, dropper 1</td>" in html
+    assert "3: line.fault[1].active to line.fault[3].active" in html

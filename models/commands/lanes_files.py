@@ -83,6 +83,9 @@ def _job(path: Path, data: Mapping[str, Any]) -> LaneJob:
         raise ParameterError(f"{path}: there is no lane, or no pantograph")
     monitored = [line.name] if line.monitor_energy else []
     monitored += [p.name for lane in lanes for p in lane.pantographs if p.monitor_energy]
+    followed = [p.name for lane in lanes for p in lane.pantographs if p.follow_height]
+    if followed:
+        raise ParameterError(f"{followed[0]}: in lanes no pantograph follows the height; set follow_height to 0")
     if monitored:
         raise ParameterError(f"{monitored[0]}: lanes keep no balance of energy; set monitor_energy to 0")
     return LaneJob(line, lanes, plan)

@@ -188,6 +188,7 @@ class LaneBlock:
         trains.masses[lane, p], trains.steps[lane, p], trains.length[lane, p] = n, count, newmark.step
         trains.mass[lane, p, :n] = np.diag(model.M)
         trains.damping[lane, p, :n, :n] = model.C
+        trains.air[lane, p, :n] = np.array(definition.air_shares) * definition.aerodynamic_force(0.0)
         trains.inverse[lane, p, :n, :n] = np.linalg.inv(model.K + newmark.a0 * model.M + newmark.a1 * model.C)
         half, middle = 0.5 * definition.strip_length, definition.strip_offset
         values = {
@@ -269,6 +270,7 @@ class LaneBlock:
         K, train = self.lanes, self._train
         return train.Trains(
             mass=np.zeros((K, P, masses)),
+            air=np.zeros((K, P, masses)),
             inverse=np.zeros((K, P, masses, masses)),
             damping=np.zeros((K, P, masses, masses)),
             masses=np.ones((K, P), np.int64),

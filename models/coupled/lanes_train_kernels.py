@@ -24,12 +24,14 @@ _STAMP_TOLERANCE, _LEAST_TRAVEL, _SAME_TIME = 0.25, 1e-9, 1e-12
 X, Z, VX, VZ, AZ, TIME, RECEIVED = range(7)
 #: What ``forces`` holds: three times, three values, latest first, and how many are known.
 KNOWN, FORCES = 6, 7
-#: Pantographs of all lanes, arrays (lanes, P, ...): masses; inverse of K_hat and damping matrix; number of masses and
-#: of inner steps; length of such a step; displacement, velocity, acceleration of the masses; see above for the rest.
+#: Pantographs of all lanes, arrays (lanes, P, ...): masses, loads of the air on them, inverse of K_hat and damping
+#: matrix; number of masses and of inner steps; length of such a step; displacement, velocity, acceleration of the
+#: masses; see above for the rest.
 Trains = namedtuple(
     "Trains",
-    ("mass", "inverse", "damping", "masses", "steps", "length", "motion", "setting", "strip", "received", "forces"),
-)
+    ("mass", "air", "inverse", "damping", "masses", "steps", "length", "motion", "setting", "strip", "received",
+     "forces"),
+)  # fmt: skip
 _OPTIONS: Any = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
 #: Functions that are called from outside, and those that are not: what leads into these from Python is not compiled.
 _compiled = njit(cache=True, **_OPTIONS)
@@ -74,7 +76,8 @@ def start(trains, lane, time, contact):
         trains.motion[lane, p, 2, 0] = setting[STATIC_FORCE] * raised(setting, 0.0)
         trains.motion[lane, p, 2, trains.masses[lane, p] - 1] -= contact[p]
         for i in range(trains.masses[lane, p]):
-            trains.motion[lane, p, 2, i] /= trains.mass[lane, p, i]
+            load = trains.motion[lane, p, 2, i] + trains.air[lane, p, i]
+            trains.motion[lane, p, 2, i] = load / trains.mass[lane, p, i]
         place_strip(trains, lane, p, 0.0)
         received[: VZ + 1] = trains.strip[lane, p]
         received[AZ], received[TIME] = 0.0, time
@@ -183,7 +186,7 @@ def step_masses(trains, lane, p, uplift, contact):
     load[0] += uplift
     load[n - 1] -= contact
     for i in range(n):
-        load[i] += mass[i] * (a0 * motion[0, i] + a2 * motion[1, i] + motion[2, i])
+        load[i] += trains.air[lane, p, i] + mass[i] * (a0 * motion[0, i] + a2 * motion[1, i] + motion[2, i])
         for j in range(n):
             load[i] += damping[i, j] * (a1 * motion[0, j] + motion[1, j])
     for i in range(n):

@@ -152,9 +152,17 @@ def _check_component(component: Component, *, is_pantograph: bool) -> None:
         if variable.causality != "parameter":
             text = f"{component.name}.{name}: it sets no start value of an {variable.causality}"
             raise RequestError(f"--engine lanes, {text}; {_INSTEAD}")
-    monitored = component.parameters.get("monitor_energy", component.fmu.variables["monitor_energy"].start)
-    if float(monitored or 0.0):
+    if _chosen(component, "follow_height"):
+        text = f"has no pantograph that follows the height ({component.name}.follow_height)"
+        raise RequestError(f"--engine lanes {text}; {_INSTEAD}")
+    if _chosen(component, "monitor_energy"):
         raise RequestError(f"--engine lanes keeps no balance of energy ({component.name}.monitor_energy); {_INSTEAD}")
+
+
+def _chosen(component: Component, name: str) -> bool:
+    """Whether a parameter that is 0 or 1 is not 0; False if there is none."""
+    variable = component.fmu.variables.get(name)
+    return variable is not None and bool(float(component.parameters.get(name, variable.start or 0.0)))
 
 
 def _definition(fmu: Fmu) -> bytes:

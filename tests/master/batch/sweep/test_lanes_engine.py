@@ -139,7 +139,7 @@ def output(base, contact, strip):
         "strip": np.concatenate([strip, np.zeros((count, 2))], axis=1)[:, None],
         "uplift": np.zeros((count, supports)),
         "slack": np.zeros((-(-count // rate), droppers), dtype=np.bool_),
-        "dropper_force": np.zeros((0, droppers)),
+        "dropper_force": np.zeros((-(-count // rate), droppers)),
     }
     return LaneOutput({"failure": "", "ends": [[0.7, -0.7]]}, arrays)
 

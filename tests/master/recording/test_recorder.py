@@ -45,6 +45,23 @@ def test_file_and_memory_agree(tmp_path, fake_slave):
     assert again[NAME] == pytest.approx(recorder.read_back()[NAME], rel=1e-9)
 
 
+def test_every_source_has_its_columns(tmp_path, fake_slave):
+    """In a block of rows as in one."""
+    network = Network([fake_slave("s", (), ("y",), np.zeros(1), lambda s, u, t, h: np.zeros(1))], [])
+    first, second, read = np.zeros(2), np.zeros(1), []
+    sources = [RecordedValues(["a", "b"], first), RecordedValues(["c"], second, lambda: read.append(1))]
+    for is_steady in (False, True):
+        path = tmp_path / f"{is_steady}.csv"
+        recorder = Recorder(path, sources, {}, is_steady=is_steady)
+        for n in range(4):
+            first[:], second[:] = (10.0 + n, 20.0 + n), 30.0 + n
+            recorder.observe(n, 1e-3 * n, network)
+        recorder.finish()
+        rows = np.loadtxt(path, delimiter=",", skiprows=1)
+        assert rows.tolist() == [[1e-3 * n, 10.0 + n, 20.0 + n, 30.0 + n] for n in range(4)]
+    assert len(read) == 8
+
+
 def test_rows_reach_the_disk_while_the_run_goes_on(tmp_path, fake_slave):
     path, seen = tmp_path / "a.csv", []
 

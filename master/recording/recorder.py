@@ -75,8 +75,8 @@ class Recorder:
         self._every = every
         ends = list(itertools.accumulate((len(s.names) for s in sources), initial=1))
         self._places = [(s, slice(*ends)) for s, ends in zip(sources, itertools.pairwise(ends), strict=True)]
-        self._format = (",".join([NUMBER_FORMAT] * ends[-1]) + "\n").encode()
         self._is_steady = is_steady
+        self._format = (",".join([NUMBER_FORMAT] * ends[-1]) + "\n").encode()
         self._waiting: FloatArray = np.empty((1 if is_steady else ROWS_PER_FLUSH, ends[-1]))
         self._unformatted = 0  # rows that wait there
         self._lines: list[bytes] = []

@@ -370,10 +370,20 @@ def add_new(verbs: Any) -> None:
     parser.add_argument("--speed", required=True, type=finite_number, metavar="KM/H", help="of the train [km/h]")
     text = "where figures are taken [m]; by default as many spans as the line has room for, ten at most"
     parser.add_argument("--interval", nargs=2, type=finite_number, metavar=("START", "END"), help=text)
+    text = "whose limits apply and whose upper mean force calibrate seeks: AC (default), 'DC 1.5kV', 'DC 3kV'"
+    parser.add_argument("--supply", type=_supply, default="AC", metavar="SYSTEM", help=text)
     text = "which variable of an FMU a port is (A.x ... B.vz, contact.force), if its name does not say; repeatable"
     port = partial(assignment, form="PORT=VARIABLE")
     parser.add_argument("--map", action="append", type=port, default=[], metavar="PORT=VARIABLE", help=text)
     parser.set_defaults(verb=_new)
+
+
+def _supply(text: str) -> str:
+    """Return the name that limits have for a supply system."""
+    name = text.upper().replace(" ", "").replace("KV", "")
+    if name not in ("AC", "DC1.5", "DC3"):
+        raise argparse.ArgumentTypeError(f"'{text}' has no limits here: give AC, 'DC 1.5kV' or 'DC 3kV'")
+    return name
 
 
 def add_new_line(verbs: Any) -> None:
@@ -395,7 +405,7 @@ def _add_copy(verbs: Any, verb: str, kind: str) -> None:
 
 def _new(options: argparse.Namespace) -> int:
     """Write a project."""
-    from master.evaluation.en50367_limits import LimitChoice, limits_at
+    from master.evaluation.en50367_limits import SUPPLIES, LimitChoice, limits_at
     from master.scenario.project import new_project as projects
     from master.scenario.project.stretch import Wire, check_speed
     from models.library import definition_facts as facts
@@ -404,7 +414,7 @@ def _new(options: argparse.Namespace) -> int:
     projects.check_folder(options.folder)
     check_speed(options.speed / 3.6)
     name, speed = projects.project_name(options.folder), options.speed / 3.6
-    wire, lifts = None, {}
+    wire, lifts, raised = None, {}, 0.0
     line, definition = _source("lines", options.line, name, load_line)
     if definition is not None:
         wire = Wire(options.line, *facts.line_facts(definition))
@@ -413,13 +423,17 @@ def _new(options: argparse.Namespace) -> int:
         pantograph, definition = _source("pantographs", given, name, load_pantograph)
         train.append(pantograph)
         if definition is not None:
+            raised = raised if len(train) > 1 else facts.raised_after(definition)
             lifts[pantograph.name] = projects.Lift(*facts.lift_facts(definition))
-    target = limits_at(speed, LimitChoice()).mean_upper.value
+    target = limits_at(speed, LimitChoice(options.supply)).mean_upper.value
     interval = tuple(options.interval) if options.interval else None
     request = projects.Request(
-        options.folder, line, wire, train, lifts, options.separation, speed, target, interval, options.map
-    )
+        options.folder, line, wire, train, lifts, options.separation, speed, target, interval, options.map,
+        (options.supply, SUPPLIES[options.supply]), raised,
+    )  # fmt: skip
     projects.new_project(request)
+    if doubt := projects.doubt(request):
+        print(f"note: {doubt}", file=sys.stderr)
     print(f"{options.speed:g} km/h; {options.folder / 'README.md'} says what each file is and what was chosen")
     print(f"next: openpanto run {shlex.quote(str(options.folder))}")
     return 0

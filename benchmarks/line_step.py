@@ -18,7 +18,9 @@ from timing import by_turns, on_one_thread, table
 
 from models.catenary.contact_and_slack import local_problem
 from models.catenary.line_model import CatenaryModel
-from models.catenary.step import numpy_engine
+from models.catenary.step import linear_step
+from models.catenary.step.compiled_line_step import CompiledLineStep
+from models.catenary.step.plain_step import PlainStep
 from models.coupled.monolithic import CoupledModel
 from models.library.catalogue import load_line, load_lumped
 from models.pantograph.lumped.lumped_model import LumpedModel
@@ -39,7 +41,7 @@ def main(name: str) -> None:
         "line under a pantograph, monolithic": under,
         "line as FMU, without contact": lambda: fmu(STEPS),
     }
-    if isinstance(model._step(STEP).engine, numpy_engine.NumpyEngine):
+    if isinstance(model._engine(STEP), PlainStep):
         jobs["line, coupling by rows"] = without_load(by_rows(name))
     best = by_turns(jobs)
     each = {}
@@ -56,13 +58,17 @@ def main(name: str) -> None:
 
 def parts(model: CatenaryModel) -> Parts:
     """Return part of a step -> class and methods that it is done in; what they call in another part counts there."""
-    engine = type(model._step(STEP).engine)
+    pantograph = {"pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of"))}
+    engine = model._engine(STEP)
+    if isinstance(engine, CompiledLineStep):
+        compiled = {"line, compiled (CompiledLineStep)": (CompiledLineStep, ("_run",))}
+        return {**compiled, **pantograph, "rest of the line": (CatenaryModel, ("step",))}
     return {
-        f"products ({engine.__name__})": (engine, ("begin", "finish")),
-        f"band solution ({engine.__name__})": (engine, ("solve",)),
-        "finding the contact": (CatenaryModel, ("_candidates",)),
+        "products": (linear_step.LinearStep, ("begin", "finish")),
+        "band solution": (linear_step.LinearStep, ("solve",)),
+        "finding the contact": (PlainStep, ("_candidates",)),
         "contact force and slack droppers": (local_problem.LocalProblem, ("solve",)),
-        "pantograph": (LumpedModel, ("load", "free_response", "compliance", "advance", "velocity_of")),
+        **pantograph,
         "rest of the line": (CatenaryModel, ("step",)),
     }
 
@@ -70,8 +76,8 @@ def parts(model: CatenaryModel) -> Parts:
 def by_rows(name: str) -> CatenaryModel:
     """Return a line whose mass coupling is stored by rows, as that of a line with intervals of several sizes is."""
     model = CatenaryModel(load_line(name))
-    with patch.object(numpy_engine, "_by_blocks", return_value=None):
-        model._step(STEP)
+    with patch.object(linear_step, "_by_blocks", return_value=None):
+        model._engine(STEP)
     return model
 
 

@@ -1,17 +1,20 @@
-"""What a line needs before its first step: ``python benchmarks/startup.py [--spans 200]``.
+"""What a line needs before its first step: ``python benchmarks/startup.py [--spans 200] [--beside WORKTREE]``.
 
-LN2 and a longer line of its materials, each in a process of its own, phase by phase, as bare model and as FMU.
+LN2 and a longer line of its materials, each in a process of its own, phase by phase, as bare model and as FMU. With
+``--beside`` whole commands instead, from start to end, by turns with those of another worktree (with its ``.venv``):
+every row the least processor time of all processes of a command.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,6 +45,9 @@ def main() -> None:
     if options.alone is not None:
         print(json.dumps(model_phases(options.alone) | fmu_phases(options.alone)))
         return
+    if options.beside is not None:
+        commands_beside(options.beside, options.rounds)
+        return
     lines = {"LN2": 0, f"{options.spans} spans": options.spans}
     best = {title: _alone(spans) for title, spans in lines.items()}
     first, second = best.values()
@@ -52,9 +58,43 @@ def main() -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--spans", type=int, default=200, help="of the longer line, default 200")
+    parser.add_argument("--beside", type=Path, metavar="WORKTREE", help="compare whole commands with those there")
+    parser.add_argument("--rounds", type=int, default=5, help="of the commands, default 5")
     # The argument of the process that starts one line; 0 is LN2.
     parser.add_argument("--alone", type=int, help=argparse.SUPPRESS)
     return parser.parse_args()
+
+
+#: Whole commands, by what they show.
+COMMANDS = {
+    "help": ("run", "--help"),
+    "validate cx_ln2": ("validate", "cx_ln2"),
+    "run cx_ln2 to 1 ms, no report": ("run", "cx_ln2", "--stop", "0.001", "--quiet", "--no-report"),
+    "run cx_ln2, no report": ("run", "cx_ln2", "--quiet", "--no-report"),
+    "run cx_ln2": ("run", "cx_ln2", "--quiet"),
+}
+
+
+def commands_beside(other: Path, rounds: int) -> None:
+    """Print the time of whole commands here and in another worktree, by turns, after one round that warms up."""
+    places = (other.resolve(), Path(__file__).resolve().parents[1])
+    rows = []
+    for title, words in COMMANDS.items():
+        times = [[_command(place, words) for place in places] for _ in range(rounds + 1)][1:]
+        there, here = (min(column) for column in zip(*times, strict=True))
+        rows.append((title, f"{there:.2f}", f"{here:.2f}", f"{here / there:.2f}"))
+    table("Whole commands", ("command", f"{other.name} s", "here s", "ratio"), rows)
+
+
+def _command(place: Path, words: Sequence[str]) -> float:
+    """Return the processor time of ``openpanto`` of a worktree and of all that it starts [s]."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with tempfile.TemporaryDirectory() as folder:
+        out = ["--out", folder + "/out"] if words[0] == "run" and "--help" not in words else []
+        command = [str(place / ".venv/bin/python"), "openpanto.py", *words, *out]
+        subprocess.run(command, cwd=place, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def _alone(spans: int) -> dict[str, float]:

@@ -175,4 +175,27 @@ def test_a_definition_that_does_not_build_is_answered_once(call, tmp_path):
     path.write_text(path.read_text().replace('20000, "N"', '20000, "kN"'))
     code, _, said = call("validate demo")
     assert code == 1
-    assert f"could not be built: {path}: contact_wire.tension" in said
+    assert f"error: {path}: contact_wire.tension" in said
+    assert re.search(r"contact_wire\.tension.*; so resources/Catenary_demo_LN2\.fmu of component 'catenary' ", said)
+
+
+def test_a_dc_project_is_judged_and_calibrated_by_its_limits(call, tmp_path):
+    assert call("new demo --line EN50318_2002 --pantograph CX --speed 160 --supply DC3kV")[0] == 0
+    data = (tmp_path / "demo" / "demo.ssp" / "SystemStructure.ssd").read_text()
+    assert '<panto:Limits supply="DC3"/>' in data
+    assert f'meanForce="{0.00097 * 160**2 + 110:.6g}"' in data
+    assert "DC 3 kV (recalled)" in (tmp_path / "demo" / "README.md").read_text()
+    with pytest.raises(SystemExit):
+        call("new other --line EN50318_2002 --pantograph CX --speed 160 --supply 25kV")
+
+
+def test_a_line_with_an_overlap_is_judged_over_it_and_an_early_interval_is_told(call, tmp_path):
+    assert call("new demo --line LN2_overlap --pantograph CX --speed 250")[::2] == (0, "")
+    data = (tmp_path / "demo" / "demo.ssp" / "SystemStructure.ssd").read_text()
+    start, end = map(float, re.search(r'Interval start="(.*?)" end="(.*?)"', data).groups())
+    assert start <= 997.1
+    assert end >= 1095.7
+    assert "from 997.1 to 1095.7 m: this overlap lies in the interval" in (tmp_path / "demo" / "README.md").read_text()
+    code, _, said = call("new early --line LN2 --pantograph CX --speed 250 --interval 100 600")
+    assert code == 0
+    assert re.fullmatch(r"note: figures are taken from 100 m and .* begin at \d+ m or later, with --interval\n", said)

@@ -184,6 +184,7 @@ GIVEN = {
     "actuator_force": {"force": q(50.0, "N")},
     "actuator_moment": {"moment": q(50.0, "N.m"), "axis_i": q([0.0, 1.0, 0.0], "1")},
     "bump_stop": {"stiffness": q(1e4, "N/m"), "longest": q(0.01, "m")},
+    "angle_stop": {"stiffness": q(1e3, "N.m/rad"), "highest": q(-0.1, "rad"), "axis_i": q([0.0, 1.0, 0.0], "1")},
     "bushing": {"translation_stiffness": q([1e3, 1e3, 1e3], "N/m"), "rotation_damping": q([1, 1, 1], "N.m.s/rad")},
     "joint_friction": {"moment": q(5.0, "N.m"), "transition": q(0.1, "rad/s"), "joint": "hinge"},
 }
@@ -194,7 +195,7 @@ def pushed(kind):
     given = dict(GIVEN[kind])
     if kind != "joint_friction":
         given |= {"body_i": "base", "body_j": "rod"}
-        if kind != "actuator_moment":
+        if kind not in ("actuator_moment", "angle_stop"):
             given |= {"point_i": q([0.0, 0.0, 0.5], "m"), "point_j": q([0.2, 0.0, 0.0], "m")}
     axes = {"axis_i": (0, 1, 0), "axis_j": (0, 1, 0)}
     hinge = joint("revolute", "base", "rod", point_i=(0, 0, 0), point_j=(-0.5, 0, 0), **axes)

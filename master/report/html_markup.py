@@ -78,13 +78,22 @@ def signs(limit: str) -> str:
     return text(limit.replace("+-", "\u00b1").replace("<=", "\u2264"))
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: bool = True, is_sortable: bool = False) -> str:
-    """Return a table; the columns after the first hold numbers, or text. The reader may sort it if it is sortable."""
+def table(
+    heads: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    numbers: bool = True,
+    leading: int = 1,
+    is_sortable: bool = False,
+) -> str:
+    """Return a table; the columns after the leading ones hold numbers, or text. The reader may sort a sortable one."""
     kind = "n" if numbers else "text"
     right = " class='n'" if numbers else ""
-    head = "".join(f"<th{right if i else ''}>{text(h)}</th>" for i, h in enumerate(heads))
+    head = "".join(f"<th{right if i >= leading else ''}>{text(h)}</th>" for i, h in enumerate(heads))
     body = "".join(
-        f"<tr><td>{text(r[0])}</td>" + "".join(f"<td class='{kind}'>{text(c)}</td>" for c in r[1:]) + "</tr>"
+        "<tr>"
+        + "".join(f"<td>{text(c)}</td>" for c in r[:leading])
+        + "".join(f"<td class='{kind}'>{text(c)}</td>" for c in r[leading:])
+        + "</tr>"
         for r in rows
     )
     kind = " class='sortable'" if is_sortable else ""

@@ -37,6 +37,8 @@ _OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg", "definiti
 #: What a run, a study or a verification may leave half written if it is killed, and what is no result.
 _PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT)), f".*{PART}")
 _LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)
+#: How folders begin that hold nothing of worth once the process is gone that made them.
+WORK: Final = ".work-"
 #: Format of numbers that are to be read back to the last bit.
 _EXACT: Final = "%.17g"
 _NOT_OURS: Final = "exists and is {kind} of this tool; it is left alone, choose another with --out"
@@ -220,7 +222,7 @@ def _holds_nothing(folder: Path) -> bool:
     """Whether a folder does not exist, or holds only what a run that was killed at once has left."""
     if not folder.is_dir():
         return not folder.exists()
-    return all(any(path.match(p) for p in (*_PARTS, *_LOCKS)) for path in folder.iterdir())
+    return all(any(path.match(p) for p in (*_PARTS, *_LOCKS, f"{WORK}*")) for path in folder.iterdir())
 
 
 def is_ours(folder: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -166,10 +167,20 @@ def _fmus(
             by_path[path] = _provide(path, replace(provision, build=may_build))
         fmu = by_path[path]
         if isinstance(fmu, str):
-            problems.append(Problem(SSD_NAME, c.line, "fmu", f"component '{c.name}': {c.source} {fmu}"))
+            problems.append(_unprovided(c.name, c.source, c.line, fmu))
         else:
             found[c.name] = fmu
     return found
+
+
+def _unprovided(name: str, source: str, line: int, why: str) -> Problem:
+    """Return why a component has no FMU; a mistake in a definition is told with its place there first."""
+    found = re.fullmatch(r"(?:could not|cannot) be built: (?P<file>[^\n]*?\.toml): (?P<text>[^\n]+)", why)
+    if found is None:
+        return Problem(SSD_NAME, line, "fmu", f"component '{name}': {source} {why}")
+    at = re.search(r"\(at line (\d+),", found["text"])
+    text = f"{found['text']}; so {source} of component '{name}' ({SSD_NAME}:{line}) cannot be built"
+    return Problem(found["file"], int(at[1]) if at else 0, "definition", text)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
+import numpy as np
+
 from models.arrays import FloatArray, IntArray, Snapshot
 from models.catenary.linear_motion.line_motion import LineMotion
 
@@ -66,6 +68,12 @@ class ContactResult:
 
     force: FloatArray
     point: FloatArray
+
+
+def empty_result(pantographs: int, sections: int) -> ContactResult:
+    """Return the contacts of strips that meet nothing."""
+    shape = (pantographs, sections)
+    return ContactResult(np.zeros(shape), np.full((*shape, 3), np.nan))
 
 
 @dataclass

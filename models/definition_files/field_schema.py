@@ -134,6 +134,36 @@ class _Part:
 
 
 @dataclass(frozen=True)
+class _Series:
+    """A list of numbers of any length, which stay as written."""
+
+    unit: str
+    description: str
+    minimum: float
+    maximum: float
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        return table.quantities(name, self.unit, minimum=self.minimum, maximum=self.maximum)
+
+
+@dataclass(frozen=True)
+class _WordOrPart:
+    """One of some words, or a dataclass in a sub-table."""
+
+    choices: tuple[str, ...]
+    cls: type[Any]
+
+    def read(self, table: Table, name: str, default: Any) -> Any:
+        given = table.data.get(name)
+        if given is None and default is not dataclasses.MISSING:
+            return default
+        if isinstance(given, dict):
+            inner = table.table(name)
+            return default if inner is None else read(self.cls, inner)
+        return table.text(name, choices=self.choices)
+
+
+@dataclass(frozen=True)
 class _Named:
     """Named dataclasses in tables ``[key.NAME]``, whose class may depend on the text ``kind`` in the table."""
 
@@ -223,6 +253,16 @@ def text(*, default: Any = dataclasses.MISSING, choices: Iterable[str] | None = 
 def part(cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:
     """Declare a dataclass in a sub-table; ``default=None`` makes it optional."""
     return _field(_Part(cls), default)
+
+
+def series(unit: str, description: str, *, minimum: float = -math.inf, maximum: float = math.inf) -> Any:
+    """Declare a list of physical values of any length: a column of a table, no parameter."""
+    return _field(_Series(unit, description, minimum, maximum), dataclasses.MISSING)
+
+
+def word_or_part(choices: tuple[str, ...], cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:
+    """Declare one of some words, or a dataclass in a sub-table."""
+    return _field(_WordOrPart(choices, cls), default)
 
 
 def named(key: str, kinds: type[Any] | Kinds) -> Any:

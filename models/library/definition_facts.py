@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 from models.catenary.definition.line_definition import CatenaryDefinition, Section
@@ -22,6 +23,8 @@ class LineFacts(NamedTuple):
         Height of the contact wire: the lowest, and at the supports.
     is_ring : bool
         Whether the line closes on itself at ``end``.
+    overlaps : tuple of (begin, end)
+        Where a section and the next one both have wires.
     """
 
     begin: float
@@ -30,6 +33,7 @@ class LineFacts(NamedTuple):
     lowest: float
     height: float
     is_ring: bool
+    overlaps: tuple[tuple[float, float], ...] = ()
 
 
 class LiftFacts(NamedTuple):
@@ -56,7 +60,8 @@ def line_facts(line: CatenaryDefinition) -> LineFacts:
     end = max(_working(section)[1] for section in line.sections)
     supports = sorted({x for section in line.sections for span in section.spans for x in (span.start, span.end)})
     inside = tuple(x for x in supports if begin <= x <= end)
-    return LineFacts(begin, end, inside, _lowest(line), line.profile.contact_wire_height, line.sections[0].periodic)
+    is_ring, height = line.sections[0].periodic, line.profile.contact_wire_height
+    return LineFacts(begin, end, inside, _lowest(line), height, is_ring, _overlaps(line))
 
 
 def lift_facts(pantograph: LumpedDefinition | MechanismDefinition) -> LiftFacts:
@@ -66,6 +71,17 @@ def lift_facts(pantograph: LumpedDefinition | MechanismDefinition) -> LiftFacts:
     if pantograph.static_moment is not None:
         return LiftFacts("static_moment", "N.m", pantograph.static_moment, None)
     return LiftFacts("static_force", "N", pantograph.static_force or 0.0, None)
+
+
+def _overlaps(line: CatenaryDefinition) -> tuple[tuple[float, float], ...]:
+    ordered = sorted(line.sections, key=lambda section: section.spans[0].start)
+    zones = ((ahead.spans[0].start, behind.spans[-1].end) for behind, ahead in itertools.pairwise(ordered))
+    return tuple((begin, end) for begin, end in zones if begin < end)
+
+
+def raised_after(pantograph: LumpedDefinition | MechanismDefinition) -> float:
+    """Return how long after the start the uplift has grown to its value [s]."""
+    return pantograph.raise_start + pantograph.raise_duration
 
 
 def _working(section: Section) -> tuple[float, float]:

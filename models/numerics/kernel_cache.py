@@ -20,9 +20,11 @@ import importlib.util
 import logging
 import os
 import pickle
+import re
 import shutil
 import sys
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -31,6 +33,8 @@ from models.numerics.user_cache import cache_folder, check_owner
 
 #: Environment variable that chooses between compiled kernels and NumPy.
 SWITCH: Final = "OPENPANTO_KERNEL"
+#: An import of other kernels of the project, on one line or in brackets.
+_FROM_PROJECT: Final = re.compile(rb"^from models\.[\w.]+_kernels import (?:\([^)]*\)|[^(\n]*)$", re.MULTILINE)
 _LOG: Final = logging.getLogger("openpanto")
 #: Length of the checksum before the content of a file [bytes].
 _DIGEST: Final = hashlib.sha256().digest_size
@@ -40,6 +44,17 @@ _named: set[str] = set()
 
 class KernelError(RuntimeError):
     """Compiled kernels were requested and are not available."""
+
+
+def joined(files: Iterable[Path]) -> bytes:
+    """Return the source of kernels that are kept in several files, without the lines by which these import each other.
+
+    Parameters
+    ----------
+    files : iterable of Path
+        Each after those that it imports; no two may define the same name, unless for the same.
+    """
+    return b"\n".join(_FROM_PROJECT.sub(b"", path.read_bytes()) for path in files)
 
 
 def load_kernels(name: str, source: bytes) -> ModuleType:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from master.commands.main import main
+from tests import forked_commands
 from tests.effort import IS_LONG
 
 ROOT = Path(__file__).parents[2]
@@ -105,10 +106,9 @@ def started(tmp_path):
 
     def start(scenario, folder, *more, hangs=True):
         mark = tmp_path / "hangs"
-        command = [sys.executable, "-m", "master", str(scenario), *options(folder), *more]
         environment = {**os.environ, "HOSTILE_MARK": str(mark)}
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        process = subprocess.Popen(command, cwd=ROOT, env=environment, **pipes)
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        process = forked_commands.start("master", scenario, *options(folder), *more, env=environment, **pipes)
         made.append(process)
         deadline = time.monotonic() + 60.0
         while hangs and not mark.exists() and time.monotonic() < deadline:

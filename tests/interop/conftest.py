@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
 import pytest
 
+from tests import forked_commands
 from tests.interop.support import ROOT, ToolRun, run_tool
 
 
@@ -19,8 +19,8 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """cx_ln2.ssp, as ``python -m master pack`` writes it."""
     archive = tmp_path_factory.mktemp("packed") / "cx_ln2.ssp"
     scenario = ROOT / "ssp_scenarios" / "cx_ln2.ssp"
-    command = [sys.executable, "-m", "master", "pack", str(scenario), "--out", str(archive)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    done = forked_commands.run("master", "pack", scenario, "--out", archive)
+    assert done.returncode == 0, done.stderr
     return archive
 
 

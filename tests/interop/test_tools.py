@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
-from tests.interop.support import ROOT, STEP, require
+from tests import forked_commands
+from tests.interop.support import STEP, require
 
 #: Tool, the package it needs, largest difference of the contact force [N]. Asked for: 0.1 N in Ecos and libcosim.
 #: libcosim counts time in nanoseconds, so its steps differ in the last digits; the others give the same numbers.
@@ -31,10 +28,9 @@ def reference(packed, tmp_path_factory):
     def run(stop):
         if stop not in done:
             folder = tmp_path_factory.mktemp("ours") / "results"
-            command = [sys.executable, "-m", "master", str(packed), "--scheme", "jacobi", "--stop", str(stop)]
-            command += ["--step", str(STEP), "--out", str(folder), "--quiet", "--no-report"]
-            environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-            subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True)
+            command = ["master", packed, "--scheme", "jacobi", "--stop", stop, "--step", STEP]
+            done_run = forked_commands.run(*command, "--out", folder, "--quiet", "--no-report")
+            assert done_run.returncode == 0, done_run.stderr
             titles = (folder / "timeseries.csv").open().readline().strip().split(",")
             column = titles.index("catenary.pantograph[1].contact.force [N]")
             done[stop] = np.loadtxt(folder / "timeseries.csv", delimiter=",", skiprows=1, usecols=(0, column))[1:].T

@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from master.results import run_results
 from master.run_session import run
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
+from tests import forked_commands
 
 ROOT = Path(__file__).parents[2]
 FORCE = "catenary.pantograph[1].contact.force"
@@ -163,12 +163,12 @@ def test_nan_stops_the_run_with_its_name_time_and_last_good_value(toy, tmp_path)
 
 def long_run(scenario, out):
     """Return the command of a run that is still at work when it is interrupted."""
-    return [sys.executable, "-m", "master", str(scenario), "--stop", "1e4", "--out", str(out), "--no-build"]
+    return ["master", scenario, "--stop", "1e4", "--out", out, "--no-build"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_loses_nothing(toy, tmp_path, number):
-    process = subprocess.Popen(long_run(toy, tmp_path / "out"), cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    process = forked_commands.start(*long_run(toy, tmp_path / "out"), stderr=subprocess.PIPE)
     series = tmp_path / "out" / "timeseries.csv"
     deadline = time.monotonic() + 60
     while not (series.exists() and series.stat().st_size > 50_000) and time.monotonic() < deadline:
@@ -186,7 +186,7 @@ def test_an_interrupted_run_loses_nothing(toy, tmp_path, number):
 
 
 def test_a_killed_run_is_readable_up_to_its_last_rows(toy, tmp_path):
-    process = subprocess.Popen(long_run(toy, tmp_path / "out"), cwd=ROOT, stderr=subprocess.DEVNULL)
+    process = forked_commands.start(*long_run(toy, tmp_path / "out"))
     series = tmp_path / "out" / "timeseries.csv"
     deadline = time.monotonic() + 60
     while not (series.exists() and series.stat().st_size > 200_000) and time.monotonic() < deadline:

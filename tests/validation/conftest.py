@@ -1,13 +1,13 @@
 """Whole reference runs, each made once."""
 
 import json
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from tests import forked_commands
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,8 +45,7 @@ def simulate(tmp_path_factory):
         if key not in done:
             folder = tmp_path_factory.mktemp("run") / "results"
             path = scenario if isinstance(scenario, Path) else ROOT / "ssp_scenarios" / f"{scenario}.ssp"
-            command = [sys.executable, "-m", "master", str(path), "--out", str(folder), "--quiet", "--no-report"]
-            answer = subprocess.run([*command, *options], cwd=ROOT, capture_output=True, text=True, check=False)
+            answer = forked_commands.run("master", path, "--out", folder, "--quiet", "--no-report", *options)
             assert answer.returncode == 0, answer.stderr
             columns = _read(folder / "timeseries.csv")
             summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

@@ -25,7 +25,7 @@ from master.errors import InterruptedRunError, MasterError, RunError, one_line
 from master.evaluation.contact_assessment import Assessment
 from master.evaluation.contact_positions import leading_first
 from master.evaluation.output_figures import output_figures
-from master.results.results_folder import FORCES, GEOMETRY, SUMMARY
+from master.results.results_folder import FORCES, GEOMETRY, SUMMARY, WORK
 from master.results.run_results import Results
 from master.results.run_summary import peak_memory
 from master.run_session import run
@@ -39,8 +39,6 @@ Row = Mapping[str, Cell]
 OUTPUT_KINDS: Final = ("end", "minimum", "maximum", "mean")
 #: Files of a run that stay if it is thinned.
 _THINNED: Final = (SUMMARY, GEOMETRY, FORCES)
-#: How the folder begins that a run is made in, until it is complete.
-WORK: Final = ".work-"
 #: How often a run is made whose process dies.
 ATTEMPTS: Final = 2
 #: Why a run has failed that no process survives: the same words wherever it was made.

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from master.batch.batch_session import BatchFiles, BatchState, run_tasks
+from master.batch.sweep.held_fmus import held_fmus
 from master.batch.sweep.pages import sweep_page
 from master.batch.sweep.pages.sweep_view import read_view, view_of
 from master.batch.sweep.sensitivity import SensitivityIndices, described
@@ -19,7 +20,7 @@ from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, s
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
-from master.batch.sweep.sweep_run import WORK, Row, RunPlace, SweepResult
+from master.batch.sweep.sweep_run import Row, RunPlace, SweepResult
 from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
 from master.errors import InterruptedRunError
@@ -233,7 +234,7 @@ def sweep(
     found: dict[str, SweepResult] = {}
     try:
         with results_folder.taken_over(folder, JSON, files.generator, files.kind):
-            _remove_leftovers(place)
+            _remove_leftovers(folder)
             with closing(SweepJournal(folder)) as journal:
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
                 found |= {r.key: old[r.key] for r in state.runs if r.key in old}
@@ -247,7 +248,7 @@ def sweep(
 
                 if why := prepared.announced:
                     tell(why)
-                with chosen.opened(prepared.base, place) as make_runs_of:
+                with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
                     tell(_announcement(make_runs_of, prepared.base.start, missing, len(state.runs), chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     ended = run_tasks(state, results, finish, files, folder)
@@ -284,9 +285,10 @@ def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], N
         tell(text)
 
 
-def _remove_leftovers(place: RunPlace) -> None:
-    for path in place.folder.glob(f"{WORK}*"):
-        shutil.rmtree(path, ignore_errors=True)
+def _remove_leftovers(folder: Path) -> None:
+    for place in (folder, folder / RUNS):
+        for path in place.glob(f"{results_folder.WORK}*"):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _is_there(result: SweepResult, place: RunPlace) -> bool:

@@ -17,6 +17,7 @@ from master.report.charts.chart import (
     Curve,
     Envelope,
     Level,
+    Part,
     Points,
     Stroke,
     Ticks,
@@ -36,7 +37,7 @@ _SHARES: Final = {"overlaying": "y", "range": [0, 1], "visible": False, "fixedra
 def interactive_figure(chart: Chart) -> dict[str, Any]:
     """Return ``data`` and ``layout`` of a chart for plotly.js."""
     shapes = [_shape(part) for part in chart.parts if isinstance(part, Band | Level)]
-    data = [_TRACES[type(part)](part) for part in chart.parts if not isinstance(part, Band | Level)]
+    data = [trace for part in chart.parts if not isinstance(part, Band | Level) for trace in _traces(part)]
     layout: dict[str, Any] = {"xaxis": _axis(chart.x), "yaxis": _axis(chart.y), "shapes": shapes}
     if any(isinstance(part, Ticks) for part in chart.parts):
         layout["yaxis2"] = _SHARES
@@ -47,6 +48,10 @@ def interactive_figure(chart: Chart) -> dict[str, Any]:
     if chart.group:
         layout["meta"] = {"sync": chart.group}
     return {"data": data, "layout": layout}
+
+
+def _traces(part: Part) -> list[Trace]:
+    return _cells(part) if isinstance(part, Cells) else [_TRACES[type(part)](part)]
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
@@ -111,30 +116,40 @@ def _envelope(envelope: Envelope) -> Trace:
     }
 
 
-def _cells(cells: Cells) -> Trace:
-    """Return cells as bars that stand on each other's place: they need no other kind of trace, and have hatching."""
-    colours = cells.colours
-    there = [(r, c) for r, c in np.ndindex(cells.values.shape) if colours[r][c]]
-    own = [colours[r][c] for r, c in there]
-    inks = [ink_on(colour) for colour in own]
-    hatching = {"shape": ["/" if cells.hatched[r, c] else "" for r, c in there], "fgcolor": inks, "fgopacity": 0.45}
-    pattern = {**hatching, "fillmode": "overlay", "bgcolor": own, "size": 9, "solidity": 0.12}
-    return {
-        "type": "bar",
-        "x": [int(c) for _, c in there],
-        "y": [1] * len(there),
-        "base": [int(r) - 0.5 for r, _ in there],
-        "width": 1,
-        "marker": {"color": own, "pattern": pattern, "line": {"width": 0}},
-        "text": [_plain(cells.words[r][c]) for r, c in there],
-        "hovertext": [_plain(cells.hints[r][c]) for r, c in there],
+def _cells(cells: Cells) -> list[Trace]:
+    """Return cells as bars that stand on each other's place: they need no other kind of trace, and have hatching.
+
+    The hatching lies over them, a trace for each ink: lines of one trace have one colour.
+    """
+    colours = {(r, c): colour for r, row in enumerate(cells.colours) for c, colour in enumerate(row) if colour}
+    whole = {
+        **_boxes(list(colours)),
+        "marker": {"color": list(colours.values()), "line": {"width": 0}},
+        "text": [_plain(cells.words[r][c]) for r, c in colours],
+        "hovertext": [_plain(cells.hints[r][c]) for r, c in colours],
         "hoverinfo": "text",
         "textposition": "inside",
         "insidetextanchor": "middle",
         "textangle": 0,
-        "insidetextfont": {"color": inks, "size": 12},
-        "showlegend": False,
+        "insidetextfont": {"color": [ink_on(colour) for colour in colours.values()], "size": 12},
     }
+    hatched: dict[str, list[tuple[int, int]]] = {}
+    for place, colour in colours.items():
+        if cells.hatched[place]:
+            hatched.setdefault(ink_on(colour), []).append(place)
+    return [whole, *(_hatching(places, ink) for ink, places in hatched.items())]
+
+
+def _hatching(places: list[tuple[int, int]], ink: str) -> Trace:
+    pattern = {"shape": "/", "size": 9, "solidity": 0.12, "fgcolor": ink, "fgopacity": 0.5, "bgcolor": "rgba(0,0,0,0)"}
+    return {**_boxes(places), "marker": {"color": ink, "pattern": pattern, "line": {"width": 0}}, "hoverinfo": "skip"}
+
+
+def _boxes(places: list[tuple[int, int]]) -> Trace:
+    """Return bars that fill the cells at these rows and columns."""
+    base = [row - 0.5 for row, _ in places]
+    box = {"x": [column for _, column in places], "y": [1] * len(places), "base": base, "width": 1}
+    return {"type": "bar", **box, "showlegend": False}
 
 
 def _points(points: Points) -> Trace:
@@ -176,5 +191,5 @@ def _transparent(colour: str, opacity: float) -> str:
 
 
 _TRACES: Final[dict[type, Callable[[Any], Trace]]] = {
-    Curve: _curve, Ticks: _ticks, Bars: _bars, Points: _points, Envelope: _envelope, Cells: _cells
+    Curve: _curve, Ticks: _ticks, Bars: _bars, Points: _points, Envelope: _envelope
 }  # fmt: skip

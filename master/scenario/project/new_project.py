@@ -23,7 +23,7 @@ from master.fmu.fmu_description import read_fmu
 from master.safety.safe_files import write_atomically
 from master.scenario.project.port_finding import ENDS, REPLY, Port, Side, check_given, find_ports, own_port
 from master.scenario.project.project_page import PROJECT_FILE, ProjectPage, project_text
-from master.scenario.project.stretch import Stretch, Wire, stretch
+from master.scenario.project.stretch import Stretch, Wire, contained, early, stretch
 from master.scenario.project.system_text import (
     WrittenComponent,
     WrittenConnection,
@@ -101,6 +101,10 @@ class Request:
         Of interest [m].
     maps : sequence of (str, str)
         Names of ports and parameters, and the variables of an FMU that they are.
+    supply : (str, str)
+        Supply system whose limits apply: as limits name it, and in words.
+    raised : float
+        How long after the start the leading pantograph has been raised [s].
     """
 
     folder: Path
@@ -113,6 +117,8 @@ class Request:
     mean_force: float
     interval: tuple[float, float] | None = None
     maps: Sequence[tuple[str, str]] = ()
+    supply: tuple[str, str] = ("AC", "AC")
+    raised: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -183,6 +189,12 @@ def new_project(request: Request) -> Path:
     return request.folder / f"{project_name(request.folder)}.ssp"
 
 
+def doubt(request: Request) -> str:
+    """Return what deserves a second look in a project that can be made, empty if nothing does."""
+    way = stretch(request.wire, request.speed, _separations(request), request.interval)
+    return early(way, request.speed, request.raised)
+
+
 def project_files(request: Request) -> dict[str, bytes]:
     """Return the files of a project by their places in its folder."""
     name, count = project_name(request.folder), len(request.pantographs)
@@ -206,6 +218,8 @@ def project_files(request: Request) -> dict[str, bytes]:
         mean_force=request.mean_force,
         speed=request.speed,
         way=way,
+        supply=request.supply[1],
+        overlap=contained(request.wire, way),
         own_start=tuple(p.name for p in train if not p.is_placed),
     )
     return {**files, PROJECT_FILE: project_text(name).encode(), "README.md": said.text().encode()}
@@ -327,6 +341,7 @@ def _scenario(name: str, request: Request, way: Stretch, line: _Part, train: Seq
         until_end=all(p.variable(name) == name for p in train for name in ("start_position", "speed")),
         calibrated=_calibrated(train, request.lifts),
         mean_force=request.mean_force,
+        supply=request.supply[0],
     )
     return {"SystemStructure.ssd": ssd_text(system).encode(), **files}
 

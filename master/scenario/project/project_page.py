@@ -49,6 +49,10 @@ class ProjectPage:
     speed : float
         [m/s]
     way : Stretch
+    supply : str
+        Supply system whose limits apply.
+    overlap : (float, float) or None
+        Overlap of the line that lies in the interval [m].
     own_start : sequence of str
         Pantographs that cannot be set to where they start.
     """
@@ -62,6 +66,8 @@ class ProjectPage:
     mean_force: float
     speed: float
     way: Stretch
+    supply: str
+    overlap: tuple[float, float] | None
     own_start: Sequence[str]
 
     def text(self) -> str:
@@ -113,8 +119,12 @@ class ProjectPage:
         start, end = (f"{x:g}" for x in self.way.interval)
         places = ", ".join(f"`{n}` at {x:g} m" for n, x in zip(self.train, self.way.starts, strict=True))
         yield f"Speed {self.speed * 3.6:g} km/h; start of the strip: {places}."
+        if self.overlap is not None:
+            begin, after = (f"{x:g}" for x in self.overlap)
+            yield f"Both sections of the line have wires from {begin} to {after} m: this overlap lies in the interval."
         yield f"Figures are taken from {start} to {end} m (`Interval`); 0.5 s after the last strip has passed, it ends."
-        target = f"the mean force that EN 50367 allows at most at this speed, AC (recalled): {self.mean_force:.1f} N"
+        target = "the mean force that EN 50367 allows at most at this speed, "
+        target += f"{self.supply} (recalled): {self.mean_force:.1f} N"
         if self.calibrated:
             yield f"`openpanto calibrate` seeks {target}, by `{self.calibrated}`; the value written is a first guess."
         else:

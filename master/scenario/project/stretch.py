@@ -16,6 +16,8 @@ MARGIN: Final = 10.0
 #: The leading pantograph runs this long before its interval [s] (choice), but over no more than this share of the line.
 LEAD_IN: Final = 3.0
 LEAD_SHARE: Final = 0.4
+#: The motion of the start dies out in this time after the raising [s] (choice), as the evaluation has it.
+SETTLING: Final = 1.0
 #: Most spans that are evaluated unless the user says so (choice: as many as EN 50318 has at least).
 MOST_SPANS: Final = 10
 #: Pantographs nearer to one another than this would touch [m] (choice).
@@ -40,6 +42,8 @@ class Wire:
         Its height: the lowest, and at the supports.
     is_ring : bool
         Whether the line goes on at its beginning.
+    overlaps : tuple of (float, float)
+        Where a section and the next one both have wires.
     """
 
     name: str
@@ -49,6 +53,7 @@ class Wire:
     lowest: float
     height: float
     is_ring: bool = False
+    overlaps: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -131,11 +136,49 @@ def _checked(wire: Wire, first: float, last: float, interval: tuple[float, float
 def _chosen(wire: Wire, speed: float, first: float, last: float, train: float) -> tuple[float, float]:
     """Return the interval from support to support that leaves the start's motion room to die out."""
     ahead = min(LEAD_IN * speed, LEAD_SHARE * (last - first))
-    supports = [x for x in wire.supports if first + ahead <= x <= last][: MOST_SPANS + 1]
+    supports = [x for x in wire.supports if first + ahead <= x <= last]
     if len(supports) < 2:
         train_text = f" of pantographs {train:g} m apart" if train else ""
         text = f"{wire.name} is at its working height from {wire.begin:g} to {wire.end:g} m, too short for a train"
         raise RequestError(
             f"{text}{train_text} at {3.6 * speed:g} km/h: take a longer line, or a slower or shorter train"
         )
-    return supports[0], supports[-1]
+    return _about(wire, supports) or (supports[0], supports[MOST_SPANS if len(supports) > MOST_SPANS else -1])
+
+
+def _about(wire: Wire, supports: Sequence[float]) -> tuple[float, float] | None:
+    """Return the interval with the first overlap that has room, in its middle as far as that goes; None without one."""
+    count = min(len(supports) - 1, MOST_SPANS)
+    windows = [(supports[i], supports[i + count]) for i in range(len(supports) - count)]
+    for begin, end in wire.overlaps:
+        around = [w for w in windows if w[0] <= begin and end <= w[1]]
+        if around:
+            return min(around, key=lambda w: abs(w[0] + w[1] - begin - end))
+    return None
+
+
+def contained(wire: Wire | None, way: Stretch) -> tuple[float, float] | None:
+    """Return the first overlap that lies in the interval, None if none does."""
+    start, end = way.interval
+    return next((o for o in (wire.overlaps if wire else ()) if start <= o[0] and o[1] <= end), None)
+
+
+def early(way: Stretch, speed: float, raised: float) -> str:
+    """Return that the interval begins before the motion of the start has died out, empty if it does not.
+
+    Parameters
+    ----------
+    way : Stretch
+    speed : float
+        [m/s]
+    raised : float
+        When the leading pantograph has been raised [s].
+    """
+    settled = way.starts[0] + speed * (raised + SETTLING)
+    if way.interval[0] >= settled:
+        return ""
+    at, place = way.interval[0], way.starts[0]
+    return (
+        f"figures are taken from {at:g} m and the pantograph starts at {place:g} m, so its raising and the motion "
+        f"after it are in them; begin at {math.ceil(settled)} m or later, with --interval"
+    )

@@ -73,6 +73,8 @@ class WrittenSystem:
         Parameter that is calibrated; empty for none.
     mean_force : float
         What it has to give [N].
+    supply : str
+        Supply system whose limits apply.
     """
 
     name: str
@@ -84,6 +86,7 @@ class WrittenSystem:
     until_end: bool
     calibrated: str
     mean_force: float
+    supply: str = "AC"
 
 
 def ssd_text(system: WrittenSystem) -> str:
@@ -174,6 +177,8 @@ def _annotation(system: WrittenSystem) -> Iterator[str]:
     if system.calibrated:
         values = f'meanForce="{system.mean_force:.6g}" tolerance="0.1"'
         yield f"        <panto:Calibration parameter={quoteattr(system.calibrated)} {values}/>"
+    if system.supply != "AC":
+        yield f"        <panto:Limits supply={quoteattr(system.supply)}/>"
     yield "      </panto:Run>"
     yield "    </ssc:Annotation>"
     yield "  </ssd:Annotations>"

@@ -111,6 +111,12 @@ class ContactWire:
         Direction of the nodal axes in plan [rad].
     period : float
         Length after which the wire is met again, because it closes on itself [m]; 0 for one that ends.
+
+    Attributes
+    ----------
+    starts : list of float
+        Where its elements begin along the track, and where the last one ends [m].
+    intervals : tuple of WireInterval
     """
 
     def __init__(
@@ -123,14 +129,14 @@ class ContactWire:
         period: float = 0.0,
     ) -> None:
         self.period = period
-        self._starts: list[float] = static.positions[chain.nodes, 0].tolist()
+        self.starts: list[float] = static.positions[chain.nodes, 0].tolist()
         self.intervals = _intervals(parts, static, modes, angles)
         self._of_element = [i for i in self.intervals for _ in i.height]
 
     @property
     def ends(self) -> tuple[float, float]:
         """Return where the wire begins and ends along the track [m]."""
-        return self._starts[0], self._starts[-1]
+        return self.starts[0], self.starts[-1]
 
     @property
     def elements(self) -> int:
@@ -146,13 +152,13 @@ class ContactWire:
             Ends A and B; position and velocity.
         """
         a, b = float(strip[0, 0, 0]), float(strip[1, 0, 0])
-        return self.period > 0.0 or (max(a, b) > self._starts[0] - _FAR and min(a, b) < self._starts[-1] + _FAR)
+        return self.period > 0.0 or (max(a, b) > self.starts[0] - _FAR and min(a, b) < self.starts[-1] + _FAR)
 
     def locate(self, x: float) -> tuple[int, float]:
         """Return the element at a position of the track and the share of the way along it, in the static shape."""
         x -= self._laps(x) * self.period
         element = self.start(-1, x)
-        start, end = self._starts[element : element + 2]
+        start, end = self.starts[element : element + 2]
         return element, (x - start) / (end - start)
 
     def interval(self, element: int) -> WireInterval:
@@ -211,16 +217,16 @@ class ContactWire:
     def crossing(self, strip: FloatArray, element: int, xi: float, share: float) -> Crossing:
         """Return a crossing from its place on an element and on the strip."""
         a, b = strip[:, 0, :2].tolist()
-        start, end = self._starts[element : element + 2]
+        start, end = self.starts[element : element + 2]
         x = start + xi * (end - start)
-        from_wire_end = math.inf if self.period else min(x - self._starts[0], self._starts[-1] - x)
+        from_wire_end = math.inf if self.period else min(x - self.starts[0], self.starts[-1] - x)
         return Crossing(element, xi, share, engagement(min(share, 1.0 - share) * math.dist(a, b), from_wire_end))
 
     def start(self, guess: int, x: float) -> int:
         """Return where to begin walking; a guess that is far off (first step, reset) is replaced by a search."""
-        if 0 <= guess < len(self._of_element) and abs(self._starts[guess] - x) < 5.0:
+        if 0 <= guess < len(self._of_element) and abs(self.starts[guess] - x) < 5.0:
             return guess
-        found = bisect_left(self._starts, x) - 1
+        found = bisect_left(self.starts, x) - 1
         return min(max(found, 0), len(self._of_element) - 1)
 
     def in_lap(self, strip: FloatArray) -> FloatArray:
@@ -252,12 +258,26 @@ class ContactWire:
 
     def _laps(self, x: float) -> int:
         """Return how often a position of the track has gone round a wire that closes on itself; 0 on one that ends."""
-        return math.floor((x - self._starts[0]) / self.period) if self.period else 0
+        return math.floor((x - self.starts[0]) / self.period) if self.period else 0
 
     def _shift(self, a: list[float], b: list[float], laps: int) -> None:
         """Move the ends of a strip by whole laps."""
         a[0] += laps * self.period
         b[0] += laps * self.period
+
+
+def put_in_lap(wires: Sequence[ContactWire], point: FloatArray, strips: FloatArray) -> None:
+    """Move points of wires that close on themselves along with their strips, which travel on.
+
+    Parameters
+    ----------
+    point : ndarray, shape (n_pantographs, n_sections, 3)
+        Changed in place [m].
+    strips : ndarray, shape (n_pantographs, 2, 2, 3)
+    """
+    for s, wire in enumerate(wires):
+        if wire.period:
+            point[:, s, 0] = wire.alongside(strips[:, :, 0, 0].mean(axis=1), point[:, s, 0])
 
 
 def height_polynomials(nodes: IntArray, static: StaticState, angles: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -36,6 +36,8 @@ class DropperLaw:
         1 - r.
     slack_delay : ndarray, shape (n_droppers,)
         c / k where spring and damper go slack together [s]; 0 where the spring does so alone.
+    elastic_at_rest : ndarray, shape (n_droppers,)
+        k e in the static shape [N].
     rest_compensation : ndarray, shape (n_droppers,)
         What droppers that are slack at rest lack to their elastic force [N]; given lengths may leave some slack.
     rest_load : ndarray, shape (n_attached,)
@@ -46,7 +48,7 @@ class DropperLaw:
         droppers, alpha = static.droppers, static.shape.definition.damping.of("dropper").alpha
         self.B, self.stiffness = droppers.rows[:, attached].tocsr(), droppers.stiffness
         self.unilateral, self.slack_delay = 1.0 - droppers.compression_ratio, droppers.slack_delay
-        self._elastic_at_rest = static.elastic_force
+        self.elastic_at_rest = static.elastic_force
         self.rest_compensation = static.dropper_force - static.elastic_force
         self.rest_load = self.B.T @ self.rest_compensation
         #: Elastic forces from the attachments' displacements; those of the dampers from velocities.
@@ -58,7 +60,7 @@ class DropperLaw:
 
     def spring_force(self, displacement: FloatArray) -> FloatArray:
         """Return stiffness times elongation of every dropper [N], shape (n_droppers,): negative where too long."""
-        force = self._elastic_at_rest.copy()
+        force = self.elastic_at_rest.copy()
         self._tighten.add(displacement, force)
         return force
 
@@ -95,7 +97,7 @@ class DropperLaw:
 
     def pull(self, attached: FloatArray) -> FloatArray:
         """Return the pulls T at the end of a step that the motion at its beginning makes [N], shape (n_droppers,)."""
-        pull = self._elastic_at_rest.copy()
+        pull = self.elastic_at_rest.copy()
         self._pull.add(attached.ravel(), pull)
         return pull
 

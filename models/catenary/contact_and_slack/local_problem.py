@@ -42,6 +42,14 @@ class LocalSolutionError(RuntimeError):
     """Slack and contact forces of a step were not found."""
 
 
+def not_settled(slack: int, contacts: int) -> LocalSolutionError:
+    """Return what is raised when the iteration does not end, with that many slack droppers and contacts."""
+    return LocalSolutionError(
+        f"slack and contact forces have not settled after {_MAX_ITERATIONS} iterations "
+        f"({slack} slack droppers, {contacts} contacts); use a smaller time step"
+    )
+
+
 class ContactCandidate(NamedTuple):
     """A strip over a wire before the contact force acts.
 
@@ -168,10 +176,7 @@ class LocalProblem:
             if not same:
                 compensation = _carried(now_slack, slack, compensation)
                 slack = now_slack
-        raise LocalSolutionError(
-            f"slack and contact forces have not settled after {_MAX_ITERATIONS} iterations "
-            f"({slack.size} slack droppers, {len(contacts)} contacts); use a smaller time step"
-        )
+        raise not_settled(slack.size, len(contacts))
 
     def law_of(self, contact: ContactCandidate, penetration: float, velocity: float) -> NormalForce:
         """Return the contact law of one contact; its first closed instant is its impact."""

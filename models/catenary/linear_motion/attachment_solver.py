@@ -44,12 +44,14 @@ class Banded:
     Attributes
     ----------
     matrix : sparse, shape (n, n)
+    width : int
+        Its half-bandwidth.
     factor : ndarray, shape (width + 1, n)
         Lower triangle of the Cholesky factor, diagonal by diagonal.
     """
 
     def __init__(self, matrix: sp.coo_matrix, width: int) -> None:
-        self.matrix = matrix.tocsr()
+        self.matrix, self.width = matrix.tocsr(), width
         self._reach = 0
         lower = matrix.row >= matrix.col
         band = np.zeros((width + 1, matrix.shape[0]), order="F")
@@ -127,12 +129,13 @@ class Cyclic:
 
     Attributes
     ----------
-    matrix : sparse, shape (n, n)
+    matrix, width
+        The parameters.
     """
 
     def __init__(self, matrix: sp.spmatrix, width: int) -> None:
-        self.matrix = matrix.tocsr()
-        self._width, self._inner = width, matrix.shape[0] - width
+        self.matrix, self.width = matrix.tocsr(), width
+        self._inner = matrix.shape[0] - width
         inner, border = slice(0, self._inner), slice(self._inner, None)
         self._band = Banded(self.matrix[inner, inner].tocoo(), width)
         self._border = np.ascontiguousarray(self.matrix[border, inner].toarray())
@@ -165,10 +168,10 @@ class Cyclic:
         """
         n, quarter = self.matrix.shape[0], self._half // 2
         away = 0 if quarter <= first < n - quarter else self._half
-        at, last = (first - away) % n, self._inner - self._width
-        if at >= self._width and at + len(load) <= last:
+        at, last = (first - away) % n, self._inner - self.width
+        if at >= self.width and at + len(load) <= last:
             begin, values = (self._opposite if away else self._band).near(at, load)
-            if begin >= self._width and begin + len(values) <= last:
+            if begin >= self.width and begin + len(values) <= last:
                 return (begin + away) % n, values
         whole = np.zeros((n, load.shape[1]))
         whole[(first + np.arange(len(load))) % n] = load

@@ -1,7 +1,17 @@
 """One step of a line: the protocol of a step engine, and two engines side by side.
 
-`numpy_engine` is there to be read, `numba_engine` with `step_kernels` to be fast; neither knows the other, both rest on
-the same `StepMatrices`, and `engine_choice` chooses once for every step size.
+`plain_step` with `linear_step` is there to be read, `compiled_line_step` to be fast; neither knows the other, both rest
+on the same `StepMatrices`, and `engine_choice` chooses once for every step size. The compiled one is one call::
 
-May import `shape`, `linear_motion` and `contact_and_slack`.
+    step_kernels        the step, part by part
+    attachment_kernels  forces on the attachments and their solution, in eight segments: `attachment_lanes`
+    mode_kernels        the modes follow, and prepare the next step: `mode_units`
+    contact_kernels     strips that cross wires: `step_records` keeps what is read of intervals and droppers
+    local_kernels       contacts and slack droppers
+    vector_kernels      eight numbers at once
+
+That is twice the same step, once in the language of the physics and once in that of the machine, which is why the room
+is large. What the kernels do is proved by the plain step, figure for figure.
+
+May import `shape`, `linear_motion`, `contact_and_slack` and `line_state`.
 """

@@ -12,37 +12,55 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from models.catenary.linear_motion.step_matrices import StepMatrices
-from models.catenary.step.numba_engine import NumbaEngine, UnsuitedError
-from models.catenary.step.numpy_engine import NumpyEngine
-from models.catenary.step.step_engine import StepEngine
-from models.numerics.kernel_cache import SWITCH, KernelError, load_kernels
+from models.catenary.step.compiled_line_step import CompiledLineStep, UnsuitedError
+from models.catenary.step.plain_step import PlainStep
+from models.catenary.step.step_engine import StepEngine, SteppedLine
+from models.numerics.kernel_cache import SWITCH, KernelError, joined, load_kernels
+from models.numerics.newmark import Newmark
 
-if TYPE_CHECKING:  # an FMU carries what is imported, and this is never imported by its name
-    from models.catenary.step import step_kernels as _  # noqa: F401
+if TYPE_CHECKING:  # an FMU carries what is imported, and these are never imported by their names
+    from models.catenary.step import (
+        attachment_kernels,
+        contact_kernels,
+        local_kernels,
+        mode_kernels,
+        step_kernels,
+        vector_kernels,
+    )
 
+    _ = (attachment_kernels, contact_kernels, local_kernels, mode_kernels, step_kernels, vector_kernels)
+
+#: The kernels, each after those that it calls.
+KERNEL_FILES = tuple(
+    Path(__file__).with_name(f"{part}_kernels.py")
+    for part in ("vector", "attachment", "mode", "contact", "local", "step")
+)
 #: Read now: an FMU's folder may be gone when a second instance asks for the kernels.
-_SOURCE = Path(__file__).with_name("step_kernels.py").read_bytes()
+_SOURCE = joined(KERNEL_FILES)
 
 
-def make_engine(matrices: StepMatrices) -> StepEngine:
+def make_engine(line: SteppedLine, newmark: Newmark) -> StepEngine:
     """Return the fastest step engine that this machine has for a line.
 
     Raises
     ------
     KernelError
         If the environment asks for kernels that cannot be had, or for ones that do not exist.
+    numpy.linalg.LinAlgError
+        If the line cannot make steps of this length.
     """
     wanted = os.environ.get(SWITCH, "auto")
     if wanted not in ("auto", "numpy", "numba"):
         raise KernelError(f"{SWITCH} is '{wanted}'; use auto, numpy or numba")
+    matrices = StepMatrices(line.modes, newmark)
     if wanted == "numpy":
-        return NumpyEngine(matrices)
+        return PlainStep(line, matrices)
     try:
-        return NumbaEngine(matrices, kernels())
+        return CompiledLineStep(line, matrices, kernels())
     except (ImportError, UnsuitedError) as error:
         if wanted == "numba":
             raise KernelError(f"{SWITCH} is 'numba', but {error}") from error
-        return NumpyEngine(matrices)
+        return PlainStep(line, matrices)
 
 
 def kernels() -> ModuleType:

@@ -1,490 +1,329 @@
-"""The two halves of a line's step in one pass each, for numba.
+"""One step of a line in one call, for numba: what `models.catenary.step.plain_step` does, in the same order.
 
-The same arithmetic as `numpy_engine.NumpyEngine`, but nothing is read twice and no intermediate array
-is written: how much is read and written sets the pace.
-Indices are unsigned, which spares the compiler the check whether they count from the end.
-What belongs together is handed over together, as a tuple or as one array (`unpacked`).
-
-This module imports nothing of the project and is not divided: it is compiled from a copy in the user's cache
-(`models.catenary.step.engine_choice`), which cannot see other files.
+Other files `*_kernels.py` hold the parts. Each has one subject, and none may import anything else of the project:
+they are joined to one source and compiled from a copy in the user's cache (`models.catenary.step.engine_choice`), which
+cannot see other files. What belongs together is handed over together, because a call costs more for every array.
 """
 
+import math
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
 
-#: Modes of a unit, and ends that it moves with: what the processor takes at once.
-LANES, ENDS = 8, 6
-#: Rows of a unit: the coupling mu G with its ends, 1 / K_hat, then the motion of its modes.
-INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
-#: What `meet` returns where there is no crossing.
-NOWHERE, BEFORE, BEYOND = -1, -2, -3
-#: An interval of a contact wire, as `unpacked` returns it: ``slots``, where the amplitudes of its modes are in the
-#: table, ``ends``, the places of its attachments' displacements, and ``reached``, the displacements that loads at these
-#: reach, all unsigned; ``plan`` to ``height_static`` of the `WireInterval`; ``yielding``, ``at_ends`` and the values of
-#: ``columns`` of the `IntervalResponse`.
-Interval = namedtuple(
-    "Interval",
-    ("slots", "ends", "reached", "plan", "plan_static", "height", "height_static", "yielding", "at_ends", "columns"),
+from models.catenary.step.attachment_kernels import Lanes, LanesWork, load, solve
+from models.catenary.step.contact_kernels import (
+    NOWHERE,
+    Points,
+    Records,
+    Wires,
+    add_column,
+    bend,
+    dropper_at,
+    find,
+    interval_at,
+    point,
+    press,
+    put_place,
 )
-#: Sums may be reordered, not more: infinities and NaN stay what they are.
-_compiled = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
-_0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
-_LANES, _UNIT = np.uint64(LANES), np.uint64(ROWS * LANES)
-_R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
-    np.uint64(LANES * row) for row in range(ROWS)
-)
-#: From the place of a mode's amplitude in the table to others of the same mode.
-_TO_RATE, _TO_HELD, _FROM_INVERSE = _RATE - _AMPLITUDE, _HELD - _AMPLITUDE, _AMPLITUDE - _INVERSE
+from models.catenary.step.local_kernels import LACKING, SINGULAR, SOLVED, solve_local
+from models.catenary.step.mode_kernels import Modes, advance
+from models.catenary.step.vector_kernels import compiled, part
+
+#: Answers of `step`.
+DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS, DROPPER_LACKS = range(5)
+#: Droppers: their elongation by the attachments, ``rows``, ``columns`` and ``values``; ``at_rest``, elastic force [N];
+#: ``stiffness``, ``delay`` and ``unilateral`` of the `DropperLaw`; ``known``, twice its rest_load, shape (n_attached,).
+Droppers = namedtuple("Droppers", "rows columns values at_rest stiffness delay unilateral known")
+#: What a step leaves in ``report``: how far it has come; what lacks; how many forces are on the wires, how many
+#: droppers slack; an interval before a strip whose record is lacking, or -1.
+STAGE, LACKS, LOADED, SLACK, AHEAD = range(5)
+_BEGUN = 1
+_1 = np.uint64(1)
 
 
-@_compiled
-def prepare(units, table, pull):
-    """Find what modes do in the next step, were the attachments held, and what they do to the ends of their intervals.
-
-    Parameters
-    ----------
-    units, table
-        See `finish`.
-    pull : ndarray, shape (n_ends,)
-        Result: forces on the ends.
-    """
-    where, rates, more, more_coupling = units
-    pull[:] = 0.0
-    for u in range(where.size):
-        end, begin = where[u], np.uint64(u) * _UNIT
-        for k in range(begin, begin + _LANES):
-            inverse = table[k + _INVERSE]
-            held = (rates[u, _3] + rates[u, _4] * inverse) * table[k + _AMPLITUDE]
-            held += rates[u, _1] * inverse * table[k + _MOMENTUM]
-            table[k + _HELD] = held
-            value = rates[u, _2] * table[k + _RATE] - held
-            for j in range(_0, np.uint64(ENDS)):
-                pull[end + j] += table[k + j * _LANES] * value
-    draw_more(rates, more, more_coupling, table, pull)
-
-
-@_compiled
-def load(back, own, attached, pressed, pull, right):
-    """Find the forces on the attachments that their change in this step balances.
+@compiled
+def step(line, moving, state, strips, given, records, work, report, out):
+    """Advance a line by one step, or as far as the records of intervals and droppers reach: then call again.
 
     Parameters
     ----------
-    back : (ndarray, ndarray, ndarray)
-        Turn of the ends back to the attachments' axes: rows, columns and values, compressed by rows.
-    own : (ndarray, ndarray, ndarray)
-        -2 K and a2 M of the attachments, values (k, 2) for both: upper triangles compressed by rows, each of
-        which begins with its diagonal.
-    attached : ndarray, shape (2, n_attached)
-    pressed : ndarray, shape (n_attached,)
-    pull : ndarray, shape (n_ends,)
-    right : ndarray, shape (n_attached,)
-        Result.
-    """
-    rows, columns, values = own
-    for i in range(right.size):
-        right[i] = pressed[i]
-    for i in range(right.size):
-        x, v = attached[0, i], attached[1, i]
-        at = rows[i]
-        total = values[at, _0] * x + values[at, _1] * v
-        for k in range(at + _1, rows[i + _1]):
-            j = columns[k]
-            total += values[k, _0] * attached[0, j] + values[k, _1] * attached[1, j]
-            right[j] += values[k, _0] * x + values[k, _1] * v
-        right[i] += total
-    add_product(back, pull, right)
-
-
-@_compiled
-def finish(turn, units, a1, solution, ends, attached, table, pull):
-    """Let the intervals follow their attachments, replace the motion, and `prepare` the next step in the same pass.
-
-    Parameters
-    ----------
-    turn : (ndarray, ndarray, ndarray)
-        Turn of the attachments' displacements to the axes of the intervals: rows, columns and values, compressed by
-        rows.
-    units : (where, rates, more, more_coupling)
-        where : ndarray of unsigned int, shape (N,)
-            First of the six ends that the modes of a unit move with.
-        rates : ndarray, shape (N, 5)
-            a1 / mu, a2 and a2 / mu of the modes, then c and d with -2 lambda / K_hat = c + d / K_hat: less to read
-            than these themselves.
-        more : ndarray of unsigned int, shape (M, 2)
-            Units that move with further ends: the unit, and the first of six such ends.
-        more_coupling : ndarray, shape (M, 6, 8)
-            mu G with these.
-    a1 : float
-    solution : ndarray, shape (n_attached,)
-        Change of the attachments' displacements.
-    ends : ndarray, shape (n_ends,)
-        Work space.
-    attached : ndarray, shape (2, n_attached)
-        Motion of the attachments, replaced.
-    table : ndarray, shape (N * 11 * 8,)
-        Unit by unit eleven rows of eight modes, see the constants above: properties, and the motion, which is replaced.
-        The last row is the change of the amplitudes were the attachments held, of this step; for the next one
-        afterwards.
-    pull : ndarray, shape (n_ends,)
-        Result: forces on the ends in the next step, the attachments held.
-    """
-    where, rates, more, more_coupling = units
-    ends[:] = 0.0
-    pull[:] = 0.0
-    add_product(turn, solution, ends)
-    for i in range(solution.size):
-        attached[0, i] += solution[i]
-        attached[1, i] = a1 * solution[i] - attached[1, i]
-    follow_more(rates, more, more_coupling, ends, table)
-    advance(where, rates, a1, ends, table, pull)
-    draw_more(rates, more, more_coupling, table, pull)
-
-
-@_compiled
-def advance(where, rates, a1, ends, table, pull):
-    """Replace the motion of all modes.
-
-    One array for everything and rows at fixed distances: then the compiler knows that nothing overlaps, and takes
-    several modes at once.
-    """
-    for u in range(where.size):
-        end, begin = where[u], np.uint64(u) * _UNIT
-        to_momentum, a2, from_rate = rates[u, _0], rates[u, _1], rates[u, _2]
-        stiff, less = rates[u, _3], rates[u, _4]
-        e0, e1, e2 = ends[end], ends[end + _1], ends[end + _2]
-        e3, e4, e5 = ends[end + _3], ends[end + _4], ends[end + _5]
-        t0 = t1 = t2 = t3 = t4 = t5 = 0.0
-        for k in range(begin, begin + _LANES):
-            g0, g1, g2 = table[k], table[k + _R1], table[k + _R2]
-            g3, g4, g5 = table[k + _R3], table[k + _R4], table[k + _R5]
-            moved = g0 * e0 + g1 * e1 + g2 * e2 + g3 * e3 + g4 * e4 + g5 * e5
-            inverse = table[k + _INVERSE]
-            change = table[k + _HELD] - moved * inverse
-            amplitude = table[k + _AMPLITUDE] + change
-            rate = a1 * change - table[k + _RATE]
-            momentum = a1 * change + to_momentum * moved - table[k + _MOMENTUM]
-            held = a2 * inverse * momentum + (stiff + less * inverse) * amplitude
-            value = from_rate * rate - held
-            table[k + _AMPLITUDE], table[k + _RATE] = amplitude, rate
-            table[k + _MOMENTUM], table[k + _HELD] = momentum, held
-            t0 += g0 * value
-            t1 += g1 * value
-            t2 += g2 * value
-            t3 += g3 * value
-            t4 += g4 * value
-            t5 += g5 * value
-        pull[end] += t0
-        pull[end + _1] += t1
-        pull[end + _2] += t2
-        pull[end + _3] += t3
-        pull[end + _4] += t4
-        pull[end + _5] += t5
-
-
-@_compiled
-def follow_more(rates, more, coupling, ends, table):
-    """Put what further ends do to the modes into ``table``, so that `advance` finds it there."""
-    for i in range(more.shape[0]):
-        unit, end = more[i, _0], more[i, _1]
-        for k in range(_0, _LANES):
-            moved = 0.0
-            for j in range(_0, np.uint64(ENDS)):
-                moved += coupling[i, j, k] * ends[end + j]
-            at = unit * _UNIT + k
-            table[at + _HELD] -= moved * table[at + _INVERSE]
-            table[at + _MOMENTUM] -= rates[unit, _0] * moved
-
-
-@_compiled
-def draw_more(rates, more, coupling, table, pull):
-    """Add what modes do to further ends to ``pull``."""
-    for i in range(more.shape[0]):
-        unit, end = more[i, _0], more[i, _1]
-        for k in range(_0, _LANES):
-            at = unit * _UNIT + k
-            value = rates[unit, _2] * table[at + _RATE] - table[at + _HELD]
-            for j in range(_0, np.uint64(ENDS)):
-                pull[end + j] += coupling[i, j, k] * value
-
-
-@_compiled
-def add_product(matrix, vector, result):
-    """Add a matrix, its rows, columns and values, times a vector to ``result``."""
-    rows, columns, values = matrix
-    for i in range(result.size):
-        total = 0.0
-        for k in range(rows[i], rows[i + _1]):
-            total += values[k] * vector[columns[k]]
-        result[i] += total
-
-
-@_compiled
-def solve(band, load, work, solution):
-    """Solve a band from both of its ends towards the middle, which are two chains that do not wait for each other.
-
-    Parameters
-    ----------
-    band : (top, bottom, middle, size)
-        top, bottom : ndarray, shape (p (width + 1),), (q (width + 1),)
-            Cholesky factors of the first p rows, and of the last q rows from the end backwards: row j holds 1 / L_jj
-            and L_j+k,j for k = 1 ... width.
-        middle : ndarray, shape (width, width)
-            Inverse of what is left for the rows between.
-        size : ndarray of unsigned int, shape (4,)
-            p, q, width, width + 1; q <= p <= q + 1.
-    load : ndarray, shape (n,)
-        n = p + width + q.
-    work : ndarray, shape (2, p + width)
-    solution : ndarray, shape (n,)
-    """
-    top, bottom, middle, size = band
-    p, q, width, stride = size[_0], size[_1], size[_2], size[_3]
-    n = p + width + q
-    for j in range(p + width):
-        work[0, j] = load[j]
-    for j in range(q):
-        work[1, j] = load[n - _1 - j]
-    for k in range(q, q + width):
-        work[1, k] = 0.0
-    at = _0
-    for j in range(q):
-        a, b = work[0, j] * top[at], work[1, j] * bottom[at]
-        work[0, j], work[1, j] = a, b
-        for k in range(_1, stride):
-            work[0, j + k] -= top[at + k] * a
-            work[1, j + k] -= bottom[at + k] * b
-        at += stride
-    if p > q:
-        a = work[0, q] * top[at]
-        work[0, q] = a
-        for k in range(_1, stride):
-            work[0, q + k] -= top[at + k] * a
-    for k in range(width):
-        load[k] = work[0, p + k] + work[1, q + width - _1 - k]
-    for i in range(width):
-        total = 0.0
-        for k in range(width):
-            total += middle[i, k] * load[k]
-        work[0, p + i] = total
-        work[1, q + width - _1 - i] = total
-    if p > q:
-        total = 0.0
-        for k in range(_1, stride):
-            total += top[at + k] * work[0, q + k]
-        work[0, q] = (work[0, q] - total) * top[at]
-    for step in range(q):
-        j = q - _1 - step
-        at -= stride
-        a = b = 0.0
-        for k in range(_1, stride):
-            a += top[at + k] * work[0, j + k]
-            b += bottom[at + k] * work[1, j + k]
-        work[0, j] = (work[0, j] - a) * top[at]
-        work[1, j] = (work[1, j] - b) * bottom[at]
-    for j in range(p + width):
-        solution[j] = work[0, j]
-    for j in range(q):
-        solution[n - _1 - j] = work[1, j]
-
-
-@_compiled
-def unpacked(record):
-    """Return the parts of an interval's record, see `Interval`.
-
-    A record is one array, because a call costs more for every array that is handed over: four whole numbers (modes n,
-    displacements of attachments e, elements k, displacements r that are reached), then the parts one after the other.
-    """
-    n, e, k, r = record[:4].view(np.int64)
-    m, nodes, at = n + e, 2 * (k + 1), 4
-    slots, at = record[at : at + n].view(np.uint64), at + n
-    ends, at = record[at : at + e].view(np.uint64), at + e
-    reached, at = record[at : at + r].view(np.uint64), at + r
-    plan, at = record[at : at + nodes * m].reshape((nodes, m)), at + nodes * m
-    plan_static, at = record[at : at + nodes], at + nodes
-    height, at = record[at : at + 4 * k * m].reshape((k, 4, m)), at + 4 * k * m
-    height_static, at = record[at : at + 4 * k].reshape((k, 4)), at + 4 * k
-    yielding, at = record[at : at + n * e].reshape((n, e)), at + n * e
-    at_ends, at = record[at : at + e * e].reshape((e, e)), at + e * e
-    columns = record[at : at + r * e].reshape((r, e))
-    return Interval(slots, ends, reached, plan, plan_static, height, height_static, yielding, at_ends, columns)
-
-
-@_compiled
-def meet(record, strip, element, a1, table, solution, attached, result):
-    """Find where a strip crosses an interval of a wire at the end of a step, forces found inside the step left out.
-
-    The same as `models.catenary.contact_and_slack.wire_response.walk` does.
-
-    Parameters
-    ----------
-    record : ndarray
-        Of the interval, see `unpacked`.
-    strip : ndarray, shape (2, 2, 3)
-        Ends A and B; position and velocity.
-    element : int
-        Of the interval, to begin with.
-    a1 : float
-    table : ndarray
-        See `finish`.
-    solution, attached : ndarray, shape (n_attached,), (2, n_attached)
-        Change of the attachments in this step, and their motion at its beginning.
-    result : ndarray, shape (6 + m + e,)
-        Share of the way along the element and along the strip, static height, rise and its rate, compliance; what a
-        unit force on the point does to the m local coordinates, and to the e displacements of the attachments directly
-        and through the modes.
+    line : (constants, Lanes, Modes, Droppers, Wires, turn and back), as plain tuples
+        constants : ndarray, shape (5,)
+            a1, then ``contact`` of `law_of`.
+        turn, back : six ndarray
+            To the axes of the intervals and back, rows, columns and values each, compressed by rows.
+    moving : (attached, table, pull)
+        attached : ndarray, shape (2, n_attached)
+        table, pull
+            See `models.catenary.step.mode_kernels.advance`.
+    state : (element, impact_velocity, loaded, load, slack, compensation)
+        As in a `CatenaryState`; the first two are replaced.
+    strips : (strip, compliance)
+        As in a `StripMotion`.
+    given : (loaded, load)
+        Known forces on the wires at the end of the step.
+    records : Records
+    work : (lanes, change, ends, pressed, free, local, whole, numbers, row, load, chosen), arrays to work in
+    report : ndarray of int, shape (5,)
+        See above; all zero at first.
+    out : (force, point, loaded, load, points, slack, lacks, pull)
+        force, point
+            As in a `ContactResult`.
+        loaded, load
+            Forces on the wires at the end of the step.
+        points, slack, lacks, pull
+            ``results`` of `solve_local`.
 
     Returns
     -------
     int
-        Element of the interval; NOWHERE where the strip and the wire are parallel or pass beside each other, BEFORE or
-        BEYOND where they may cross in another interval on that side.
+        DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS or DROPPER_LACKS; ``report[LACKS]`` says which.
     """
-    interval = unpacked(record)
-    plan, plan_static = interval.plan, interval.plan_static
-    size = plan.shape[1]
-    row, load = result[6 : 6 + size], result[6 + size :]
-    local = np.empty((2, size))
-    follow_ends(interval, a1, table, solution, attached, local)
-    ax, ay = strip[0, 0, 0], strip[0, 0, 1]
-    strip_x, strip_y = strip[1, 0, 0] - ax, strip[1, 0, 1] - ay
-    direction = 0
-    while True:
-        x, y = plan_static[2 * element], plan_static[2 * element + 1]
-        x2, y2 = plan_static[2 * element + 2], plan_static[2 * element + 3]
-        for m in range(row.size):
-            x += plan[2 * element, m] * local[0, m]
-            y += plan[2 * element + 1, m] * local[0, m]
-            x2 += plan[2 * element + 2, m] * local[0, m]
-            y2 += plan[2 * element + 3, m] * local[0, m]
-        determinant = strip_y * (x2 - x) - strip_x * (y2 - y)
-        if determinant == 0.0:
-            return NOWHERE
-        dx, dy = x - ax, y - ay
-        share = (dy * (x2 - x) - dx * (y2 - y)) / determinant
-        xi = (strip_x * dy - strip_y * dx) / determinant
-        step = -1 if xi < 0.0 else (1 if xi > 1.0 else 0)
-        if step == 0 or step == -direction:
-            break
-        direction = step
-        element += step
-        if element < 0:
-            return BEFORE
-        if element >= interval.height.shape[0]:
-            return BEYOND
-    if not 0.0 <= share <= 1.0:
-        return NOWHERE
-    xi = min(max(xi, 0.0), 1.0)
-    height = lift(interval, element, xi, row)
-    rise = rate = 0.0
-    for m in range(row.size):
-        rise += row[m] * local[0, m]
-        rate += row[m] * local[1, m]
-    result[0], result[1], result[2], result[3], result[4] = xi, share, height, rise, rate
-    result[5] = give(interval, table, row, load)
-    return element
-
-
-@_compiled
-def follow_ends(interval, a1, table, solution, attached, local):
-    """Put the local coordinates of an interval at the end of a step and their rates into ``local``; see `meet`."""
-    slots, ends, yielding = interval.slots, interval.ends, interval.yielding
-    count, size = yielding.shape
-    for j in range(size):
-        change = solution[ends[j]]
-        local[0, count + j] = change
+    constants, lanes, modes, droppers, wires, turns = line
+    droppers, wires, records = Droppers(*droppers), Wires(*wires), Records(*records)
+    lanes, modes = Lanes(*lanes), Modes(*modes)
+    attached, table, pull = moving
+    element, impact = state[0], state[1]
+    whole, numbers = work[6], work[7]
+    points = Points(
+        whole[0], whole[1], whole[2], whole[3], whole[4],
+        numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6],
+        work[8], work[9],
+    )  # fmt: skip
+    change, free, chosen, size = work[1], work[4], work[10], attached.shape[1]
+    motion = constants[0], table, change, attached
+    if report[STAGE] < _BEGUN:
+        lacking = _unknown(wires, records, state[2], given[0])
+        if lacking >= 0:
+            report[LACKS] = lacking
+            return INTERVAL_LACKS
+        _begin(lanes, droppers, wires, records, moving, state, turns, work)
+        _push(wires, records, given, points, motion)
+        _put_free(droppers, motion, free)
+        report[STAGE] = _BEGUN
+    lacking, count = _meet(wires, records, element, impact, strips[0], constants[4], motion, work[5], points, report)
+    if lacking >= 0:
+        report[LACKS] = lacking
+        return INTERVAL_LACKS
+    n = 0
     for i in range(count):
-        at = slots[i]
-        change = table[at + _TO_HELD]
-        for j in range(size):
-            change -= yielding[i, j] * local[0, count + j]
-        local[1, i] = a1 * change - table[at + _TO_RATE]
-        local[0, i] = table[at] + change
-    for j in range(size):
-        change = local[0, count + j]
-        local[1, count + j] = a1 * change - attached[1, ends[j]]
-        local[0, count + j] = attached[0, ends[j]] + change
+        # One that was closed stays among the contacts: other forces of the step may keep it so.
+        if points.penetration[i] > 0.0 or points.impact[i] > 0.0:
+            chosen[n] = i
+            n += 1
+    contacts = chosen[:n]
+    answer = solve_local(
+        records, points, contacts, strips[1], free, droppers.unilateral, constants[0], constants[1:], size, table,
+        state[4], out[4:],
+    )  # fmt: skip
+    if answer >= LACKING:
+        report[LACKS] = answer - LACKING
+        return DROPPER_LACKS
+    if answer != SOLVED:
+        report[SLACK], report[LOADED] = _count(out[5]), n
+        return NO_SOLUTION if answer == SINGULAR else NOT_SETTLED
+    _apply(records, points, contacts, out, motion)
+    _follow(modes, turns, motion, work[2], pull)
+    _note(points, contacts, given, impact, out, report)
+    _put_result(wires, records, points, contacts, count, strips[0], motion, out)
+    return DONE
 
 
-@_compiled
-def lift(interval, element, xi, row):
-    """Put what a unit force on a point does to the local coordinates into ``row``; return the static height."""
-    height, height_static = interval.height, interval.height_static
-    power, static = 1.0, 0.0
-    row[:] = 0.0
-    for n in range(4):
-        static += power * height_static[element, n]
-        for m in range(row.size):
-            row[m] += power * height[element, n, m]
-        power *= xi
-    return static
+@part
+def _unknown(wires, records, loaded, given):
+    """Return an interval under a known force whose record is lacking, or -1."""
+    for places in (loaded, given):
+        for i in range(places.shape[0]):
+            number = wires.interval[wires.first[places[i, 0]] + places[i, 1]]
+            if records.intervals[number] < 0:
+                return number
+    return -1
 
 
-@_compiled
-def give(interval, table, row, load):
-    """Put what a unit force on a point does to the attachments into ``load``; return the compliance of the point."""
-    slots, yielding, at_ends = interval.slots, interval.yielding, interval.at_ends
-    count, size = yielding.shape
-    compliance = 0.0
-    for j in range(size):
-        load[j] = row[count + j]
+@part
+def _begin(lanes, droppers, wires, records, moving, state, turns, work):
+    """Find the change of the attachments under the forces at the beginning of the step, and known ones at its end."""
+    attached, table, pull = moving
+    loaded, force, slack, compensation = state[2], state[3], state[4], state[5]
+    change, pressed = work[1], work[3]
+    for i in range(pressed.size):
+        pressed[i] = droppers.known[i]
+    for k in range(slack.size):
+        for i in range(droppers.rows[slack[k]], droppers.rows[slack[k] + 1]):
+            pressed[droppers.columns[i]] -= compensation[k] * droppers.values[i]
+    for k in range(loaded.shape[0]):
+        number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
+        record, place = records.intervals[number], loaded[k, 1] - wires.begins[number]
+        row, share = work[8][0], work[9][0]
+        point(records, record, place, force[k, 0], table, row, share)
+        press(records, record, row, force[k, 1], table)
+        interval = interval_at(records.whole, record)
+        for j in range(interval.size):
+            pressed[records.whole[interval.ends + j]] += force[k, 1] * share[j]
+    lanes_work = LanesWork(*work[0])
+    load(lanes, (turns[3], turns[4], turns[5]), attached, pressed, pull, lanes_work)
+    solve(lanes, lanes_work, change)
+
+
+@part
+def _push(wires, records, given, points, motion):
+    """Add what given forces at the end of the step change in it."""
+    _, table, change, _ = motion
+    places, force = given
+    for k in range(places.shape[0]):
+        number = wires.interval[wires.first[places[k, 0]] + places[k, 1]]
+        record, place = records.intervals[number], places[k, 1] - wires.begins[number]
+        point(records, record, place, force[k, 0], table, points.row[0], points.load[0])
+        press(records, record, points.row[0], force[k, 1], table)
+        bend(records, record, points.load[0], force[k, 1], change)
+
+
+@part
+def _put_free(droppers, motion, free):
+    """Put the droppers' pulls at the end of the step, if they could push, into ``free``; see `DropperLaw.pull`."""
+    a1, _, change, attached = motion
+    for i in range(free.size):
+        elongation = 0.0
+        for k in range(droppers.rows[i], droppers.rows[i + 1]):
+            j = droppers.columns[k]
+            rate = a1 * change[j] - attached[1, j]
+            elongation += droppers.values[k] * (attached[0, j] + change[j] + droppers.delay[i] * rate)
+        free[i] = droppers.at_rest[i] + droppers.stiffness[i] * elongation
+
+
+@part
+def _meet(wires, records, element, impact, strips, gap, motion, local, points, report):
+    """Find all strips that cross a wire at the end of the step, forces found inside it left out.
+
+    Returns
+    -------
+    (int, int)
+        An interval whose record is lacking, or -1; how many points there are.
+    """
+    count = 0
+    place = np.empty(3)
+    report[AHEAD] = -1
+    for s in range(wires.period.size):
+        for p in range(strips.shape[0]):
+            strip = strips[p]
+            found = find(wires, records, s, strip, element[p, s], motion, local, place)
+            if found == NOWHERE:
+                continue
+            if found < NOWHERE:
+                return NOWHERE - 1 - found, count
+            element[p, s] = found
+            number = wires.interval[wires.first[s] + found]
+            record = records.intervals[number]
+            points.pantograph[count], points.section[count], points.element[count] = p, s, found
+            points.record[count], points.place[count] = record, found - wires.begins[number]
+            points.xi[count], points.engagement[count], points.impact[count] = place[0], place[2], impact[p, s]
+            row = points.row[count]
+            height, points.compliance[count] = point(
+                records, record, points.place[count], place[0], motion[1], row, points.load[count]
+            )
+            points.height[count] = height
+            rate = 0.0
+            interval = interval_at(records.whole, record)
+            for m in range(interval.modes + interval.size):
+                height += row[m] * local[0, m]
+                rate += row[m] * local[1, m]
+            a, b = strip[0, :, 2], strip[1, :, 2]
+            points.penetration[count] = a[0] + place[1] * (b[0] - a[0]) - (height - gap)
+            points.velocity[count] = a[1] + place[1] * (b[1] - a[1]) - rate
+            ahead = _next(wires, s, number)
+            if records.intervals[ahead] < 0:
+                report[AHEAD] = ahead
+            count += 1
+    return -1, count
+
+
+@part
+def _next(wires, section, number):
+    """Return the interval after another; the last one of a wire that ends follows itself."""
+    last = wires.interval[wires.first[section + 1] - 1]
+    if number < last:
+        return number + 1
+    return wires.interval[wires.first[section]] if wires.period[section] > 0.0 else number
+
+
+@part
+def _apply(records, points, contacts, out, motion):
+    """Add what contacts and slack droppers change within the step."""
+    _, table, change, _ = motion
+    of_points, is_slack, lacks = out[4], out[5], out[6]
+    for i in contacts:
+        force = of_points[i, 0]
+        if force != 0.0:
+            press(records, points.record[i], points.row[i], force, table)
+            bend(records, points.record[i], points.load[i], force, change)
+    for j in range(is_slack.size):
+        if is_slack[j]:
+            dropper = dropper_at(records.whole, records.droppers[j])
+            add_column(records.data, dropper.column, dropper.first, dropper.reach, -lacks[j], change)
+
+
+@part
+def _follow(modes, turns, motion, ends, pull):
+    """Replace the motion by that at the end of the step."""
+    a1, table, change, attached = motion
+    rows, columns, values = turns[0], turns[1], turns[2]
+    for i in range(ends.size):
+        moved = 0.0
+        for k in range(rows[i], rows[i + _1]):
+            moved += values[k] * change[columns[k]]
+        ends[i] = moved
+    for i in range(change.size):
+        attached[0, i] += change[i]
+        attached[1, i] = a1 * change[i] - attached[1, i]
+    advance(modes, a1, ends, table, pull)
+
+
+@part
+def _note(points, contacts, given, impact, out, report):
+    """Record the forces at the end of the step; the next one begins with them."""
+    of_points, loaded, load = out[4], out[2], out[3]
+    count = given[0].shape[0]
     for i in range(count):
-        compliance += row[i] * row[i] * table[slots[i] - _FROM_INVERSE]
-        for j in range(size):
-            load[j] -= row[i] * yielding[i, j]
-    for j in range(size):
-        for k in range(size):
-            compliance += load[j] * at_ends[j, k] * load[k]
-    return compliance
+        for j in range(2):
+            loaded[i, j], load[i, j] = given[0][i, j], given[1][i, j]
+    for p in range(out[0].shape[0]):
+        for s in range(out[0].shape[1]):
+            impact[p, s] = 0.0
+    for i in contacts:
+        loaded[count, 0], loaded[count, 1] = points.section[i], points.element[i]
+        load[count, 0], load[count, 1] = points.xi[i], of_points[i, 0]
+        count += 1
+        if of_points[i, 1] > 0.0:
+            before = points.impact[i]
+            impact[points.pantograph[i], points.section[i]] = before if before > 0.0 else max(of_points[i, 2], 1e-6)
+    report[LOADED] = count
+    report[SLACK] = _count(out[5])
 
 
-@_compiled
-def push(record, element, xi, force, table, pressed):
-    """Add a known force on a point of an interval to ``pressed``, the forces on the attachments, and to its modes."""
-    interval = unpacked(record)
-    ends = interval.ends
-    row, load = np.empty(interval.plan.shape[1]), np.empty(ends.size)
-    lift(interval, element, xi, row)
-    give(interval, table, row, load)
-    for j in range(ends.size):
-        pressed[ends[j]] += force * load[j]
-    press(interval.slots, force, row, table)
+@part
+def _put_result(wires, records, points, contacts, count, strips, motion, out):
+    """Put the contacts into the result."""
+    _, table, _, attached = motion
+    force, place, of_points = out[0], out[1], out[4]
+    for p in range(force.shape[0]):
+        for s in range(force.shape[1]):
+            force[p, s] = 0.0
+            for i in range(3):
+                place[p, s, i] = math.nan
+    for i in contacts:
+        force[points.pantograph[i], points.section[i]] = of_points[i, 0]
+    for i in range(count):
+        p, s = points.pantograph[i], points.section[i]
+        put_place(records, points, i, table, attached, place[p, s])
+        if wires.period[s] > 0.0:  # points travel on along with their strips
+            laps = (0.5 * (strips[p, 0, 0, 0] + strips[p, 1, 0, 0]) - place[p, s, 0]) / wires.period[s]
+            place[p, s, 0] += wires.period[s] * math.floor(laps + 0.5)
 
 
-@_compiled
-def press(slots, force, row, table):
-    """Add a force on a point of an interval, its attachments held, to the changes of the interval's modes."""
-    for i in range(slots.size):
-        table[slots[i] + _TO_HELD] += force * row[i] * table[slots[i] - _FROM_INVERSE]
-
-
-@_compiled
-def apply(record, row, load, force, table, solution):
-    """Add what a force on a point changes in a step; ``row`` and ``load`` are those of the point, see `meet`."""
-    interval = unpacked(record)
-    reached, columns = interval.reached, interval.columns
-    press(interval.slots, force, row, table)
-    for i in range(reached.size):
-        total = 0.0
-        for j in range(load.size):
-            total += columns[i, j] * load[j]
-        solution[reached[i]] += force * total
-
-
-@_compiled
-def place(record, row, height, table, attached, element, xi, out):
-    """Put a point of a wire into ``out``, shape (3,); ``row`` and ``height`` are those of the point, see `meet`."""
-    interval = unpacked(record)
-    slots, ends, plan, plan_static = interval.slots, interval.ends, interval.plan, interval.plan_static
-    count = slots.size
-    x, y = plan_static[2 * element], plan_static[2 * element + 1]
-    x2, y2, z = plan_static[2 * element + 2], plan_static[2 * element + 3], height
-    for m in range(row.size):
-        value = table[slots[m]] if m < count else attached[0, ends[m - count]]
-        x += plan[2 * element, m] * value
-        y += plan[2 * element + 1, m] * value
-        x2 += plan[2 * element + 2, m] * value
-        y2 += plan[2 * element + 3, m] * value
-        z += row[m] * value
-    out[0], out[1], out[2] = x + xi * (x2 - x), y + xi * (y2 - y), z
+@part
+def _count(is_slack):
+    """Return how many droppers are slack."""
+    count = 0
+    for j in range(is_slack.size):
+        count += is_slack[j]
+    return count

@@ -46,7 +46,7 @@ class Inputs(NamedTuple):
     base : tuple of float
         Vertical displacement, velocity and acceleration of the base [m, m/s, m/s2].
     lift : float
-        Value of the lifting element [N or N.m].
+        What is set of the lifting element [N, N.m, or 1 for a table of a cam].
     force : float
         Contact force, positive pushes the strip down [N].
     lateral : float
@@ -245,17 +245,28 @@ class Mechanism:
         return np.concatenate([A, A @ skew(y[10 * n + 3 * k : 10 * n + 3 * k + 3][None, :])[0]])
 
     def loads(
-        self, y: FloatArray, kinematics: Kinematics, inputs: Inputs, vectors: MovingVectors | None = None
+        self,
+        y: FloatArray,
+        kinematics: Kinematics,
+        inputs: Inputs,
+        vectors: MovingVectors | None = None,
+        *,
+        lifted: bool = True,
     ) -> FloatArray:
-        """Return all applied loads on the bodies, shape (n, 6), without gyroscopic moments."""
+        """Return all applied loads on the bodies, shape (n, 6), without gyroscopic moments; the lift's if wanted."""
         if vectors is None:
             vectors = self.pool.evaluate(kinematics)
-        loads = self.forces.loads(kinematics, vectors, y[10 * self.count :].reshape(-1, 3), inputs.lift)
+        w = y[10 * self.count :].reshape(-1, 3)
+        loads = self.forces.loads(kinematics, vectors, w, inputs.lift, lifted=lifted)
         loads += self._weights
         if inputs.force != 0.0:
             frame = kinematics.frames[self.strip_body, :3]
             loads[self.strip_body] += self.contact_load(y, inputs, frame)
         return loads
+
+    def lift_value(self, y: FloatArray, lift: float) -> float:
+        """Return the force or moment of the lifting element [N or N.m] for what is set of it."""
+        return lift if self.forces.cam is None else self.forces.lift_value(self.kinematics(y), lift)
 
     def constraint_values(self, kinematics: Kinematics) -> ConstraintValues:
         """Return all constraints."""
@@ -394,10 +405,12 @@ class Mechanism:
         return self.join(s.r, s.p, *self.unscaled(scaled))
 
     def energy(self, y: FloatArray) -> float:
-        """Return kinetic energy plus that of weights, springs and bump stops [J]; the base's weight left out."""
+        """Return kinetic energy plus that of weights, springs and stops [J]; the base's weight left out."""
         free = slice(self.driven, None)
         weight = self.definition.gravity * (self.mass[free] @ self.split(y).r[free, 2])
-        return float(self.kinetic(y) + weight + self.forces.energy(self.pool.evaluate(self.kinematics(y))))
+        kinematics = self.kinematics(y)
+        stored = self.forces.energy(self.pool.evaluate(kinematics)) + self.forces.stops.energy(kinematics.frames)
+        return float(self.kinetic(y) + weight + stored)
 
     def kinetic(self, y: FloatArray) -> float:
         """Return the kinetic energy of the bodies that the base does not drive [J]."""

@@ -57,8 +57,8 @@ def inertia_warning(definition: MechanismDefinition) -> str:
 
 
 def _raised(definition: MechanismDefinition) -> Raised:
-    parameter, unit = ("static_moment", "N.m") if definition.lifts_by_moment else ("static_force", "N")
-    return Raised(parameter, definition.lift, unit, definition.reference_height, definition.start_position)
+    name, unit = definition.lift_parameter or "static_force", definition.lift_unit
+    return Raised(name, definition.lift, unit, definition.reference_height, definition.start_position)
 
 
 def _force(mechanism: Mechanism, standing: FloatArray, height: float) -> float | None:

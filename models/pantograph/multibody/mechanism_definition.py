@@ -9,12 +9,22 @@ The file is longer than others because all kinds are declared side by side, and 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Final
 
 from models.definition_files import field_schema
-from models.definition_files.field_schema import direction, named, part, quantity, text, vector
+from models.definition_files.field_schema import (
+    direction,
+    named,
+    part,
+    quantity,
+    series,
+    text,
+    vector,
+    word_or_part,
+)
 from models.definition_files.parameter import Parameter
 from models.definition_files.toml_reader import Quantity, Table
 from models.pantograph.operation import Operation
@@ -32,8 +42,11 @@ _STIFFNESS: Final[_Range] = {"minimum": 0.0, "maximum": 1e9}
 _DAMPING: Final[_Range] = {"minimum": 0.0, "maximum": 1e6}
 _VALUE: Final[_Range] = {"minimum": -1e5, "maximum": 1e5}
 _FRICTION: Final[_Range] = {"minimum": 0.0, "maximum": 1e4}
+_ANGLE: Final[_Range] = {"minimum": -3.2, "maximum": 3.2}
 _TRANSITION: Final[_Range] = {"minimum": 1e-9, "maximum": 100.0}
 _NONE: Final = (0.0, 0.0, 0.0)
+#: Points that make a spline.
+_FEWEST: Final = 3
 #: Share by which the largest moment of inertia may exceed the other two together before it is refused [choice]. No
 #: body's does at all, but printed tables do: the source's by 43 % (its stabilisation arm).
 _LARGEST_EXCESS: Final = 1.0
@@ -233,6 +246,56 @@ class BumpStop(LineForce):
             yield "", "needs a length 'shortest' or 'longest'"
 
 
+#: A cam that the tool finds: with it the strip presses with the force set, at every height.
+CONSTANT_FORCE: Final = "constant_force"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CamTable:
+    """What cams given as tables have: places that rise, and a value for each."""
+
+    @property
+    def columns(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Places and values."""
+        raise NotImplementedError
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield what is wrong with the table."""
+        (place, value), names = self.columns, tuple(f.name for f in fields(self))
+        if len(place) != len(value):
+            yield names[1], f"has {len(value)} values for {len(place)} of '{names[0]}'"
+        elif len(place) < _FEWEST:
+            yield names[0], f"has {len(place)} values where a cam takes at least {_FEWEST}"
+        elif falls := [b for a, b in itertools.pairwise(place) if not b > a]:
+            yield names[0], f"must rise from value to value; {falls[0]:g} does not"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MomentCam(CamTable):
+    """A lifting moment over the angle of its bodies, which is 0 as written."""
+
+    angle: tuple[float, ...] = series("rad", "angle of the lifting element", minimum=-3.0, maximum=3.0)
+    moment: tuple[float, ...] = series("N.m", "moment of the cam", **_VALUE)
+
+    @property
+    def columns(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Angles [rad] and moments [N.m]."""
+        return self.angle, self.moment
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceCam(CamTable):
+    """A lifting force over the length between its points."""
+
+    length: tuple[float, ...] = series("m", "length of the lifting element", **_LENGTH)
+    force: tuple[float, ...] = series("N", "force of the cam", **_VALUE)
+
+    @property
+    def columns(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Lengths [m] and forces [N]."""
+        return self.length, self.force
+
+
 @dataclass(frozen=True, kw_only=True)
 class ActuatorForce(LineForce):
     """A force that pushes the points apart."""
@@ -242,7 +305,13 @@ class ActuatorForce(LineForce):
 
 @dataclass(frozen=True, kw_only=True)
 class LiftingForce(LineForce):
-    """The force that raises the pantograph: it pushes the points apart with the definition's ``static_force``."""
+    """The force that raises the pantograph: it pushes the points apart with the definition's ``static_force``.
+
+    With a cam, ``static_force`` is what the strip presses with ("constant_force"), or the table's value at the length
+    in the working configuration.
+    """
+
+    cam: str | ForceCam | None = word_or_part((CONSTANT_FORCE,), ForceCam, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -261,7 +330,41 @@ class ActuatorMoment(AxisMoment):
 
 @dataclass(frozen=True, kw_only=True)
 class LiftingMoment(AxisMoment):
-    """The moment that raises the pantograph: the definition's ``static_moment``."""
+    """The moment that raises the pantograph: the definition's ``static_moment``.
+
+    With the cam "constant_force" it is whatever makes the strip press with the definition's ``static_force``; a cam as
+    a table is scaled so that its value at angle 0 is ``static_moment``, if that is given.
+    """
+
+    cam: str | MomentCam | None = word_or_part((CONSTANT_FORCE,), MomentCam, default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleStop(AxisMoment):
+    """A spring and a damper that turn body j back, about an axis of body i, beyond a lowest and a highest angle.
+
+    Angles are 0 as written.
+    """
+
+    lowest: float | None = quantity("rad", "{name}: lowest angle without moment", default=None, **_ANGLE)
+    highest: float | None = quantity("rad", "{name}: highest angle without moment", default=None, **_ANGLE)
+    stiffness: float = quantity("N.m/rad", "{name}: stiffness", minimum=1.0, maximum=1e9)
+    damping: float = quantity("N.m.s/rad", "{name}: damping", default=0.0, minimum=0.0, maximum=1e7)
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield what is missing or the wrong way round."""
+        if self.lowest is None and self.highest is None:
+            yield "", "needs an angle 'lowest' or 'highest'"
+        elif self.lowest is not None and self.highest is not None and self.lowest >= self.highest:
+            yield "lowest", f"{self.lowest:g} rad is not below 'highest', {self.highest:g} rad"
+
+    def beyond(self, angle: float) -> float:
+        """Return how far an angle lies beyond the stops, below the lowest one negative [rad]."""
+        if self.highest is not None and angle > self.highest:
+            return angle - self.highest
+        if self.lowest is not None and angle < self.lowest:
+            return angle - self.lowest
+        return 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -340,6 +443,7 @@ FORCES: Final[Mapping[str, type[Force] | Callable[[Table], type[Force]]]] = {
     "actuator_force": _force,
     "actuator_moment": _moment,
     "bump_stop": BumpStop,
+    "angle_stop": AngleStop,
     "joint_friction": _friction,
     "bushing": Bushing,
 }
@@ -405,6 +509,17 @@ class MechanismDefinition(Operation):
     )
     static_moment: float | None = quantity("N.m", "lifting moment after the raise", default=None, **_VALUE)
     gravity: float = quantity("m/s2", "acceleration of gravity", default=9.81, minimum=0.0, maximum=30.0)
+    base_height: float | None = quantity(
+        "m",
+        "height of the base's origin above the rails; with it the arms take the angle that the reference height needs",
+        default=None,
+        minimum=0.5,
+        maximum=9.0,
+    )
+    start_height: float | None = quantity(
+        "m", "height of the strip at time 0, if it is not the reference height: folded, say", default=None,
+        minimum=0.5, maximum=10.0,
+    )  # fmt: skip
     tolerance: float = quantity("m", "local error of an internal step", default=1e-8, minimum=1e-15, maximum=0.1)
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
 
@@ -418,13 +533,45 @@ class MechanismDefinition(Operation):
 
     def problems(self) -> Iterator[tuple[str, str]]:
         """Yield what is wrong with the values of what lifts."""
-        lifted_by = {type(f) for f in self.forces}
-        for key, cls in (("static_force", LiftingForce), ("static_moment", LiftingMoment)):
-            if cls in lifted_by and getattr(self, key) is None:
+        wanted = self.lift_parameter
+        cam = getattr(self.lifting, "cam", None)
+        for key in ("static_force", "static_moment"):
+            given = getattr(self, key)
+            if key == wanted and given is None and not isinstance(cam, MomentCam | ForceCam):
                 yield key, "is missing"
-            elif cls not in lifted_by and getattr(self, key) is not None:
-                kind = "actuator_force" if cls is LiftingForce else "actuator_moment"
-                yield key, f"does nothing: no {kind} has lift = true"
+            elif key != wanted and given is not None:
+                yield key, self._useless(key)
+
+    def _useless(self, key: str) -> str:
+        if self.holds_force and self.lifting is not None:
+            cam = f"with the cam '{CONSTANT_FORCE}' of '{self.lifting.name}'"
+            return f"does nothing: {cam} the strip's force is set, by 'static_force'"
+        kind = "actuator_force" if key == "static_force" else "actuator_moment"
+        return f"does nothing: no {kind} has lift = true"
+
+    @property
+    def lifting(self) -> LiftingForce | LiftingMoment | None:
+        """The element that raises the pantograph, None if nothing does."""
+        return next((f for f in self.forces if isinstance(f, LiftingForce | LiftingMoment)), None)
+
+    @property
+    def holds_force(self) -> bool:
+        """Return whether a cam makes the force of the strip the same at every height."""
+        return getattr(self.lifting, "cam", None) == CONSTANT_FORCE
+
+    @property
+    def lift_parameter(self) -> str:
+        """Name of the parameter that says how much it lifts; empty if nothing does."""
+        if self.lifting is None:
+            return ""
+        return "static_moment" if isinstance(self.lifting, LiftingMoment) and not self.holds_force else "static_force"
+
+    @property
+    def lift_unit(self) -> str:
+        """Unit of that parameter; "1" of a cam given as a table that is not scaled by one."""
+        if self.lift_parameter and getattr(self, self.lift_parameter) is None:
+            return "1"
+        return "N.m" if self.lift_parameter == "static_moment" else "N"
 
     @property
     def driven(self) -> frozenset[str]:
@@ -438,5 +585,6 @@ class MechanismDefinition(Operation):
 
     @property
     def lift(self) -> float:
-        """Full value of the lifting force [N] or moment [N.m]; 0 if nothing lifts."""
-        return self.static_moment or self.static_force or 0.0
+        """Full value of the lifting force [N] or moment [N.m]; 1 of a cam as a table alone, 0 if nothing lifts."""
+        value = getattr(self, self.lift_parameter) if self.lift_parameter else 0.0
+        return 1.0 if value is None else value

@@ -95,7 +95,7 @@ class MechanismBalance:
         turning = (kinematics.frames[:, :3] @ state.w[:, :, None])[:, :, 0]
         motion = np.concatenate([state.v, turning], axis=1)
         loads = mechanism.loads(y, kinematics, inputs, vectors)
-        unlifted = mechanism.loads(y, kinematics, inputs._replace(lift=0.0), vectors)
+        unlifted = mechanism.loads(y, kinematics, inputs, vectors, lifted=False)
         by_body = (loads * motion).sum(axis=1)
         contact = 0.0
         if inputs.force != 0.0:

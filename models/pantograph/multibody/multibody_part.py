@@ -10,7 +10,7 @@ import numpy as np
 from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
-from models.pantograph.multibody.analysis.mechanism_statics import equilibrium, settle_springs
+from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_advice import mechanism_warning, working_height_warning
@@ -25,7 +25,8 @@ class MultibodyPantographPart:
 
     At first it stands in its working configuration (the written one, assembled) with the strip at the reference
     height, held by the lifting value that balances the weights; the ramp of the raise leads from there to the full
-    value. The base stands at the height above the rails that this takes.
+    value. The base stands at the height above the rails that this takes, or where the definition says; the arms then
+    take the angle that the reference height needs, or the start height.
 
     Parameters
     ----------
@@ -149,12 +150,12 @@ class MultibodyPantographPart:
     def working_height_warning(self, x: float, z: float) -> str:
         """Say so if the wire above the start, at (x, z) [m], is higher than the lifting value is for."""
         built = self._ready()
-        return working_height_warning(built.mechanism, built.standing, x, z)
+        return working_height_warning(built.mechanism, built.reference, x, z)
 
     def mechanism_warning(self) -> str:
         """Say so if the mechanism has motions too many, or some that grow."""
         built = self._ready()
-        return mechanism_warning(built.mechanism, built.standing)
+        return mechanism_warning(built.mechanism, built.reference)
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
@@ -257,15 +258,19 @@ class MultibodyPantographPart:
         # Along the strip, which may roll and yaw.
         offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
         values = evaluation.constraints
-        self._observation[:-6] = bodies.ravel()
-        self._observation[-6:] = (
+        lift = self._lift(self.time)
+        held = (lift,) if operation.holds_force else ()
+        own = (
             roll,
             roll_rate,
             offset,
-            self._lift(self.time),
+            mechanism.lift_value(self._y, lift),
+            *held,
             np.abs(values.violation).max(initial=0.0),
             np.abs(values.rate).max(initial=0.0),
         )
+        self._observation[: bodies.size] = bodies.ravel()
+        self._observation[bodies.size :] = own
 
 
 class _Last(NamedTuple):
@@ -311,10 +316,11 @@ class _Built:
             raise MechanismError(f"{definition.name}: a pantograph needs a [strip]")
         self.mechanism = Mechanism(definition)
         self.integrator = Integrator(self.mechanism, definition.tolerance, definition.time_step)
-        working = equilibrium(self.mechanism, start=settle_springs(self.mechanism))
-        self.standing = project(self.mechanism, working.y)
-        self.balance = working.lift
-        self.base_height = definition.reference_height - working.strip_height
+        posture = take_posture(self.mechanism)
+        self.standing = project(self.mechanism, posture.start.y)
+        self.reference = posture.reference
+        self.balance = posture.start.lift
+        self.base_height = posture.base_height
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 
 
@@ -326,6 +332,7 @@ def _observed(definition: MechanismDefinition) -> tuple[tuple[str, str, str], ..
         if b.name not in definition.driven
         for key, unit, text in kinds
     ]
+    held = (("uplift.force", "N", "force on the strip that the cam holds"),) if definition.holds_force else ()
     return (
         *bodies,
         ("strip.roll", "rad", "roll of the collector strip, left end up"),
@@ -334,6 +341,7 @@ def _observed(definition: MechanismDefinition) -> tuple[tuple[str, str, str], ..
         ("lift.moment", "N.m", "lifting moment")
         if definition.lifts_by_moment
         else ("lift.force", "N", "lifting force"),
+        *held,
         ("joints.violation", "m", "largest constraint violation"),
         ("joints.violation_rate", "m/s", "largest rate of constraint violation"),
     )

@@ -19,6 +19,7 @@ from master.recording.recording import load
 from master.results import run_results
 from master.safety import folder_lock
 from master.safety.folder_lock import LOCK, OWNER, FolderInUseError, claimed
+from tests import forked_commands
 
 ROOT = Path(__file__).parents[3]
 HOLDER = """
@@ -40,8 +41,7 @@ def said(capsys):
 
 
 def start(*arguments):
-    command = [sys.executable, "-m", "master", *map(str, arguments)]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    return forked_commands.start("master", *arguments, stderr=subprocess.PIPE)
 
 
 def running(toy, folder, *options):

@@ -10,7 +10,6 @@ import random
 import resource
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from master.recording.recording import load
 from master.results import results_folder, run_results
 from master.safety import safe_files
 from master.safety.safe_files import AppendOnlyFile, write_atomically
+from tests import forked_commands
 
 ROOT = Path(__file__).parents[3]
 SERIES = ("timeseries.csv", "timeseries_5ms.csv")
@@ -35,8 +35,8 @@ def go(toy, folder, *options):
 
 
 def started(toy, folder, *options, **settings):
-    command = [sys.executable, "-m", "master", str(toy), "--no-build", "--quiet", "--no-report", "--out", str(folder)]
-    return subprocess.Popen([*command, *options], cwd=ROOT, stderr=subprocess.PIPE, text=True, **settings)
+    command = ["master", toy, "--no-build", "--quiet", "--no-report", "--out", folder, *options]
+    return forked_commands.start(*command, stderr=subprocess.PIPE, **settings)
 
 
 def kill(process, folder, more, delay):

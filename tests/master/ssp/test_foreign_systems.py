@@ -560,7 +560,7 @@ def test_a_run_without_a_pantograph_shows_its_outputs(scenario, tmp_path, capsys
     assert "<title>foreign: outputs of the run</title>" in page
     assert "pantograph-catenary" not in page
     assert "No contact-quality figures" not in page
-    assert (tmp_path / "out" / "outputs1.svg").is_file()
+    assert (tmp_path / "out" / "outputs1.png").is_file()
 
 
 # Single FMUs.

@@ -19,8 +19,6 @@ from master.report.charts.chart import Axis, Bars, Chart
 _FIGURES: Final = ("maximum", "minimum", "sigma", "uplift")
 _ACTIVE: Final = re.compile(r"(?:.*\.)?fault\[(\d+)\]\.active")
 _PLACE: Final = re.compile(r"dropper (\d+) of span (\d+)(?: of section (\d+))? at (-?[\d.]+) m")
-#: Most droppers whose names stand below the bars.
-_MOST_NAMES: Final = 40
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ def criticalities(view: SweepView, rows: Sequence[Row], others: Sequence[SweptCo
     figures = tuple(f for name in _FIGURES for f in view.figures if f.name == name) or view.figures[:4]
     made = []
     for circumstances, group in grouped(view, rows, others).items() if faults and figures else ():
-        by_fault = {_acting(row, faults): row for row in group}
+        by_fault = {acting_faults(row, faults): row for row in group}
         healthy = by_fault.get(())
         single = [p for p in faults if (p.title,) in by_fault]
         if healthy is None or not single:
@@ -79,9 +77,15 @@ def criticalities(view: SweepView, rows: Sequence[Row], others: Sequence[SweptCo
     return made
 
 
-def _acting(row: Row, faults: Sequence[SweptColumn]) -> tuple[str, ...]:
+def acting_faults(row: Row, faults: Sequence[SweptColumn]) -> tuple[str, ...]:
     """Return the titles of the faults that act in a row."""
     return tuple(p.title for p in faults if isinstance(v := row.get(p.title), float) and v > 0.5)
+
+
+def acting_names(view: SweepView, row: Row) -> str:
+    """Return the names of the droppers whose faults act in a row, or a word for none."""
+    faults = {p.title: p for p in fault_parameters(view)}
+    return "; ".join(_dropper(view, faults[t]).name for t in acting_faults(row, list(faults.values()))) or "none"
 
 
 def _dropper(view: SweepView, parameter: SweptColumn) -> Dropper:
@@ -99,7 +103,7 @@ def criticality_charts(found: Sequence[Criticality], key: str) -> list[Chart]:
     for k, figure in enumerate(drawn[0].figures if drawn else ()):
         bars = tuple(_bars(c, k, number) for number, c in enumerate(drawn))
         is_placed = not isinstance(bars[0].x, tuple)
-        axis = Axis("position of the dropper", "m") if is_placed else Axis("dropper", ticks=(), words=())
+        axis = Axis("position of the dropper", "m") if is_placed else Axis("dropper")
         change = Axis(f"change of {figure.name}", figure.unit)
         made.append(Chart(f"{key}_{k}", f"Change of {figure.name}", axis, change, bars, height=300))
     return made
@@ -113,8 +117,7 @@ def _bars(c: Criticality, k: int, number: int) -> Bars:
     name = c.circumstances or "change"
     positions = np.array([d.position for d in c.droppers])
     if np.isfinite(positions).all() and len(set(positions.tolist())) == len(positions):
-        width = 0.7 * float(np.diff(positions).min()) if len(positions) > 1 else 1.0
-        return Bars(name, positions, change, number, width, words)
+        return Bars(name, positions, change, number, None, words)
     return Bars(name, tuple(d.name for d in c.droppers), change, number, None, words)
 
 

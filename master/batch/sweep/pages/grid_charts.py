@@ -31,6 +31,7 @@ from master.report.charts.chart import (
     Envelope,
     Level,
     Part,
+    Points,
     Stroke,
     stroke,
 )
@@ -86,11 +87,21 @@ def curve_charts(view: SweepView, rows: Sequence[Row], parameters: Sequence[Swep
             parts += _curve(name, figure, [at_level(groups[group], first.title, v) for v in found], places, k)
         if not any(np.isfinite(p.y).any() for p in parts if isinstance(p, Curve)):
             continue
-        shown = np.concatenate([p.y for p in parts if isinstance(p, Curve)])
-        ordinate = Axis(figure.name, figure.unit, None if np.nanmax(np.abs(shown)) > 0.0 else (0.0, 1.0))
         parts += limit_parts(view, figure, [at_level(rows, first.title, v) for v in found], places)
+        ordinate = Axis(figure.name, figure.unit, shown_range(parts))
         made.append(Chart(f"{key}_{number}", figure.heading, axis, ordinate, tuple(parts), note, height=300))
     return made
+
+
+def shown_range(parts: Sequence[Part]) -> tuple[float, float]:
+    """Return the range of an ordinate in which all parts are seen, their limits and the words at them too."""
+    found = [np.array([p.at]) for p in parts if isinstance(p, Level)]
+    found += [p.y for p in parts if isinstance(p, Curve | Points)]
+    found += [v for p in parts if isinstance(p, Envelope) for v in (p.low, p.high)]
+    whole = np.concatenate(found)
+    low, high = float(np.nanmin(whole)), float(np.nanmax(whole))
+    margin = 0.1 * (high - low) or max(0.1 * abs(high), 1.0)
+    return (0.0, high + margin) if 0.0 <= low <= margin else (low - margin, high + margin)
 
 
 def _curve(name: str, figure: Figure, cells: Sequence[Sequence[Row]], places: FloatArray, index: int) -> list[Part]:

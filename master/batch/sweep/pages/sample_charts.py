@@ -91,10 +91,8 @@ def _histogram(view: SweepView, figure: Figure, groups: Groups, key: str) -> Cha
     parts: list[Part] = []
     for k, (name, each) in enumerate(values.items()):
         counts, _ = np.histogram(each, edges)
-        width = float(edges[1] - edges[0]) * (0.92 if len(values) == 1 else 0.92 / len(values))
-        parts.append(
-            Bars(name or figure.name, 0.5 * (edges[1:] + edges[:-1]), 100.0 * counts / len(each), k, width=width)
-        )
+        shares = 100.0 * counts / len(each)
+        parts.append(Bars(name or figure.name, 0.5 * (edges[1:] + edges[:-1]), shares, k))
     if len(values) == 1:
         parts += [Level(float(q), f"{100 * p:.0f} %", is_upright=True) for p, q in _quantiles(whole)]
     abscissa = Axis(figure.name, figure.unit)
@@ -147,10 +145,10 @@ def running_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart
     for f in (f for f in view.figures if f.name in _RUNNING):
         values = values_of(rows, f.title)
         values = values[np.isfinite(values)]
-        if len(values) > 2:
+        if len(values) > 2 and np.ptp(values) > 0.0:
             value, low, high = running_mean(values)
             spread = float(values.std(ddof=1))
-            limits = (float(values.mean()) - 3.0 * spread, float(values.mean()) + 3.0 * spread) if spread else None
+            limits = (float(values.mean()) - 3.0 * spread, float(values.mean()) + 3.0 * spread)
             title, axis = f"Mean of {f.name}", Axis(f"mean of {f.name}", f.unit, limits)
             made.append(
                 Chart(f"{key}_{f.name}", title, number, axis, _settling(title.lower(), value, low, high), height=280)

@@ -105,14 +105,9 @@ def chapters(view: SweepView) -> list[Chapter]:
         sensitivity_charts.index_chart(data, f"indices_{k}")
         for k, data in enumerate(view.indices[: sensitivity_charts.MOST_INDICES])
     )
-    return [
-        *found,
-        *(
-            [Chapter("indices", "Indices of sensitivity", (f"<p class='note'>{_DESIGN}</p>",), charts)]
-            if charts
-            else []
-        ),
-    ]
+    if charts:
+        found.append(Chapter("indices", "Indices of sensitivity", (f"<p class='note'>{_DESIGN}</p>",), charts))
+    return found
 
 
 def _chapters(view: SweepView, pantograph: str, number: int) -> Iterator[Chapter]:
@@ -123,10 +118,10 @@ def _chapters(view: SweepView, pantograph: str, number: int) -> Iterator[Chapter
     others = [*grid, *_grouping(view, listed)]
     if found := criticality.criticalities(view, rows, [*grid, *listed]):
         yield _faults(found, number)
+        rows = [row for row in rows if not criticality.acting_faults(row, faults)]  # the other charts mix no faults
     if len(grid) > 1 and (charts := grid_charts.map_charts(view, rows, others, f"map_{number}")):
-        yield Chapter(
-            "maps", f"Over {view.short_names[grid[0].title]} and {view.short_names[grid[1].title]}", (), tuple(charts)
-        )
+        names = [view.short_names[p.title] for p in grid]
+        yield Chapter("maps", f"Over {names[0]} and {names[1]}", (), tuple(charts))
     if grid or (len(listed) == 1 and not view.of_kind("sampled")):
         parameters = others if grid else listed
         if charts := grid_charts.curve_charts(view, rows, parameters, f"curve_{number}"):
@@ -148,7 +143,9 @@ def _faults(found: Sequence[criticality.Criticality], number: int) -> Chapter:
     figures = [f.title.removesuffix(" [1]") for f in found[0].figures]
     heads = [*(["parameters"] if len(found) > 1 else []), "fault", "position [m]", *figures]
     rows = criticality.ranking_rows(found)
-    text = (f"<p class='note'>{_FAULTS}</p>", html_markup.table(heads, rows[:MOST_ROWS], is_sortable=True))
+    leading = 2 if len(found) > 1 else 1
+    ranking = html_markup.table(heads, rows[:MOST_ROWS], leading=leading, is_sortable=True)
+    text = (f"<p class='note'>{_FAULTS}</p>", ranking)
     return Chapter(
         "faults", "Which fault matters", text, tuple(criticality.criticality_charts(found, f"fault_{number}"))
     )
@@ -171,10 +168,13 @@ def _samples(
     if shares:
         without = sum(not is_judged(row) for row in rows)
         told = f" {without} of {len(rows)} complete runs have no verdict." if without else ""
-        table = html_markup.table([*head, "limit", "samples that fail it", "share", "interval"], shares)
+        heads = [*head, "limit", "samples that fail it", "share", "interval"]
+        table = html_markup.table(heads, shares, leading=1 + len(head))
         text = (f"<p class='note'>{_SHARES}{told}</p>", table, *_more(groups))
         yield Chapter("shares", "How many samples fail a limit", text, tuple(running))
-    table = html_markup.table([*head, *sample_charts.FIGURE_HEADS], sample_charts.figure_rows(view, groups))
+    table = html_markup.table(
+        [*head, *sample_charts.FIGURE_HEADS], sample_charts.figure_rows(view, groups), leading=1 + len(head)
+    )
     text = (table, "<p class='note'>Mean with its 95 % interval (Student), of independent samples.</p>", *_more(groups))
     charts = sample_charts.distribution_charts(view, groups, f"distribution_{number}")
     yield Chapter("distributions", "Distribution of the figures", text, tuple(charts))
@@ -184,14 +184,12 @@ def _samples(
     found = {g: sensitivity_charts.effects_of(view, groups[g], sampled) for g in drawn}
     effects = [(g, f, e) for g, each in found.items() for f, e in each if e is not None]
     if effects:
-        heads = ["parameter", "figure", "change", "interval", "rank correlation"]
+        effect_heads = ["parameter", "figure", "change", "interval", "rank correlation"]
         tables = []
         for g in drawn:
             title = [f"<h3>{html_markup.text(g)}</h3>"] if g else []
-            tables += [
-                *title,
-                html_markup.table(heads, sensitivity_charts.effect_rows([(f, e) for o, f, e in effects if o == g])),
-            ]
+            own = sensitivity_charts.effect_rows([(f, e) for o, f, e in effects if o == g])
+            tables += [*title, html_markup.table(effect_heads, own, leading=2)]
         charts = [
             chart
             for k, (g, f, e) in enumerate(effects)
@@ -229,7 +227,10 @@ def _count(view: SweepView) -> str:
 
 def _parameter_rows(view: SweepView) -> Iterator[tuple[str, str]]:
     """Yield each parameter with its values or its distribution, then what else was asked for."""
-    for p in view.parameters:
+    faults = criticality.fault_parameters(view)
+    if faults:
+        yield "faults", f"{len(faults)}: {faults[0].name} to {faults[-1].name}" if len(faults) > 1 else faults[0].name
+    for p in (p for p in view.parameters if p not in faults):
         found = levels(view.rows, p.title)
         text = (
             ", ".join(map(level_text, found))
@@ -276,9 +277,10 @@ def _table(view: SweepView) -> list[str]:
     has_names = len(view.pantographs) > 1
     texts = [*(["variant"] if has_variants else []), *(["pantograph"] if has_names else [])]
     figures = view.figures[: grid_charts.MOST_CHARTS]
-    inputs = [p.title for p in view.parameters]
+    faults = criticality.fault_parameters(view)
+    inputs = [p.title for p in view.parameters if p not in faults]
     titles = [*map(view.short_title, inputs), *(f.title.removesuffix(" [1]") for f in figures)]
-    heads = ["run", *texts, *titles, "verdict"]
+    heads = ["run", *texts, *(["faults"] if faults else []), *titles, "verdict"]
     rows = []
     for row in view.rows[:MOST_ROWS]:
         number = row.get("run")
@@ -286,14 +288,16 @@ def _table(view: SweepView) -> list[str]:
         cells = (f.shown(v if isinstance(v, float) else np.nan) for f, v in zip(figures, values, strict=True))
         verdict = row.get("verdict") if row.get("status") == "complete" else f"run failed: {row.get('reason')}"
         given = (level_text(row.get(title)) for title in inputs)
-        named = (str(row.get(title) or "") for title in texts)
+        named = [str(row.get(title) or "") for title in texts] + (
+            [criticality.acting_names(view, row)] if faults else []
+        )
         rows.append([level_text(number), *named, *given, *cells, _short(str(verdict or ""))])
     more = len(view.rows) - len(rows)
     note = f" The first {len(rows)} of {len(view.rows)} rows; sweep.csv has all." if more else ""
     return [
         "<h2>All runs</h2>",
         f"<p class='note'>A click on a head sorts.{note}</p>",
-        html_markup.table(heads, rows, is_sortable=True),
+        html_markup.table(heads, rows, leading=1 + len(texts) + bool(faults), is_sortable=True),
     ]
 
 

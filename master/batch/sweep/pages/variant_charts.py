@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from master.batch.sweep.pages.grid_charts import MOST_CHARTS, limit_parts
+from master.batch.sweep.pages.grid_charts import MOST_CHARTS, limit_parts, shown_range
 from master.batch.sweep.pages.sweep_view import SweepView, level_text, values_of
 from master.batch.sweep.sweep_run import Row
 from master.report.charts.chart import COLOURS, Axis, Chart, Part, Points
@@ -31,7 +31,16 @@ def variant_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart
             size = 8.0 if len(rows) <= 100 else 4.0
             parts: list[Part] = [Points(f.name, numbers, values, "circle", COLOURS[0], size, words)]
             parts += limit_parts(view, f, [[row] for row in rows], numbers)
-            made.append(Chart(f"{key}_{number}", f.heading, axis, Axis(f.name, f.unit), tuple(parts), height=280))
+            made.append(
+                Chart(
+                    f"{key}_{number}",
+                    f.heading,
+                    axis,
+                    Axis(f.name, f.unit, shown_range(parts)),
+                    tuple(parts),
+                    height=280,
+                )
+            )
     return made
 
 

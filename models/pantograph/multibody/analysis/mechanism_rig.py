@@ -21,7 +21,8 @@ from models.pantograph.multibody.analysis.mechanism_freedom import (
     freedom_warning,
     name_motions,
 )
-from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium, settle_springs
+from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium
+from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 
@@ -97,8 +98,9 @@ class Rig:
     def __init__(self, definition: MechanismDefinition) -> None:
         self.definition = definition
         self.mechanism = Mechanism(definition)
-        self._start = settle_springs(self.mechanism)
-        self.base_height = definition.reference_height - self.mechanism.strip_height(self._start)
+        posture = take_posture(self.mechanism)
+        self._start = posture.reference
+        self.base_height = posture.base_height
 
     @property
     def freedom(self) -> int:
@@ -112,7 +114,7 @@ class Rig:
     @property
     def lift_unit(self) -> str:
         """Unit of the lifting value."""
-        return "N.m" if self.definition.lifts_by_moment else "N"
+        return self.definition.lift_unit
 
     def statics(self, heights: FloatArray, contact_force: float = 157.5) -> Statics:
         """Return the statics at strip heights above top of rail [m], going up and down from the reference height."""

@@ -26,6 +26,10 @@ _UPRIGHT: Final = 0.2
 _BALANCED: Final = 1e-11
 
 
+#: A condition: state -> value that must vanish.
+Condition = Callable[[FloatArray], float]
+
+
 @dataclass(frozen=True)
 class Equilibrium:
     """A mechanism at rest.
@@ -48,10 +52,6 @@ class Equilibrium:
     def lift(self) -> float:
         """Lifting force or moment [N or N.m]."""
         return self.inputs.lift
-
-
-#: A condition: state -> value that must vanish.
-Condition = Callable[[FloatArray], float]
 
 
 def equilibrium(
@@ -91,6 +91,28 @@ def equilibrium(
         y, lift = _solve(mechanism, y, inputs, 0.0, _kept(mechanism, y))
     else:
         y, lift = _approach(mechanism, y, inputs, 0.0, strip_height)
+    return Equilibrium(y, inputs(lift), mechanism.strip_height(y))
+
+
+def equilibrium_where(
+    mechanism: Mechanism, condition: Condition, start: FloatArray, *, contact_force: float = 0.0, lift: float = 0.0
+) -> Equilibrium:
+    """Find the lifting value that balances the mechanism where a condition on its configuration holds.
+
+    Parameters
+    ----------
+    condition : callable
+        Takes a state, returns what must vanish there.
+    start : ndarray, shape (13 n,)
+        A state nearby.
+    lift : float
+        The lifting value to begin with [N or N.m].
+    """
+
+    def inputs(value: float) -> Inputs:
+        return Inputs(lift=value, force=contact_force)
+
+    y, lift = _solve(mechanism, start, inputs, lift, condition)
     return Equilibrium(y, inputs(lift), mechanism.strip_height(y))
 
 

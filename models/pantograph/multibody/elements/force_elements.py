@@ -12,12 +12,13 @@ from typing import Final, NamedTuple, get_args
 import numpy as np
 
 from models.arrays import FloatArray
+from models.pantograph.multibody.elements.angle_elements import AngleStops, BodyAngle, Cam, PointDistance
 from models.pantograph.multibody.elements.moving_vectors import Handle, Kinematics, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross
 from models.pantograph.multibody.mechanism_definition import (
     ActuatorForce,
     ActuatorMoment,
-    AxisMoment,
+    AngleStop,
     BumpStop,
     Bushing,
     Force,
@@ -44,6 +45,7 @@ KNOWN: Final = (
     LiftingForce,
     ActuatorMoment,
     LiftingMoment,
+    AngleStop,
     Bushing,
     *get_args(JointFriction),
 )
@@ -84,16 +86,31 @@ class ForceElements:
         rubbing = [(f, by_name[f.joint]) for f in forces if isinstance(f, JointFriction)]
         slides = [(f, j) for f, j in rubbing if isinstance(j, Prismatic)]
         self.lines = LineElements([f for f in forces if isinstance(f, LineForce)], numbers, pool)
-        self._moments = _Moments([f for f in forces if isinstance(f, AxisMoment)], numbers, pool)
+        turning = [f for f in forces if isinstance(f, ActuatorMoment | LiftingMoment)]
+        self._moments = _Moments(turning, numbers, pool)
         self._slides = _Lines([_Line.of(j, j.axis_i, numbers) for _, j in slides], len(numbers), pool)
         self._friction = np.array([f.level for f, _ in slides])
         self._transition = np.array([f.transition for f, _ in slides])
+        self.stops = AngleStops([f for f in forces if isinstance(f, AngleStop)], numbers, orientations)
+        self.cam: Cam | None = None
+        self.lift_place = self._place_of_lift(forces, numbers, orientations)
         self._others: list[_Friction | _Bushing] = []
         for f in forces:
             if isinstance(f, JointFriction) and not isinstance(by_name[f.joint], Prismatic):
                 self._others.append(_Friction(f, by_name[f.joint], numbers))
             elif isinstance(f, Bushing):
                 self._others.append(_Bushing(f, numbers, orientations))
+
+    @staticmethod
+    def _place_of_lift(
+        forces: Sequence[Force], numbers: dict[str, int], orientations: FloatArray
+    ) -> BodyAngle | PointDistance | None:
+        lifting = next((f for f in forces if isinstance(f, LiftingForce | LiftingMoment)), None)
+        if lifting is None:
+            return None
+        if isinstance(lifting, LiftingMoment):
+            return BodyAngle(lifting, numbers, orientations)
+        return PointDistance(lifting, numbers)
 
     def compile(self, pool: VectorPool) -> None:
         """Work out where everything comes from."""
@@ -106,7 +123,9 @@ class ForceElements:
             if isinstance(element, _Bushing):
                 element.untwist(orientations)
 
-    def loads(self, kinematics: Kinematics, vectors: MovingVectors, w: FloatArray, lift: float) -> FloatArray:
+    def loads(
+        self, kinematics: Kinematics, vectors: MovingVectors, w: FloatArray, lift: float, *, lifted: bool = True
+    ) -> FloatArray:
         """Return the loads of all elements.
 
         Parameters
@@ -116,20 +135,31 @@ class ForceElements:
         w : ndarray, shape (n, 3)
             Body-fixed angular velocities [rad/s].
         lift : float
-            Value of the lifting element [N or N.m].
+            What is set of the lifting element [N, N.m or 1]; with a cam, what the cam makes of it acts.
+        lifted : bool
+            Whether the lifting element acts at all.
         """
-        total = self.lines.loads(vectors, lift)
+        value = self.lift_value(kinematics, lift) if lifted else 0.0
+        total = self.lines.loads(vectors, value)
         if self._moments.count:
-            total[:, 3:] += self._moments.moments(vectors, lift)
+            total[:, 3:] += self._moments.moments(vectors, value)
         if self._slides.count:
             speed = self._slides.lengths(vectors).rate
             total += self._slides.spread(self._friction * np.tanh(speed / self._transition), vectors)
+        if self.stops.stops:
+            self.stops.add_loads(total, kinematics.frames, w)
         for element in self._others:
             total += element.loads(kinematics, w)
         return total
 
+    def lift_value(self, kinematics: Kinematics, lift: float) -> float:
+        """Return the force or moment of the lifting element for what is set of it [N or N.m]."""
+        if self.cam is None or self.lift_place is None:
+            return lift
+        return self.cam.value(self.lift_place.at(kinematics), lift)
+
     def energy(self, vectors: MovingVectors) -> float:
-        """Return the potential energy of springs and bump stops [J]."""
+        """Return the potential energy of springs and bump stops [J]; that of angle stops is with ``stops``."""
         return self.lines.energy(vectors)
 
 
@@ -281,7 +311,9 @@ class _Stops:
 class _Moments:
     """Actuator moments: +M on body j and -M on body i about an axis of body i."""
 
-    def __init__(self, forces: Sequence[AxisMoment], numbers: dict[str, int], pool: VectorPool) -> None:
+    def __init__(
+        self, forces: Sequence[ActuatorMoment | LiftingMoment], numbers: dict[str, int], pool: VectorPool
+    ) -> None:
         self.count = len(forces)
         self._handles = [pool.vector(Vector(numbers[f.body_i], f.axis_i)) for f in forces]
         self._values = np.array([f.moment if isinstance(f, ActuatorMoment) else 0.0 for f in forces])

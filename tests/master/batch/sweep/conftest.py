@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from master.batch.sweep.sweep_plan import SweepRequest
 from master.batch.sweep.sweep_session import PreparedSweep, sweep
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
+from tests import forked_commands
 from tests.foreign_fmus import component, connector, ssd, system
 from tests.master.conftest import CATENARY, SSV, ssd_text
 
@@ -57,21 +57,10 @@ def command(toy, tmp_path):
     begun = []
 
     def start(*options, out="out", quiet=True):
-        words = [
-            sys.executable,
-            "-m",
-            "master",
-            "sweep",
-            str(toy),
-            *options,
-            "--out",
-            str(tmp_path / out),
-            "--no-build",
-        ]
-        words += ["--quiet"] if quiet else []
+        words = ["sweep", toy, *options, "--out", tmp_path / out, "--no-build", *(["--quiet"] if quiet else [])]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        begun.append(subprocess.Popen(words, cwd=tmp_path, env=environment, **pipes))
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        begun.append(forked_commands.start("master", *words, cwd=tmp_path, env=environment, crew="sweep", **pipes))
         return begun[-1]
 
     yield start

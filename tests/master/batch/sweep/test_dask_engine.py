@@ -5,14 +5,13 @@ import os
 import re
 import signal
 import socket
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 
 import pytest
 
 from master.errors import MasterError
+from tests import forked_commands
 from tests.master.batch.sweep.conftest import GRID, ROOT, ended, journal
 
 distributed = pytest.importorskip("distributed")
@@ -39,10 +38,9 @@ class Cluster:
         self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
 
     def _start(self, kind, *options):
-        code = f"from distributed.cli.dask_{kind} import main; main()"
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment, "cwd": self.folder}
-        return subprocess.Popen([sys.executable, "-c", code, *options], **quiet)
+        command = (f"distributed.cli.dask_{kind}", *options)
+        return forked_commands.start(*command, cwd=self.folder, env=environment, crew="sweep")
 
     def add_worker(self):
         options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--death-timeout", "60")

@@ -10,10 +10,11 @@ import pytest
 
 from master.batch.sweep.pages import grid_charts
 from master.batch.sweep.sweep_engines import HereEngine
-from master.batch.sweep.sweep_run import WORK
-from master.batch.sweep.sweep_session import write_report
+from master.batch.sweep.sweep_plan import SweepRequest
+from master.batch.sweep.sweep_session import PreparedSweep, sweep, write_report
 from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError
+from master.results.results_folder import WORK
 from tests.master.batch.sweep.conftest import GRID, ended, journal
 
 STIFFNESSES = {"over": {"catenary.stiffness": "4000,5000,6000"}}
@@ -125,6 +126,21 @@ def test_the_static_force_is_found_for_the_mean_force(swept):
     done = swept(over={"catenary.stiffness": "4000,8000"}, mean_force="150 N", tolerance=0.5)
     assert [row["mean [N]"] for row in done.rows] == pytest.approx([150.0, 150.0], abs=0.5)
     assert all(row["static force [N]"] != 140.0 for row in done.rows)
+
+
+def test_fmus_that_are_built_anew_meanwhile_change_no_run(toy, toy_system, swept, tmp_path):
+    swept("whole", **STIFFNESSES)
+    prepared = PreparedSweep.of(toy_system, SweepRequest.read(STIFFNESSES))
+
+    def build(progress):
+        for path in (toy / "resources").glob("*.fmu"):
+            path.write_bytes(b"half an FMU")
+
+    sweep(prepared, tmp_path / "out", show=build)
+    assert (tmp_path / "out" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()
+    assert not any((tmp_path / "out").glob(f"{WORK}*"))
+    with pytest.raises(MasterError, match="has been built anew just now; start the sweep again"):
+        sweep(prepared, tmp_path / "late")
 
 
 def test_equal_runs_are_made_once(swept, tmp_path):

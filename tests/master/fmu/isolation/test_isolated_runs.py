@@ -16,6 +16,7 @@ import pytest
 from master.commands.main import main
 from master.recording import checkpoint
 from master.results import run_results
+from tests import forked_commands
 
 ROOT = Path(__file__).parents[4]
 
@@ -84,8 +85,8 @@ def test_a_crash_leaves_what_was_computed(with_crasher, tmp_path, capsys, deed, 
 
 def test_output_of_an_fmu_is_not_the_masters(with_crasher, tmp_path):
     options = ["--set", "toy.deed=5", "--set", "toy.gain=0", "--stop", "0.02", "--isolate", "--json", "--no-report"]
-    command = [sys.executable, "-m", "master", str(with_crasher), "--no-build", "--out", str(tmp_path / "out")]
-    done = subprocess.run([*command, *options], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = forked_commands.run("master", with_crasher, "--no-build", "--out", tmp_path / "out", *options)
+    assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["status"] == "complete"
     assert "garbage" not in done.stderr
 

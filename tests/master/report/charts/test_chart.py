@@ -145,19 +145,18 @@ MAP = Cells(
 
 
 def test_a_map_has_its_values_in_their_cells_on_a_page_and_in_a_file():
-    (trace,) = interactive_figure(chart(MAP))["data"]
-    assert list(zip(trace["x"], trace["base"], trace["text"], strict=True)) == [
-        (0, -0.5, "1"),
-        (1, -0.5, "2"),
-        (1, 0.5, "4"),
-    ]
-    assert trace["marker"]["pattern"]["shape"] == ["", "/", ""]
+    whole, hatching = interactive_figure(chart(MAP))["data"]
+    cells = {(x, base + 0.5): k for k, (x, base) in enumerate(zip(whole["x"], whole["base"], strict=True))}
+    assert {place: whole["text"][k] for place, k in cells.items()} == {(0, 0): "1", (1, 0): "2", (1, 1): "4"}
+    assert (hatching["x"], hatching["base"]) == ([1], [-0.5])
+    assert hatching["marker"]["pattern"]["shape"] == "/"
     (axes,) = static_figure([chart(MAP)]).axes
     drawn = {t.get_position(): t.get_text() for t in axes.texts}
     assert drawn == {(0, 0): "1", (1, 0): "2", (1, 1): "4"}
     boxes = {(p.get_x() + 0.5, p.get_y() + 0.5): p for p in axes.patches}
     assert {place for place, p in boxes.items() if p.get_hatch()} == {(1.0, 0.0)}
-    assert [to_hex(p.get_facecolor()) for p in axes.patches] == trace["marker"]["color"]
+    colours = whole["marker"]["color"]
+    assert {place: to_hex(p.get_facecolor()) for place, p in boxes.items()} == {p: colours[k] for p, k in cells.items()}
 
 
 def test_what_is_written_in_a_cell_can_be_read():

@@ -1,9 +1,11 @@
 """Where a run along a line begins, is evaluated and ends."""
 
+from dataclasses import replace
+
 import pytest
 
 from master.errors import RequestError
-from master.scenario.project.stretch import Wire, stretch
+from master.scenario.project.stretch import Wire, contained, early, stretch
 
 WIRE = Wire("LN2", 100.0, 1300.0, tuple(range(100, 1301, 50)), 5.03, 5.08)
 
@@ -66,3 +68,22 @@ def test_what_cannot_be_is_refused_in_a_sentence(change, said):
         stretch(**given)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_the_interval_lies_about_an_overlap_that_has_room():
+    wire = replace(WIRE, overlaps=((850.0, 950.0),))
+    way = stretch(wire, 50.0, [], None)
+    assert way.interval == (650.0, 1150.0)  # ten spans, the overlap in the middle
+    assert contained(wire, way) == (850.0, 950.0)
+    late = replace(WIRE, overlaps=((1150.0, 1250.0),))
+    assert stretch(late, 50.0, [], None).interval == (750.0, 1250.0)
+    none = replace(WIRE, overlaps=((100.0, 150.0),))  # the start is there
+    assert stretch(none, 50.0, [], None).interval == stretch(WIRE, 50.0, [], None).interval
+    assert contained(none, stretch(none, 50.0, [], None)) is None
+
+
+def test_an_interval_in_the_motion_of_the_start_is_told():
+    way = stretch(WIRE, 50.0, [], (150.0, 600.0))
+    assert way.starts == (110.0,)
+    assert "begin at 170 m or later" in early(way, 50.0, 0.2)
+    assert early(stretch(WIRE, 50.0, [], (170.0, 600.0)), 50.0, 0.2) == ""

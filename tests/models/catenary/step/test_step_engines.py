@@ -6,14 +6,12 @@ from scipy.sparse.linalg import splu
 
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import StripMotion
-from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.interval_modes import slower_than
 from models.catenary.linear_motion.step_matrices import StepMatrices
+from models.catenary.step.compiled_line_step import CompiledLineStep
 from models.catenary.step.engine_choice import kernels, make_engine
-from models.catenary.step.numba_engine import NumbaEngine
-from models.catenary.step.numpy_engine import NumpyEngine, _by_blocks
-from models.catenary.step.step_engine import AppliedForce
-from models.coupled.monolithic import CoupledModel
+from models.catenary.step.linear_step import _by_blocks
+from models.catenary.step.plain_step import PlainStep
 from models.library.catalogue import load_line
 from models.numerics.kernel_cache import KernelError
 from models.numerics.newmark import Newmark
@@ -78,14 +76,6 @@ def test_a_change_of_the_step_size_keeps_the_energy_law(model):
     assert np.all(np.diff(energy) < 0.0)
 
 
-def _matrices(model, step=1e-3):
-    return StepMatrices(model.modes, Newmark(step))
-
-
-def _compliance(model, matrices):
-    return Compliance(matrices.factor, model.dropper_law.B, model.dropper_law.stiffness)
-
-
 def test_the_coupling_by_blocks_is_the_coupling(model):
     """Some intervals move with more than six ends; with intervals of two sizes there are no blocks of one size."""
     modes = model.modes
@@ -104,51 +94,24 @@ def compiled_kernels():
     return kernels()
 
 
-def _engines(model, compiled_kernels, step=1e-3):
-    matrices = _matrices(model, step)
-    return NumpyEngine(matrices), NumbaEngine(matrices, compiled_kernels)
-
-
-def test_compiled_steps_are_the_plain_ones(model, compiled_kernels):
-    """Two engines over one motion each, with forces on a point of an interval and on attachments in every step."""
-    engines = _engines(model, compiled_kernels)
-    rng = np.random.default_rng(2)
-    motions = []
-    for _ in engines:
-        state, _ = _moving(model, 6)
-        motions.append(state.motion)
-    interval = model.wires[0].intervals[12]
-    columns = _compliance(model, _matrices(model)).units(interval.ends)
-    responses = [engine.response(interval, columns) for engine in engines]
-    for _ in range(30):
-        pressed = 10.0 * rng.standard_normal(len(model.modes.attached))
-        force, known = 100.0 * rng.standard_normal(2)
-        for engine, response, motion in zip(engines, responses, motions, strict=True):
-            engine.begin(motion, pressed.copy(), [AppliedForce(response, interval.first + 1, 0.7, known)])
-            engine.apply(response.point(interval.first, 0.3), force)
-            engine.finish(motion)
-    for name in ("modal", "momentum", "attached"):
-        plain, compiled = (getattr(motion, name) for motion in motions)
-        for one, other in zip(np.atleast_2d(plain), np.atleast_2d(compiled), strict=True):
-            assert np.abs(other - one).max() < 1e-11 * np.abs(one).max(), name
-
-
 def test_a_step_that_was_prepared_is_forgotten_when_the_step_size_changes(model, compiled_kernels):
     """Back and forth between step sizes, against the plain engine."""
-    plain, compiled = zip(*(_engines(model, compiled_kernels, h) for h in (1e-3, 0.5e-3)), strict=True)
-    motions = [_moving(model, 7)[0].motion for _ in range(2)]
-    still = np.zeros(len(model.modes.attached))
+    engines = [
+        [kind(model._line, StepMatrices(model.modes, Newmark(h)), *more) for h in (1e-3, 0.5e-3)]
+        for kind, more in ((PlainStep, ()), (CompiledLineStep, (compiled_kernels,)))
+    ]
+    states = [_moving(model, 7)[0] for _ in engines]
     for n in range(20):
-        for engines, motion in zip((plain, compiled), motions, strict=True):
-            engines[n % 3 // 2].begin(motion, still)
-            engines[n % 3 // 2].finish(motion)
-    assert motions[1].modal[0] == pytest.approx(motions[0].modal[0], abs=1e-11 * np.abs(motions[0].modal[0]).max())
+        for of_kind, state in zip(engines, states, strict=True):
+            of_kind[n % 3 // 2].push(state, ())
+    plain, compiled = (state.motion.modal[0] for state in states)
+    assert compiled == pytest.approx(plain, abs=1e-11 * np.abs(plain).max())
 
 
 def test_a_compiled_step_goes_on_from_a_snapshot_bit_for_bit(model, compiled_kernels, monkeypatch):
     monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
     fresh = CatenaryModel(model.definition)
-    assert isinstance(fresh._step(1e-3).engine, NumbaEngine)
+    assert isinstance(fresh._engine(1e-3), CompiledLineStep)
     state, _ = _moving(fresh, 8)
     for _ in range(5):
         fresh.step(state, 1e-3, _far())
@@ -161,32 +124,18 @@ def test_a_compiled_step_goes_on_from_a_snapshot_bit_for_bit(model, compiled_ker
 
 
 def test_kernels_can_be_left_out_or_insisted_on(model, monkeypatch):
-    matrices = _matrices(model)
+    line, newmark = model._line, Newmark(1e-3)
     monkeypatch.setenv("OPENPANTO_KERNEL", "numpy")
-    assert type(make_engine(matrices)) is NumpyEngine
+    assert type(make_engine(line, newmark)) is PlainStep
     monkeypatch.setenv("OPENPANTO_KERNEL", "cuda")
     with pytest.raises(KernelError, match="'cuda'; use auto, numpy or numba"):
-        make_engine(matrices)
+        make_engine(line, newmark)
     monkeypatch.setattr("models.numerics.kernel_cache.importlib.util.find_spec", lambda _: None)
     monkeypatch.setenv("OPENPANTO_KERNEL", "numba")
     with pytest.raises(KernelError, match="numba is not installed"):
-        make_engine(matrices)
+        make_engine(line, newmark)
     monkeypatch.setenv("OPENPANTO_KERNEL", "auto")
-    assert type(make_engine(matrices)) is NumpyEngine
-
-
-def test_a_whole_run_is_the_same_with_and_without_kernels(short_line, cx, compiled_kernels, monkeypatch):
-    """Contact found, contact force, droppers, points of contact: a strip over many intervals."""
-    records = []
-    for kernel in ("numpy", "numba"):
-        monkeypatch.setenv("OPENPANTO_KERNEL", kernel)
-        pantograph = cx.with_values({"start_position": 60.0, "raise_duration": 0.05})
-        records.append(CoupledModel(CatenaryModel(short_line), [pantograph]).run(1.0, 1e-3))
-    plain, compiled = records
-    assert plain.contact_force.max() > 100.0
-    for name in ("contact_force", "uplift", "dropper_force", "contact_point", "strip_height"):
-        one, other = getattr(plain, name)[1:], getattr(compiled, name)[1:]
-        assert np.nanmax(np.abs(other - one)) < 1e-10 * np.nanmax(np.abs(one)), name
+    assert type(make_engine(line, newmark)) is PlainStep
 
 
 def test_a_constant_force_pushes_like_a_load_in_nodal_coordinates(model):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from master.batch.sweep.pages.criticality import criticalities, criticality_charts, ranking_rows
+from master.batch.sweep.pages.sweep_page import chapters, page
 from tests.master.batch.sweep.pages.conftest import failure, row, view
 
 FAULTS = [f"line.fault[{k}].active" for k in (1, 2, 3)]
@@ -77,3 +78,19 @@ def test_a_fault_whose_run_failed_is_not_drawn_as_harmless():
 @pytest.mark.parametrize("rows", [ROWS[1:], ROWS[:1], []], ids=["no healthy line", "no fault", "nothing"])
 def test_without_a_comparison_there_is_none(rows):
     assert faults(rows) == []
+
+
+def test_the_page_shows_what_acts_and_mixes_no_faults_into_its_other_charts():
+    rows = [
+        row(10 * i + r["run"], {**{f: r[f] for f in FAULTS}, "speed [km/h]": v}, maximum=r["maximum [N]"] + v)
+        for i, v in enumerate((200.0, 300.0))
+        for r in ROWS
+    ]
+    whole = view(rows, {**dict.fromkeys(FAULTS, ""), "speed [km/h]": ""}, over=("speed",), setting={"places": PLACES})
+    faults, curves = chapters(whole)
+    assert [b.name for b in faults.charts[0].parts] == ["speed 200 km/h", "speed 300 km/h"]
+    maximum = next(c for c in curves.charts if c.title == "Maximum")
+    assert [p.y.tolist() for p in maximum.parts] == [[400.0, 500.0]]
+    html = page(whole)
+    assert "<td>span 14, dropper 3; span 14, dropper 1</td>" in html
+    assert "3: line.fault[1].active to line.fault[3].active" in html

@@ -102,3 +102,12 @@ def test_a_map_of_many_values_thins_its_labels_and_a_cell_without_a_run_is_empty
 def test_evenly_keeps_the_ends():
     assert evenly([1, 2, 3], 5) == [1, 2, 3]
     assert evenly(list(range(11)), 3) == [0, 5, 10]
+
+
+def test_limits_are_seen_with_their_words(grid):
+    for chart in curves(grid):
+        low, high = chart.y.limits
+        levels = [p.at for p in chart.parts if isinstance(p, Level)]
+        points = np.concatenate([p.y for p in chart.parts if isinstance(p, Curve)])
+        assert low <= np.nanmin(points)
+        assert high > max([*levels, np.nanmax(points)])

@@ -17,6 +17,7 @@ intervals. It is added between the two products, where it costs next to nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,27 +25,42 @@ import scipy.sparse as sp
 from models.arrays import FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.crossing import Crossing
-from models.catenary.contact_and_slack.wire_response import (
-    IntervalResponse,
-    Met,
-    ResponseOf,
-    WirePoint,
-    interval_response,
-    walk,
-)
-from models.catenary.linear_motion.compliance import Columns
+from models.catenary.contact_and_slack.wire_response import IntervalResponse, Met, ResponseOf, WirePoint, walk
 from models.catenary.linear_motion.interval_modes import IntervalModes
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.sparse_products import BlockProduct, Multiplier, Product, TransposedProduct
 from models.catenary.linear_motion.step_matrices import StepMatrices
-from models.catenary.step.step_engine import AppliedForce
 
 #: Ends of an interval that its modes in one plane move with.
 _ENDS_IN_PLANE = 6
 
 
-class NumpyEngine:
-    """Steps of one size by NumPy and SciPy; see `StepEngine`.
+class AppliedForce(NamedTuple):
+    """A force on a contact wire that is known before a step.
+
+    Attributes
+    ----------
+    response : IntervalResponse
+        Of the interval that it acts on.
+    element : int
+        Of the wire.
+    xi : float
+        Share of the way along the element.
+    force : float
+        Positive up [N].
+    """
+
+    response: IntervalResponse
+    element: int
+    xi: float
+    force: float
+
+
+class LinearStep:
+    """What is linear in steps of one size, in the parts that contacts and slack come between.
+
+    The order of calls: `begin`; `meet` for every strip; `apply` and changes of ``attached`` for what acts inside the
+    step and is not known before it; `finish`; `place`.
 
     Parameters
     ----------
@@ -75,12 +91,19 @@ class NumpyEngine:
         #: Motion of intervals at the end of this step, forces found inside it left out.
         self._free: dict[WireInterval, FloatArray] = {}
 
-    def response(self, interval: WireInterval, columns: Columns) -> IntervalResponse:
-        """Return how a wire gives way about an interval; see `StepEngine`."""
-        return interval_response(self._matrices, interval, columns)
-
     def begin(self, motion: LineMotion, pressed: FloatArray, applied: Sequence[AppliedForce] = ()) -> None:
-        """Find the changes of this step without what is found inside it; see `StepEngine`."""
+        """Find the changes of this step without what is found inside it.
+
+        Parameters
+        ----------
+        motion : LineMotion
+            At the beginning of the step.
+        pressed : ndarray, shape (n_attached,)
+            Known forces on the attachments, beginning plus end of the step [N]; what those on the wires do to the
+            attachments at their ends is added.
+        applied : sequence of AppliedForce
+            Forces on the contact wires, at the beginning of the step.
+        """
         self._free.clear()
         points = []
         for response, element, xi, force in applied:
@@ -110,7 +133,17 @@ class NumpyEngine:
     def meet(
         self, wire: ContactWire, response_of: ResponseOf, strip: FloatArray, guess: int, motion: LineMotion
     ) -> Met | None:
-        """Return where a strip crosses a wire at the end of the step; see `StepEngine`."""
+        """Return where a strip crosses a wire at the end of the step, forces found inside the step left out.
+
+        Parameters
+        ----------
+        strip : ndarray, shape (2, 2, 3)
+            Ends A and B; position and velocity.
+        guess : int
+            Element of the wire, to begin with.
+        motion : LineMotion
+            At the beginning of the step.
+        """
 
         def motion_of(interval: WireInterval) -> FloatArray:
             found = self._free.get(interval)
@@ -123,13 +156,13 @@ class NumpyEngine:
         return walk(wire, response_of, motion_of, strip, guess)
 
     def apply(self, point: WirePoint, force: float) -> None:
-        """Add what a force on a point of a wire changes in this step; see `StepEngine`."""
+        """Add what a force on a point of a wire changes in this step; ``force`` is that at its end [N], positive up."""
         self._press(point, force)
         columns = point.response.columns
         self.attached[columns.rows] += columns.values @ (force * point.load)
 
     def finish(self, motion: LineMotion) -> None:
-        """Let the intervals follow their attachments, and replace the motion; see `StepEngine`."""
+        """Let the intervals follow their attachments, and replace the motion by that at the end of the step."""
         a1, modal, following, work = self._matrices.newmark.a1, self._modal, self._following, self._work
         self._ends[...] = 0.0
         self._out[1].add(self.attached, self._ends)
@@ -150,7 +183,7 @@ class NumpyEngine:
         np.subtract(self.attached, velocity, out=velocity)
 
     def place(self, crossing: Crossing, point: WirePoint, motion: LineMotion, place: FloatArray) -> None:
-        """Put the place of a point of a wire into ``place``; see `StepEngine`."""
+        """Put the place of a point of a wire into ``place``, shape (3,) [m]."""
         interval = point.response.interval
         local = np.concatenate((motion.modal[0, interval.modes], motion.attached[0].take(interval.ends)))
         place[:] = *interval.at(crossing, local), point.height + point.row.dot(local)

@@ -1,0 +1,300 @@
+"""Where strips cross the contact wires, for numba, and how the wires give way there.
+
+The same as `models.catenary.contact_and_slack.contact_wire` and `wire_response` say, with records of intervals in place
+of objects.
+"""
+
+import math
+from collections import namedtuple
+
+from models.catenary.step.mode_kernels import AMPLITUDE, HELD, INVERSE, RATE
+from models.catenary.step.vector_kernels import LANES, part
+
+#: What `find` returns where a strip crosses no wire; a number below says which interval's record is lacking.
+NOWHERE = -1
+#: The contact wires, one after the other: ``first`` element of each, and one more; ``starts`` of the elements along
+#: the track, one more for each wire; ``period``; the ``interval`` of each element, counted over all wires; the element
+#: of its wire that each interval ``begins`` with.
+Wires = namedtuple("Wires", "first starts period interval begins")
+#: What is known of intervals and droppers: ``data``, record after record; ``whole``, the same memory as whole numbers;
+#: where in it the record of each of the ``intervals`` and ``droppers`` begins, below 0 if it is not there.
+Records = namedtuple("Records", "data whole intervals droppers")
+#: An interval's record: ``modes``, ``size`` (displacements of attachments), ``elements``, ``reach`` (displacements
+#: that loads at its attachments reach, from ``first`` on) and ``stretched`` (droppers); then where in the data its
+#: parts begin: ``slots``, where the amplitudes of its modes are in the table; ``ends``, the places of its attachments'
+#: displacements; ``droppers``, those that they stretch; ``plan`` to ``height_static`` of the `WireInterval`;
+#: ``yielding``, ``at_ends``, ``columns`` (by displacements of its attachments) and their ``dropper_force`` of the
+#: `IntervalResponse`. Offsets take the compiler far less time than arrays made of them.
+Interval = namedtuple(
+    "Interval",
+    "modes size elements reach first stretched slots ends droppers "
+    "plan plan_static height height_static yielding at_ends columns stretch",
+)
+#: A dropper's record: the same for a force in it.
+Dropper = namedtuple("Dropper", "reach first stretched droppers column stretch")
+#: Points of wires, and the strips above them, before any force: see `WirePoint` and `ContactCandidate`; ``record`` says
+#: where the interval's record is, ``place`` which element of the interval it is on.
+Points = namedtuple(
+    "Points",
+    "pantograph section element record place xi engagement height compliance penetration velocity impact row load",
+)
+#: A strip farther than this from the ends of a wire does not meet it [m]; a guess farther off is replaced by a search.
+_FAR, _FAR_OFF = 1.0, 5.0
+#: Widths over which a contact sets in [m], see `models.catenary.contact_and_slack.crossing`.
+_STRIP_EDGE, _WIRE_EDGE = 0.05, 1.0
+#: From the place of a mode's amplitude in the table to others of the same mode.
+_TO_RATE, _TO_HELD, _TO_INVERSE = (LANES * (row - AMPLITUDE) for row in (RATE, HELD, INVERSE))
+
+
+@part
+def interval_at(whole, at):
+    """Return the record of an interval that begins at ``at``: six whole numbers, then part after part."""
+    n, e, k, r, first, d = whole[at], whole[at + 1], whole[at + 2], whole[at + 3], whole[at + 4], whole[at + 5]
+    m, slots = n + e, at + 6
+    ends = slots + n
+    droppers = ends + e
+    plan = droppers + d
+    plan_static = plan + 2 * (k + 1) * m
+    height = plan_static + 2 * (k + 1)
+    height_static = height + 4 * k * m
+    yielding = height_static + 4 * k
+    at_ends = yielding + n * e
+    columns = at_ends + e * e
+    return Interval(
+        n, e, k, r, first, d, slots, ends, droppers, plan, plan_static, height, height_static, yielding, at_ends,
+        columns, columns + r * e,
+    )  # fmt: skip
+
+
+@part
+def dropper_at(whole, at):
+    """Return the record of a dropper that begins at ``at``."""
+    r, first, d = whole[at], whole[at + 1], whole[at + 2]
+    return Dropper(r, first, d, at + 3, at + 3 + d, at + 3 + d + r)
+
+
+@part
+def reached(first, count, place, size):
+    """Return which of ``count`` rows from ``first`` on, round the end, a displacement is; -1 if none."""
+    offset = place - first
+    if offset < 0:
+        offset += size
+    return offset if offset < count else -1
+
+
+@part
+def find(wires, records, section, strip, guess, motion, local, place):
+    """Return the element of a wire that a strip crosses at the end of a step, walking from ``guess``.
+
+    Parameters
+    ----------
+    strip : ndarray, shape (2, 2, 3)
+        Ends A and B; position and velocity.
+    motion : (float, ndarray, ndarray, ndarray)
+        a1, table, change and motion of the attachments; see `models.catenary.step.step_kernels.step`.
+    local : ndarray, shape (2, m)
+        Local coordinates of its interval at the end of the step and their rates, forces found inside it left out.
+    place : ndarray, shape (3,)
+        Shares of the way along the element and along the strip; how much of the contact acts.
+    """
+    first = wires.first[section]
+    starts, period = wires.starts[first + section : wires.first[section + 1] + section + 1], wires.period[section]
+    last, nearest, farthest = starts.size - 2, min(strip[0, 0, 0], strip[1, 0, 0]), max(strip[0, 0, 0], strip[1, 0, 0])
+    if not (period > 0.0 or (farthest > starts[0] - _FAR and nearest < starts[-1] + _FAR)):
+        return NOWHERE
+    middle = (strip[0, 0, 0] + strip[1, 0, 0]) / 2.0
+    shift = math.floor((middle - starts[0]) / period) * period if period > 0.0 else 0.0
+    if not abs(middle - shift) < math.inf:
+        return NOWHERE
+    element = _first_element(starts, guess, middle - shift)
+    number, direction, has_turned = -1, 0, False
+    while True:
+        if wires.interval[first + element] != number:
+            number = wires.interval[first + element]
+            record = records.intervals[number]
+            if record < 0:
+                return NOWHERE - 1 - number
+            follow_ends(records, record, motion, local)
+        share, xi = _crossing(strip, shift, records, record, element - wires.begins[number], local)
+        if share == math.inf:
+            return NOWHERE
+        step = -1 if xi < 0.0 else (1 if xi > 1.0 else 0)
+        if step in (0, -direction):
+            break
+        direction = step
+        element += step
+        if not 0 <= element <= last:
+            if period == 0.0 or has_turned:  # a strip along the track may cross nowhere near
+                return NOWHERE
+            has_turned = True
+            element -= step * (last + 1)
+            shift += step * period
+    if not 0.0 <= share <= 1.0:
+        return NOWHERE
+    xi = min(max(xi, 0.0), 1.0)
+    x = starts[element] + xi * (starts[element + 1] - starts[element])
+    from_wire_end = math.inf if period > 0.0 else min(x - starts[0], starts[-1] - x)
+    length = math.hypot(strip[1, 0, 0] - strip[0, 0, 0], strip[1, 0, 1] - strip[0, 0, 1])
+    from_strip_end = min(share, 1.0 - share) * length
+    place[0], place[1] = xi, share
+    place[2] = min(1.0, from_strip_end / _STRIP_EDGE) * min(1.0, from_wire_end / _WIRE_EDGE)
+    return element
+
+
+@part
+def _first_element(starts, guess, x):
+    """Return the element to begin walking with."""
+    last = starts.size - 2
+    if 0 <= guess <= last and abs(starts[guess] - x) < _FAR_OFF:
+        return guess
+    low, high = 0, last
+    while low < high:  # the last that begins before x
+        middle = (low + high + 1) // 2
+        if starts[middle] < x:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@part
+def _crossing(strip, shift, records, record, element, local):
+    """Return where strip and element cross, shares of the way along the strip and along it; infinity if parallel."""
+    interval, data = interval_at(records.whole, record), records.data
+    size = interval.modes + interval.size
+    static, plan = interval.plan_static + 2 * element, interval.plan + 2 * element * size
+    x, y, x2, y2 = data[static], data[static + 1], data[static + 2], data[static + 3]
+    for m in range(size):
+        x += data[plan + m] * local[0, m]
+        y += data[plan + size + m] * local[0, m]
+        x2 += data[plan + 2 * size + m] * local[0, m]
+        y2 += data[plan + 3 * size + m] * local[0, m]
+    strip_x, strip_y = strip[1, 0, 0] - strip[0, 0, 0], strip[1, 0, 1] - strip[0, 0, 1]
+    wire_x, wire_y = x2 - x, y2 - y
+    determinant = strip_y * wire_x - strip_x * wire_y
+    if determinant == 0.0:
+        return math.inf, 0.0
+    dx, dy = x - (strip[0, 0, 0] - shift), y - strip[0, 0, 1]
+    return (dy * wire_x - dx * wire_y) / determinant, (strip_x * dy - strip_y * dx) / determinant
+
+
+@part
+def follow_ends(records, record, motion, local):
+    """Put the local coordinates of an interval at the end of a step and their rates into ``local``; see `find`."""
+    interval, data, whole = interval_at(records.whole, record), records.data, records.whole
+    a1, table, change, attached = motion
+    count, size = interval.modes, interval.size
+    for j in range(size):
+        end = whole[interval.ends + j]
+        local[0, count + j] = change[end]
+        local[1, count + j] = a1 * change[end] - attached[1, end]
+    for i in range(count):
+        at, yielding = whole[interval.slots + i], interval.yielding + i * size
+        moved = table[at + _TO_HELD]
+        for j in range(size):
+            moved -= data[yielding + j] * local[0, count + j]
+        local[0, i] = table[at] + moved
+        local[1, i] = a1 * moved - table[at + _TO_RATE]
+    for j in range(size):
+        local[0, count + j] += attached[0, whole[interval.ends + j]]
+
+
+@part
+def point(records, record, element, xi, table, row, load):
+    """Return the static height of a point of an interval and its compliance.
+
+    Parameters
+    ----------
+    element : int
+        Of the interval.
+    row, load : ndarray, shape (m,), (e,)
+        Result: what a unit force on the point does to the local coordinates; to the displacements of the attachments,
+        directly and through the modes.
+    """
+    interval, data = interval_at(records.whole, record), records.data
+    count, size = interval.modes, interval.size
+    m = count + size
+    xi2 = xi * xi
+    xi3 = xi2 * xi
+    at, height = interval.height_static + 4 * element, interval.height + 4 * element * m
+    static = data[at] + xi * data[at + 1] + xi2 * data[at + 2] + xi3 * data[at + 3]
+    for i in range(m):
+        row[i] = data[height + i] + xi * data[height + m + i]
+        row[i] += xi2 * data[height + 2 * m + i] + xi3 * data[height + 3 * m + i]
+    compliance = 0.0
+    for j in range(size):
+        load[j] = row[count + j]
+    for i in range(count):
+        compliance += row[i] * row[i] * table[records.whole[interval.slots + i] + _TO_INVERSE]
+        for j in range(size):
+            load[j] -= row[i] * data[interval.yielding + i * size + j]
+    for j in range(size):
+        for k in range(size):
+            compliance += load[j] * data[interval.at_ends + j * size + k] * load[k]
+    return static, compliance
+
+
+@part
+def press(records, record, row, force, table):
+    """Add a force on a point of an interval, its attachments held, to the changes of the interval's modes."""
+    interval = interval_at(records.whole, record)
+    for i in range(interval.modes):
+        at = records.whole[interval.slots + i]
+        table[at + _TO_HELD] += force * row[i] * table[at + _TO_INVERSE]
+
+
+@part
+def bend(records, record, load, force, change):
+    """Add what a force on a point changes at the attachments in a step; ``load`` is that of the point."""
+    interval = interval_at(records.whole, record)
+    for j in range(interval.size):
+        if load[j] != 0.0:
+            column = interval.columns + j * interval.reach
+            add_column(records.data, column, interval.first, interval.reach, force * load[j], change)
+
+
+@part
+def add_column(data, column, first, count, force, change):
+    """Add ``count`` values from ``data[column]``, times a force, to displacements from ``first`` on, round the end."""
+    here = min(count, change.size - first)
+    for i in range(here):
+        change[first + i] += force * data[column + i]
+    for i in range(here, count):
+        change[i - here] += force * data[column + i]
+
+
+@part
+def moved_by(records, points, i, j, size, table):
+    """Return how far the wire is moved at one point by a unit force at another [m/N]; see `WirePoint.moved_by`."""
+    if i == j:
+        return points.compliance[i]
+    data, whole = records.data, records.whole
+    here, there = interval_at(whole, points.record[i]), interval_at(whole, points.record[j])
+    moved = 0.0
+    for k in range(here.size):
+        row = reached(there.first, there.reach, whole[here.ends + k], size)
+        if row >= 0:
+            for m in range(there.size):
+                moved += points.load[i, k] * data[there.columns + m * there.reach + row] * points.load[j, m]
+    if points.record[i] == points.record[j]:
+        for k in range(here.modes):
+            moved += points.row[i, k] * points.row[j, k] * table[whole[here.slots + k] + _TO_INVERSE]
+    return moved
+
+
+@part
+def put_place(records, points, i, table, attached, out):
+    """Put a point of a wire into ``out``, shape (3,) [m], as the motion stands."""
+    interval, data, whole = interval_at(records.whole, points.record[i]), records.data, records.whole
+    size, xi = interval.modes + interval.size, points.xi[i]
+    static, plan = interval.plan_static + 2 * points.place[i], interval.plan + 2 * points.place[i] * size
+    x, y, z = data[static], data[static + 1], points.height[i]
+    x += xi * (data[static + 2] - x)
+    y += xi * (data[static + 3] - y)
+    for m in range(size):
+        at = whole[interval.slots + m]  # the ends follow the slots
+        value = table[at] if m < interval.modes else attached[0, at]
+        x += ((1.0 - xi) * data[plan + m] + xi * data[plan + 2 * size + m]) * value
+        y += ((1.0 - xi) * data[plan + size + m] + xi * data[plan + 3 * size + m]) * value
+        z += points.row[i, m] * value
+    out[0], out[1], out[2] = x, y, z

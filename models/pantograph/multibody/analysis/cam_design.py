@@ -1,0 +1,164 @@
+"""The cam of a lifting element: as a table says, or found so that the strip presses alike at every height.
+
+Without friction, what the lifting element must give at a place theta is M_0(theta) for the weights and springs alone
+and F M_1(theta) for a force F on the strip, M_1 being the strip's rise per theta up to the head's tilt.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.numerics.cubic_curve import CubicCurve
+from models.pantograph.multibody.analysis.mechanism_statics import Equilibrium, equilibrium_where, settle_springs
+from models.pantograph.multibody.elements.angle_elements import BodyAngle, Cam, PointDistance
+from models.pantograph.multibody.mechanism import Mechanism, MechanismError
+from models.pantograph.multibody.mechanism_definition import AngleStop, CamTable, LiftingMoment
+
+#: Points of a cam that is found, over the working range.
+_POINTS: Final = 41
+#: Step on the way to the ends of a working range that no stop gives: of angles [rad], of lengths [m].
+_STEP: Final = {True: np.radians(1.0), False: 0.005}
+#: Rise of the strip per angle below which the arms are at a dead centre [m/rad]; per length [1].
+_DEAD: Final = 0.05
+#: Force for which M_1 is found if none is set [N].
+_USUAL_FORCE: Final = 100.0
+
+
+def stand(mechanism: Mechanism) -> FloatArray:
+    """Settle the springs and fit the cam of a pantograph; return its working configuration at rest, shape (13 n,).
+
+    Raises
+    ------
+    MechanismError
+        If there is no equilibrium that counts, or the cam has no range to work over.
+    """
+    standing = settle_springs(mechanism)
+    definition = mechanism.definition
+    given = getattr(definition.lifting, "cam", None)
+    if isinstance(given, CamTable):
+        mechanism.forces.cam = _from_table(mechanism, standing, given)
+    elif definition.holds_force:
+        mechanism.forces.cam = _constant_force(mechanism, standing)
+    return standing
+
+
+def working_range(mechanism: Mechanism, standing: FloatArray) -> tuple[float, float]:
+    """Return the lowest and the highest place of the lifting element [rad or m].
+
+    Between the stops of the same bodies about the same axis; where none is, as far as the statics go before a dead
+    centre.
+    """
+    lowest, highest = _stops(mechanism)
+    if lowest is None:
+        lowest, _ = reach(mechanism, standing, -1.0)
+    if highest is None:
+        highest, _ = reach(mechanism, standing, 1.0)
+    if not lowest < highest:
+        raise MechanismError(f"{mechanism.definition.name}: the lifting element has no range to work over")
+    return lowest, highest
+
+
+def _from_table(mechanism: Mechanism, standing: FloatArray, given: CamTable) -> Cam:
+    places, values = (np.array(column) for column in given.columns)
+    table = CubicCurve(places, values)
+    definition = mechanism.definition
+    if getattr(definition, definition.lift_parameter) is None:
+        return Cam(None, table)
+    written = (
+        0.0 if isinstance(definition.lifting, LiftingMoment) else _place(mechanism).at(mechanism.kinematics(standing))
+    )
+    unit = table.at(written)
+    if abs(unit) <= 1e-9 * np.abs(values).max():
+        raise MechanismError(
+            f"{definition.name}: the cam of '{_name(mechanism)}' gives nothing as written, so that "
+            f"{definition.lift_parameter} cannot scale it; leave that out"
+        )
+    return Cam(None, CubicCurve(places, values / unit))
+
+
+def _constant_force(mechanism: Mechanism, standing: FloatArray) -> Cam:
+    places = np.linspace(*working_range(mechanism, standing), _POINTS)
+    force = abs(mechanism.definition.lift) or _USUAL_FORCE
+    own = _lifts(mechanism, standing, places, 0.0)
+    loaded = _lifts(mechanism, standing, places, force)
+    return Cam(CubicCurve(places, own), CubicCurve(places, (loaded - own) / force))
+
+
+def _lifts(mechanism: Mechanism, standing: FloatArray, places: FloatArray, force: float) -> FloatArray:
+    """Return the lifting values that hold the mechanism at rising places, each found from its neighbour."""
+    middle = int(np.argmin(np.abs(places - _now(mechanism, standing))))
+    values = np.empty(len(places))
+    for order in (range(middle, len(places)), range(middle - 1, -1, -1)):
+        y, lift = standing, 0.0
+        for k in order:
+            found = _held(mechanism, float(places[k]), y, force, lift)
+            y, lift, values[k] = found.y, found.lift, found.lift
+    return values
+
+
+def _held(mechanism: Mechanism, place: float, start: FloatArray, force: float, lift: float) -> Equilibrium:
+    where = _place(mechanism)
+    return equilibrium_where(
+        mechanism, lambda y: where.at(mechanism.kinematics(y)) - place, start, contact_force=force, lift=lift
+    )
+
+
+def reach(mechanism: Mechanism, standing: FloatArray, way: float) -> tuple[float, float]:
+    """Return the last place on a way, -1 or 1, in which statics have an answer before a dead centre.
+
+    Returns
+    -------
+    place, height : float
+        Of the lifting element [rad or m], of the strip's middle above the base [m].
+    """
+    step = way * _STEP[isinstance(mechanism.definition.lifting, LiftingMoment)]
+    smallest = abs(step) / 128.0
+    y, place, height = standing, _now(mechanism, standing), mechanism.strip_height(standing)
+    direction = 0.0
+    while abs(step) >= smallest:
+        try:
+            found = _held(mechanism, place + step, y, 0.0, 0.0)
+        except (MechanismError, np.linalg.LinAlgError):
+            step *= 0.5
+            continue
+        slope = (found.strip_height - height) / step
+        direction = direction or float(np.sign(slope))
+        if slope * direction < _DEAD:
+            step *= 0.5
+            continue
+        y, place, height = found.y, place + step, found.strip_height
+    return place, height
+
+
+def _stops(mechanism: Mechanism) -> tuple[float | None, float | None]:
+    lifting = mechanism.definition.lifting
+    lowest: float | None = None
+    highest: float | None = None
+    if not isinstance(lifting, LiftingMoment):
+        return lowest, highest
+    pair = (lifting.body_i, lifting.body_j)
+    for stop in mechanism.definition.forces:
+        if not isinstance(stop, AngleStop) or (stop.body_i, stop.body_j) != pair:
+            continue
+        if np.dot(stop.axis_i, lifting.axis_i) > 1.0 - 1e-9:
+            lowest = stop.lowest if lowest is None else lowest
+            highest = stop.highest if highest is None else highest
+    return lowest, highest
+
+
+def _place(mechanism: Mechanism) -> BodyAngle | PointDistance:
+    place = mechanism.forces.lift_place
+    assert place is not None
+    return place
+
+
+def _now(mechanism: Mechanism, y: FloatArray) -> float:
+    return _place(mechanism).at(mechanism.kinematics(y))
+
+
+def _name(mechanism: Mechanism) -> str:
+    lifting = mechanism.definition.lifting
+    return "" if lifting is None else lifting.name

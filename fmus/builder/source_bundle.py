@@ -17,7 +17,7 @@ from pathlib import Path
 #: What a machine that runs an FMU must have besides Python itself.
 REQUIREMENTS = ("numpy", "scipy")
 #: What makes an FMU faster where it is installed.
-OPTIONAL = ("numba",)
+OPTIONAL = ("numba", "llvmlite")  # which comes with numba
 _DYNAMIC_IMPORTS = {"import_module", "__import__"}
 
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 #: What a machine that runs an FMU must have besides Python itself.
 REQUIREMENTS = ("numpy", "scipy")
-#: What makes an FMU faster where it is installed.
-OPTIONAL = ("numba",)
+#: What makes an FMU faster where it is installed; llvmlite comes with numba.
+OPTIONAL = ("numba", "llvmlite")
 _DYNAMIC_IMPORTS = {"import_module", "__import__"}
 
 

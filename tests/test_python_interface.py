@@ -28,7 +28,7 @@ NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 USER_SCRIPT = """
 from pathlib import Path
 
-from master import MasterError, Results, Scenario, calibrate, compare, open_scenario, read_results, run, sweep
+from master import MasterError, Results, Scenario, calibrate, compare, open_scenario, optimise, read_results, run, sweep
 from models import Line, couple, open_line, open_pantograph, statics
 
 
@@ -48,6 +48,8 @@ else:
     print(compare(results, read_results("other")), calibrate(scenario, mean=150.0).value + 1.0)
 table = sweep(scenario, over={"speed": "280:300:20", "catenary.contact_wire.tension": ["20 kN"]}, jobs=2).table
 print(table.head())
+found = optimise(scenario, minimise="sigma", vary={"static_force": "100:200 N"}, subject_to=["maximum<=350 N"])
+print(found.best["static_force [N]"] + 1.0, found.at_bounds, found.table.head(), sweep(scenario).sensitivity.head())
 line: Line = open_line("LN2").set({"contact_wire.tension": 22e3})
 print(statics(line, span=3).elasticity.maximum + 1.0, line.spans[0].length + 1.0)
 run_of = couple(line, open_pantograph("CX").set(static_force="160 N"), speed=83.3)

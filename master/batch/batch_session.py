@@ -6,12 +6,13 @@ are written before the first task and after each, so whatever ends it, the folde
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Final, Generic, Literal, TypeVar
 
 from master.coupling.fmu_warnings import FmuWarningObserver
 from master.coupling.macro_steps import Observer
@@ -25,6 +26,9 @@ from master.scenario.overrides import Overrides
 from master.system.components import System
 from master.system.step_rounding import adjustments
 
+#: Least time between two writings of files [s], and most of the time that may be spent on writing.
+_LEAST_PAUSE: Final = 1.0
+_SHARE: Final = 0.05
 #: Makes the observers of a run and removes them afterwards.
 ObserverFactory = Callable[[System], AbstractContextManager[Sequence[Observer]]]
 
@@ -128,6 +132,23 @@ class BatchFiles(Generic[State]):
         results_folder.write_json(folder / self.json, {"generator": self.generator, **self.data(state)})
         for name, text in self.texts.items():
             results_folder.write_text(folder / name, text(state))
+
+
+class PacedFiles(BatchFiles[State]):
+    """Files that are written as tasks finish, but not so often that writing takes more than a share of the time."""
+
+    def write(self, state: State, folder: Path) -> None:
+        """Write the files of a state, unless they were written just now and more is to come."""
+        began = time.monotonic()
+        if state.status == "running" and began < self.__dict__.get("_due", began):
+            return
+        self.write_now(state, folder)
+        now = time.monotonic()
+        self.__dict__["_due"] = now + max(_LEAST_PAUSE, (now - began) / _SHARE)
+
+    def write_now(self, state: State, folder: Path) -> None:
+        """Write the files of a state."""
+        super().write(state, folder)
 
 
 def run_tasks(

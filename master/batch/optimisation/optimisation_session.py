@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -16,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from master.arrays import FloatArray
-from master.batch.batch_session import BatchFiles, BatchState
+from master.batch.batch_session import BatchState, PacedFiles
 from master.batch.optimisation.candidate_search import SearchEnd, search
 from master.batch.optimisation.optimisation_goal import (
     BoundedParameter,
@@ -44,9 +43,6 @@ PAGE: Final = "optimise.html"
 FORMAT: Final = 1
 #: Parameters up to which every corner of the bounds is checked before the first run.
 _MOST_CORNERS: Final = 8
-#: Least time between two writings of the files [s], and most of the time that may be spent on writing.
-_LEAST_PAUSE: Final = 2.0
-_SHARE: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -64,6 +60,8 @@ class OptimisationOutcome(BatchState):
         The points that were tried, in their order; the first is where the search began.
     found : dict
         What has become of them, by key.
+    place : str
+        Where the scenario is, as a command names it.
     ended : str
         Why the search ended, empty if it has not.
     """
@@ -74,6 +72,7 @@ class OptimisationOutcome(BatchState):
     bounds: tuple[BoundedParameter, ...]
     runs: tuple[SweepRun, ...] = ()
     found: Mapping[str, SweepResult] = field(default_factory=dict)
+    place: str = ""
     ended: str = ""
 
     @property
@@ -182,24 +181,18 @@ def as_data(outcome: OptimisationOutcome) -> dict[str, Any]:
     }
 
 
-class OptimisationFiles(BatchFiles[OptimisationOutcome]):
-    """The files of an optimisation: written as runs finish, but not so often that writing takes more than a share."""
+class OptimisationFiles(PacedFiles[OptimisationOutcome]):
+    """The files of an optimisation."""
 
     def __init__(self, page: Callable[[OptimisationOutcome], str]) -> None:
         texts = {CSV: lambda outcome: as_csv(outcome.rows), PAGE: page}
         super().__init__("optimisation", "openpanto optimise", JSON, as_data, texts)
-        self.__dict__["_due"] = 0.0
 
-    def write(self, state: OptimisationOutcome, folder: Path) -> None:
-        """Write the files of a state, unless they were written just now and more is to come."""
-        began = time.monotonic()
-        if state.status == "running" and began < self.__dict__["_due"]:
-            return
-        super().write(state, folder)
+    def write_now(self, state: OptimisationOutcome, folder: Path) -> None:
+        """Write the files of a state."""
+        super().write_now(state, folder)
         if has_parquet() and state.found:
             write_parquet(state.rows, folder / PARQUET)
-        now = time.monotonic()
-        self.__dict__["_due"] = now + max(_LEAST_PAUSE, (now - began) / _SHARE)
 
 
 @dataclass(frozen=True)
@@ -221,8 +214,8 @@ class PreparedOptimisation:
     outcome: OptimisationOutcome
 
     @classmethod
-    def of(cls, base: System, request: OptimisationRequest) -> PreparedOptimisation:
-        """Return the optimisation that a request asks for.
+    def of(cls, base: System, request: OptimisationRequest, place: str = "") -> PreparedOptimisation:
+        """Return the optimisation that a request asks for; ``place`` is how a command names the scenario.
 
         Raises
         ------
@@ -235,7 +228,8 @@ class PreparedOptimisation:
         corners = itertools.product(*((b.low, b.high) for b in bounds)) if len(bounds) <= _MOST_CORNERS else ()
         points = (tuple(b.start for b in bounds), *corners)
         make_runs(base, SweepPlan(tuple(b.parameter for b in bounds), points), asked)
-        return cls(base, asked, OptimisationOutcome(scenario=base.name, request=request, goal=goal, bounds=bounds))
+        begun = OptimisationOutcome(base.name, request, goal, bounds, place=place or base.name)
+        return cls(base, asked, begun)
 
 
 def optimise(

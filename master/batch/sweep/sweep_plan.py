@@ -225,17 +225,18 @@ def _sample(distributions: Sequence[Distribution], request: SweepRequest) -> _Pa
 
 def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
     """Return the values in a CSV file and the names of its rows."""
-    try:
-        rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = said(error) if isinstance(error, OSError) else error
-        raise MasterError(f"{path} cannot be read: {why}") from error
-    if len(rows) < 2:
+    lines = _read_lines(path)
+    if len(lines) < 2:
         raise RequestError(f"{path} has no row under its head")
-    heads = rows[0]
-    for line, row in enumerate(rows[1:], 2):
+    heads = lines[0][1]
+    if len(heads) == 1 and ";" in heads[0]:
+        raise RequestError(
+            f"{path}: its cells are separated by semicolons; separate them by commas, decimals by points"
+        )
+    for number, row in lines[1:]:
         if len(row) != len(heads):
-            raise RequestError(f"{path}, row {line}: has {len(row)} cells, the head has {len(heads)}")
+            raise RequestError(f"{path}, line {number}: has {len(row)} cells, the head has {len(heads)}")
+    rows = [row for _, row in lines]
     columns = {head.strip(): [cell.strip() for cell in cells] for head, *cells in zip(*rows, strict=True)}
     if len(columns) < len(heads):
         raise RequestError(f"{path}: a column appears more than once")
@@ -248,6 +249,18 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
         raise RequestError(f"{path}: {error}") from error
     values = list(zip(*(cells for _, cells in read), strict=True))
     return _Part(tuple(p for p, _ in read), values), names or tuple(map(str, range(1, len(rows))))
+
+
+def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the rows of a CSV file that are not empty, each with the number of its last line."""
+    try:
+        reader = csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")))
+        return [(reader.line_num, row) for row in reader if any(row)]
+    except UnicodeDecodeError as error:
+        raise RequestError(f"{path} is not text in UTF-8 (byte {error.start}); save it as CSV in UTF-8") from error
+    except (OSError, csv.Error) as error:
+        why = said(error) if isinstance(error, OSError) else error
+        raise MasterError(f"{path} cannot be read: {why}") from error
 
 
 def _column(system: System, head: str, cells: Sequence[str]) -> tuple[SweptParameter, tuple[SweptValue | None, ...]]:

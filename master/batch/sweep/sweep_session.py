@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from master.batch.batch_session import BatchFiles, BatchState, run_tasks
+from master.batch.batch_session import BatchState, PacedFiles, run_tasks
 from master.batch.sweep.held_fmus import held_fmus
 from master.batch.sweep.pages import sweep_page
 from master.batch.sweep.pages.sweep_view import read_view, view_of
@@ -38,9 +38,6 @@ SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
-#: Least time between two writings of the table [s], and most of the time that may be spent on writing.
-_LEAST_PAUSE: Final = 1.0
-_SHARE: Final = 0.05
 #: Steps of the rehearsal that the estimate of time comes from.
 _REHEARSED: Final = 100
 
@@ -135,27 +132,21 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
     }
 
 
-class SweepFiles(BatchFiles[SweepOutcome]):
-    """The files of a sweep: written after every run, but not so often that writing takes more than a share of time."""
+class SweepFiles(PacedFiles[SweepOutcome]):
+    """The files of a sweep."""
 
     def __init__(self) -> None:
         super().__init__("sweep", GENERATOR, JSON, as_data, {CSV: lambda outcome: as_csv(outcome.rows)})
-        self.__dict__["_due"] = 0.0
 
-    def write(self, state: SweepOutcome, folder: Path) -> None:
-        """Write the files of a state, unless they were written just now and more is to come; the page at the end."""
-        began = time.monotonic()
-        if state.status == "running" and began < self.__dict__["_due"]:
-            return
-        super().write(state, folder)
+    def write_now(self, state: SweepOutcome, folder: Path) -> None:
+        """Write the files of a state; the page at the end."""
+        super().write_now(state, folder)
         if has_parquet() and state.found:
             write_parquet(state.rows, folder / PARQUET)
         if state.status != "running":
             indices = sensitivity_data(state.sensitivity)["indices"]
             view = view_of(as_data(state), state.rows, folder, indices)
             results_folder.write_text(folder / PAGE, sweep_page.page(view))
-        now = time.monotonic()
-        self.__dict__["_due"] = now + max(_LEAST_PAUSE, (now - began) / _SHARE)
 
 
 @dataclass(frozen=True)

@@ -166,6 +166,17 @@ def test_an_interruption_ends_the_processes_and_leaves_what_is_finished(command,
     assert (tmp_path / "out" / "sweep.csv").read_bytes() == whole_table
 
 
+def test_processes_that_cannot_be_started_are_one_sentence(swept, tmp_path, monkeypatch):
+    def ended(**_):
+        raise RuntimeError("Nanny failed to start.") from OSError("Cannot allocate memory")
+
+    monkeypatch.setattr(dask_engine, "LocalCluster", ended)
+    text = "the 2 processes of --jobs cannot be started (Cannot allocate memory); start the sweep again"
+    with pytest.raises(MasterError, match=re.escape(text)):
+        swept("out", DaskEngine(jobs=2), **SMALL)
+    assert journal(tmp_path / "out") == []
+
+
 def test_a_scheduler_that_does_not_answer_is_one_sentence(toy, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(dask_engine, "_PATIENCE", 1.5)
     began = time.monotonic()

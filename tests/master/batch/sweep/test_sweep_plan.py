@@ -59,7 +59,10 @@ def test_what_cannot_be_is_one_sentence(toy_system, request_, said):
         ("catenary.stiffness\n", "has no row"),
         ("variant\nsoft\n", "has no column of values"),
         ("catenary.stifness\n1\n", "did you mean 'catenary.stiffness'"),
-        ("catenary.stiffness,speed\n1\n", "row 2: has 1 cells, the head has 2"),
+        ("catenary.stiffness,speed\n1\n", "line 2: has 1 cells, the head has 2"),
+        ("catenary.stiffness,speed\n\n1,2\n\n1\n", "line 5: has 1 cells, the head has 2"),
+        ("catenary.stiffness;speed\n4000,5;1\n", "its cells are separated by semicolons; separate them by commas"),
+        ("catenary.stiffness\n\ud800\n", "is not text in UTF-8 (byte 19)"),
         ("catenary.stiffness\nmuch\n", "'much' is not a number"),
         ("catenary.stiffness,catenary.stiffness\n1,2\n", "more than once"),
         ("catenary.stiffness,stop [s]\n1,\n", "has an empty cell"),
@@ -67,7 +70,7 @@ def test_what_cannot_be_is_one_sentence(toy_system, request_, said):
 )
 def test_a_table_that_cannot_be_used_is_one_sentence(toy_system, tmp_path, text, said):
     table = tmp_path / "t.csv"
-    table.write_text(text)
+    table.write_text(text, encoding="utf-8", errors="surrogatepass")
     with pytest.raises(RequestError) as caught:
         _plan(toy_system, table=table)
     assert said in str(caught.value)

@@ -86,6 +86,19 @@ def test_what_cannot_be_is_one_sentence(line_and_pantograph, name, text, said):
     assert "\n" not in str(caught.value)
 
 
+def test_a_cell_without_a_unit_where_one_is_needed_is_one_sentence(line_and_pantograph):
+    with pytest.raises(RequestError, match=r"^line\.tension: '18' needs a unit, as in '18 N'$"):
+        ParameterReader(line_and_pantograph, "line.tension").cells(("20 kN", "18"))
+    assert ParameterReader(line_and_pantograph, "line.tension", "kN").cells(("20", "18"))[1] == (20.0, 18.0)
+
+
+def test_the_value_of_the_scenario_comes_in_the_unit_that_is_asked_for(line_and_pantograph):
+    line_and_pantograph.component("line").parameters["tension"] = 19000.0
+    assert ParameterReader(line_and_pantograph, "line.tension").present("kN") == pytest.approx(19.0)
+    assert ParameterReader(line_and_pantograph, "line.temperature").present("degC") == 1.0
+    assert ParameterReader(line_and_pantograph, "stop").present("s") == 1.0
+
+
 def test_a_width_has_no_offset_of_its_unit(line_and_pantograph):
     reader = ParameterReader(line_and_pantograph, "line.temperature")
     _, (mean, sd) = reader.arguments("20 degC, 10 K", (False, True))

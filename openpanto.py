@@ -36,7 +36,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn
 
-from master.errors import hint
+from master.errors import empty_argument, hint
 from master.safety.supervision import phase, supervised
 
 
@@ -278,13 +278,13 @@ def _worked(given: Sequence[str]) -> int:
     """Carry out a command line, having imported what its verb needs."""
     verb = given[0] if given else ""
     parser = command_line([verb])
-    if not verb:
+    if not given:
         parser.print_help()
         return 2
+    if empty := empty_argument(given):
+        parser.error(empty)
     if not verb.startswith("-") and verb not in VERBS:
         parser.error(f"there is no verb '{verb}'{_wanted_run(verb) or hint(verb, VERBS)}")
-    if (empty := _empty(given)) is not None:
-        parser.error(f"what comes after '{empty}' is empty: write it out, or set the shell variable that stands there")
     options, unknown = parser.parse_known_args(given)
     if unknown:
         options.parser.unknown(unknown)
@@ -292,16 +292,6 @@ def _worked(given: Sequence[str]) -> int:
     # The master says itself what it is at; of the physics, a factorisation may never come back to Python.
     with nullcontext() if execution == _MASTER else phase("computing"):
         return int(_named(execution)(options))
-
-
-def _empty(given: Sequence[str]) -> str | None:
-    """Return what stands before the first argument that is empty; None if none is."""
-    for before, text in zip(("openpanto", *given), given, strict=False):
-        if not text.strip():
-            return before
-        if re.fullmatch(r"--[a-z-]+=\s*", text):
-            return text
-    return None
 
 
 def _wanted_run(name: str) -> str:

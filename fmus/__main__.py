@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from models.definition_files.message_text import printable, said
+from models.definition_files.message_text import empty_argument, printable, said
 from models.library.search_path import search_path
 
 # What builds is imported where it is used: help and a mistyped option are answered without NumPy.
@@ -30,7 +30,10 @@ DEFAULT_FOLDER = Path("build/fmus")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return 0 for success, 1 for failure, 2 for a command line that was not understood."""
-    return carry_out(_parser().parse_args(arguments))
+    parser, given = _parser(), sys.argv[1:] if arguments is None else arguments
+    if empty := empty_argument(given):
+        parser.error(empty)
+    return carry_out(parser.parse_args(given))
 
 
 def carry_out(options: argparse.Namespace) -> int:

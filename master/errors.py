@@ -68,6 +68,28 @@ def hint(name: str, known: Iterable[str], most: int = 1) -> str:
     return f"; did you mean {' or '.join(repr(folded[k]) for k in near)}?" if near else ""
 
 
+def empty_argument(given: Sequence[str]) -> str:
+    """Return what to say of an empty argument, as of a shell variable that is not set; nothing if none is empty.
+
+    Examples
+    --------
+    >>> empty_argument(["run", "cx_ln2", "--out", ""])
+    "what comes after '--out' is empty: write it out, or set the shell variable that stands there"
+    >>> empty_argument(["run", "cx_ln2"])
+    ''
+    """
+    for k, text in enumerate(given):
+        option, equals, value = text.partition("=")
+        if not text.strip():
+            what = f"what comes after '{given[k - 1]}'" if k else "the first argument"
+        elif option.startswith("--") and equals and not value.strip():
+            what = f"what comes after '{text}'"
+        else:
+            continue
+        return f"{what} is empty: write it out, or set the shell variable that stands there"
+    return ""
+
+
 def printable(text: str) -> str:
     r"""Return text whose characters all print, lines kept: for what others have written, on its way to a terminal.
 

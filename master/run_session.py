@@ -61,6 +61,8 @@ class RunOptions:
         Given if every FMU is to have its own process.
     real_time : float, optional
         Simulated seconds per second of wall clock; as fast as possible if not given.
+    keep_definitions : bool
+        Whether the definitions of the components are copied into the folder.
     """
 
     checkpoint: float | None = None
@@ -68,6 +70,7 @@ class RunOptions:
     continuation: Continuation | None = None
     isolation: Isolation | None = None
     real_time: float | None = None
+    keep_definitions: bool = True
 
     def schedule(self, system: System) -> CheckpointSchedule:
         """Return after which macro steps checkpoints are written; refuses what does not fit the system."""
@@ -111,7 +114,8 @@ def run(system: System, folder: Path, observers: Sequence[Observer] = (), option
     with claimed_for_run(folder, options.continuation) as own, unfinished(own.summary_file, own.run):
         description = run_summary.describe(system, own.run)
         own.write_summary({**description, "status": "running"})
-        write_definitions(own.path, system.components)
+        if options.keep_definitions:
+            write_definitions(own.path, system.components)
         troubles: dict[str, str] = {}
         with (
             interruptible() as stop_wanted,

@@ -15,6 +15,9 @@ from typing import Final
 import pytest
 
 import openpanto
+from fmus.__main__ import main as fmus_main
+from master.commands.main import main as master_main
+from models.commands.physics_main import main as models_main
 from tests.robustness.conftest import measured_run, scenario  # noqa: F401  fixtures
 from tests.robustness.support import UNWORDED
 
@@ -128,6 +131,26 @@ def test_a_bad_path_ends_in_one_sentence(line, workplace, monkeypatch, capfd):
     assert REMEDY.search(errors[0]), errors
     assert Path.cwd() == workplace
     assert not (workplace / "project").exists()
+
+
+MAINS: Final = {"python -m master": master_main, "python -m models": models_main, "python -m fmus": fmus_main}
+
+
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [
+        ([""], "the first argument"),
+        (["x", " "], "what comes after 'x'"),
+        (["x", "--out="], "what comes after '--out='"),
+    ],
+)
+@pytest.mark.parametrize("program", ["openpanto", *MAINS])
+def test_an_empty_argument_is_told_alike_by_every_program(program, given, what, capfd):
+    with pytest.raises(SystemExit) as end:
+        MAINS.get(program, openpanto._worked)(given)
+    assert end.value.code == 2
+    said = f"{program}: error: {what} is empty: write it out, or set the shell variable that stands there\n"
+    assert capfd.readouterr().err.endswith(said)
 
 
 def test_every_place_for_a_path_is_tried():

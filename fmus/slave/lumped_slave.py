@@ -14,6 +14,14 @@ from models.arrays import FloatArray
 from models.pantograph.lumped.lumped_advice import working_height_warning
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, load_lumped
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
+from models.pantograph.operation import Drive
+
+#: Inputs of `operation.Drive`, in its order.
+DRIVE_SIGNALS = (
+    Signal("reference.vz", "m/s", "rate of the line's nominal height under the strip (pantograph[p].nominal.vz)", 0.0),
+    Signal("air.u", "m/s", "speed of the air along the track, for the aerodynamic uplift", 0.0),
+    Signal("uplift_force", "N", "force added to the static force, of a controller say", 0.0),
+)
 
 
 class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
@@ -28,8 +36,10 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Vertical motion only: the strip does not roll, and the lateral point of application has no effect.",
-        "Linear springs and dampers, identified at one working height; no friction, no stops.",
-        "No aerodynamic uplift: add it to static_force.",
+        "Linear springs and dampers, identified at one working height; no friction, no stops. With follow_height = 1 "
+        "the reference of the lowest spring follows the height with the time constant reference_time, which makes it "
+        "another model below 1 / (2 pi reference_time).",
+        "Aerodynamic uplift is a coefficient times the square of the speed, as on open track.",
         "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
     )
 
@@ -40,7 +50,7 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
         return LumpedPantographPart(definition)
 
     def _make_ports(self, part: LumpedPantographPart) -> Ports:
-        ports = pantograph_ports(part)
+        ports = pantograph_ports(part, DRIVE_SIGNALS)
         signals = tuple(signal for port in ports.outputs for signal in port.signals)
         return replace(ports, outputs=(Port(signals, attrgetter("outputs")),))  # read in one piece
 
@@ -48,20 +58,21 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
 
     def _initialise(self, part: LumpedPantographPart, time: float, inputs: FloatArray) -> None:
-        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6])
+        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], Drive(*inputs[6:9].tolist()))
 
     def _advance(self, part: LumpedPantographPart, inputs: FloatArray, step: float) -> None:
-        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step)
+        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step, Drive(*inputs[6:9].tolist()))
 
 
-def pantograph_ports(part: Any) -> Ports:
-    """Return the ports that every pantograph has, and those of its observations."""
+def pantograph_ports(part: Any, more: Iterable[Signal] = ()) -> Ports:
+    """Return the ports that every pantograph has, more inputs if it has some, and those of its observations."""
     return Ports(
         inputs=(
             Signal("contact.force", "N", "contact force; positive pushes the strip down", 0.0),
             *vector("contact.", "m", "point of application of the contact force", (0.0, 0.0, 0.0)),
             Signal("base.z", "m", "displacement of the vehicle's roof, up", 0.0),
             Signal("base.vz", "m/s", "velocity of the vehicle's roof, up", 0.0),
+            *more,
         ),
         outputs=(
             Port(tuple(s for end in "AB" for s in _end(end)), attrgetter("strip")),

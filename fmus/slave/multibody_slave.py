@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import ClassVar
 
 from fmus.slave.adapter import Adapter
-from fmus.slave.lumped_slave import pantograph_ports
+from fmus.slave.lumped_slave import DRIVE_SIGNALS, pantograph_ports
 from fmus.slave.ports import Ports
 from models.arrays import FloatArray
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import load_mechanism
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
+from models.pantograph.operation import Drive
 
 
 class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographPart]):
@@ -26,7 +27,8 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops).",
-        "No aerodynamic forces.",
+        "Aerodynamic uplift is a coefficient times the square of the speed, as on open track, brought to the strip by "
+        "the lifting element; an element that has a cam holds its force ideally, real cams deviate by their tolerance.",
         "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
     )
 
@@ -37,14 +39,19 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         return MultibodyPantographPart(definition)
 
     def _make_ports(self, part: MultibodyPantographPart) -> Ports:
-        return pantograph_ports(part)
+        return pantograph_ports(part, DRIVE_SIGNALS[1:])
 
     def _start_warnings(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
         yield part.mechanism_warning()
 
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:
-        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6])
+        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], _drive(inputs))
 
     def _advance(self, part: MultibodyPantographPart, inputs: FloatArray, step: float) -> None:
-        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step)
+        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step, _drive(inputs))
+
+
+def _drive(inputs: FloatArray) -> Drive:
+    air, uplift = inputs[6:8].tolist()
+    return Drive(air=air, uplift=uplift)

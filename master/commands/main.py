@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from master.commands import verb_options
 from master.commands.verb_execution import carry_out
+from master.errors import empty_argument
 
 #: What declares each verb and its options, in the order of the help.
 VERBS: Final[Mapping[str, Callable[[Any], None]]] = {
@@ -32,6 +33,8 @@ VERBS: Final[Mapping[str, Callable[[Any], None]]] = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if empty := empty_argument(given):
+        _parser(()).error(empty)
     if given and given[0] not in VERBS and given[0] not in ("-h", "--help"):
         given.insert(0, "run")
     return carry_out(_parser(given[:1] if given and given[0] in VERBS else VERBS).parse_args(given))

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
 from models.commands.physics_verbs import add_couple, add_identify, add_pantograph, add_statics
-from models.definition_files.message_text import printable, said
+from models.definition_files.message_text import empty_argument, printable, said
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import UnknownNameError
@@ -35,6 +35,8 @@ def main(argv: Sequence[str]) -> int:
     subparsers = parser.add_subparsers(dest="verb", required=True)
     for add in _VERBS:
         add(subparsers)
+    if empty := empty_argument(argv):
+        parser.error(empty)
     return carry_out(parser.parse_args(argv))
 
 

@@ -143,7 +143,8 @@ class _Series:
     maximum: float
 
     def read(self, table: Table, name: str, default: Any) -> Any:
-        return table.quantities(name, self.unit, minimum=self.minimum, maximum=self.maximum)
+        fallback = None if default is dataclasses.MISSING else default
+        return table.quantities(name, self.unit, default=fallback, minimum=self.minimum, maximum=self.maximum)
 
 
 @dataclass(frozen=True)
@@ -255,9 +256,16 @@ def part(cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:
     return _field(_Part(cls), default)
 
 
-def series(unit: str, description: str, *, minimum: float = -math.inf, maximum: float = math.inf) -> Any:
+def series(
+    unit: str,
+    description: str,
+    *,
+    default: Any = dataclasses.MISSING,
+    minimum: float = -math.inf,
+    maximum: float = math.inf,
+) -> Any:
     """Declare a list of physical values of any length: a column of a table, no parameter."""
-    return _field(_Series(unit, description, minimum, maximum), dataclasses.MISSING)
+    return _field(_Series(unit, description, minimum, maximum), default)
 
 
 def word_or_part(choices: tuple[str, ...], cls: type[Any], *, default: Any = dataclasses.MISSING) -> Any:

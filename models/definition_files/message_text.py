@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import errno
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Final
 
@@ -69,6 +69,28 @@ def nearest(name: str, known: Iterable[str], most: int = 1) -> list[str]:
     folded = {k.casefold(): k for k in known}
     matches = partial(difflib.get_close_matches, name.casefold(), folded)
     return [folded[k] for k in matches(n=1, cutoff=0.85) or matches(n=most, cutoff=0.55)]
+
+
+def empty_argument(given: Sequence[str]) -> str:
+    """Return what to say of an empty argument, as of a shell variable that is not set; nothing if none is empty.
+
+    Examples
+    --------
+    >>> empty_argument(["run", "cx_ln2", "--out", ""])
+    "what comes after '--out' is empty: write it out, or set the shell variable that stands there"
+    >>> empty_argument(["run", "cx_ln2"])
+    ''
+    """
+    for k, text in enumerate(given):
+        option, equals, value = text.partition("=")
+        if not text.strip():
+            what = f"what comes after '{given[k - 1]}'" if k else "the first argument"
+        elif option.startswith("--") and equals and not value.strip():
+            what = f"what comes after '{text}'"
+        else:
+            continue
+        return f"{what} is empty: write it out, or set the shell variable that stands there"
+    return ""
 
 
 def one_line(text: str) -> str:

@@ -37,6 +37,7 @@ SI: Final[dict[str, tuple[str, float]]] = {
     "daN/m": ("N/m", 10.0),
     "kN/m": ("N/m", 1e3),
     "N.s/m": ("N.s/m", 1.0),
+    "N.s2/m2": ("N.s2/m2", 1.0),
     "N.m.s/rad": ("N.m.s/rad", 1.0),
     "N.m/rad": ("N.m/rad", 1.0),
     "N.m2": ("N.m2", 1.0),

@@ -2,9 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from models.definition_files.field_schema import count, monitoring, quantity
+from models.definition_files.field_schema import count, monitoring, quantity, text, vector
+
+
+class Drive(NamedTuple):
+    """What acts on a pantograph from outside besides contact and roof, held over a step; all 0 if nothing is connected.
+
+    Attributes
+    ----------
+    reference_rate : float
+        Rate of the line's nominal height under the strip [m/s].
+    air : float
+        Speed of the air along x [m/s].
+    uplift : float
+        Force added to the static force [N].
+    """
+
+    reference_rate: float = 0.0
+    air: float = 0.0
+    uplift: float = 0.0
+
+
+#: Nothing connected.
+NO_DRIVE = Drive()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +55,19 @@ class Operation:
     strip_offset: float = quantity(
         "m", "lateral position of the strip's middle", default=0.0, minimum=-2.0, maximum=2.0
     )
+    aerodynamic_uplift: tuple[float, float] = vector(
+        "N.s2/m2",
+        "aerodynamic uplift per square of the speed against the air, knuckle",
+        labels=("leading", "trailing"),
+        default=(0.0, 0.0),
+        minimum=-1.0,
+        maximum=1.0,
+    )
+    knuckle: str = text(default="leading", choices=("leading", "trailing"))
+    direction: int = count(
+        "1: the knuckle is where the definition says, -1: the pantograph runs the other way round",
+        default=1, minimum=-1, maximum=1,
+    )  # fmt: skip
     extrapolation_order: int = count(
         "order of the extrapolation of the contact force inside a step: 0 held, 1 linear, 2 quadratic",
         default=2, minimum=0, maximum=2,
@@ -46,3 +83,19 @@ class Operation:
         if self.raise_duration == 0.0:
             return 1.0
         return min(1.0, (time - self.raise_start) / self.raise_duration)
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield what is wrong with the direction."""
+        if self.direction == 0:
+            yield "direction", "0 is neither 1 (as the definition says) nor -1 (the other way round)"
+
+    @property
+    def air_coefficient(self) -> float:
+        """Aerodynamic uplift per square of the speed against the air, for the way the knuckle points [N.s2/m2]."""
+        leading, trailing = self.aerodynamic_uplift
+        return leading if (self.knuckle == "leading") == (self.direction > 0) else trailing
+
+    def aerodynamic_force(self, air: float, speed: float | None = None) -> float:
+        """Return the aerodynamic uplift [N] in air that moves along x [m/s], at the speed of the train or another."""
+        against = (self.speed if speed is None else speed) - air
+        return self.air_coefficient * abs(against) * against

@@ -31,7 +31,7 @@ from distributed import Client, Future, LocalCluster, WorkerPlugin, get_worker, 
 from master.batch.sweep.sweep_engines import MakeRuns
 from master.batch.sweep.sweep_run import ATTEMPTS, DIED, RunPlace, SweepResult, carry_out
 from master.batch.sweep.swept_systems import SweepRun
-from master.errors import MasterError
+from master.errors import MasterError, one_line
 from master.system.components import System
 
 #: Seconds within which a scheduler has to answer, and between looks at its workers.
@@ -149,20 +149,25 @@ class DaskEngine:
                 dask.utils.parse_bytes(self.memory_limit)
             except ValueError as error:
                 raise MasterError(f"'{self.memory_limit}' is no size of memory, such as 2GB or 'auto'") from error
-        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        with (
-            LocalCluster(
+        with self._cluster() as cluster, Client(cluster) as client:
+            yield client, lambda: cluster.scale(self.jobs)
+
+    def _cluster(self) -> LocalCluster:
+        try:
+            return LocalCluster(
                 n_workers=self.jobs,
                 threads_per_worker=1,
                 processes=True,
                 memory_limit=self.memory_limit,
                 dashboard_address=None,
                 host="127.0.0.1",
-                env=environment,
-            ) as cluster,
-            Client(cluster) as client,
-        ):
-            yield client, lambda: cluster.scale(self.jobs)
+                env={**os.environ, "OMP_NUM_THREADS": "1"},
+            )
+        except (OSError, TimeoutError, RuntimeError) as error:  # one was ended as it began, or there is no room for it
+            causes = error, error.__cause__, error.__context__
+            why = next((str(c) for c in reversed(causes) if c is not None and str(c)), type(error).__name__)
+            text = f"the {self.jobs} processes of --jobs cannot be started ({one_line(why)}); start the sweep again"
+            raise MasterError(text) from error
 
 
 @contextmanager

@@ -48,7 +48,8 @@ class Distribution:
 
     def quantile(self, share: FloatArray) -> FloatArray:
         """Return the values below which these shares of all values lie."""
-        return _KINDS[self.kind].quantile(np.clip(share, _LEAST, 1.0 - _LEAST), *self.arguments)
+        with np.errstate(all="ignore"):  # what is not finite is refused with its run
+            return _KINDS[self.kind].quantile(np.clip(share, _LEAST, 1.0 - _LEAST), *self.arguments)
 
 
 @dataclass(frozen=True)

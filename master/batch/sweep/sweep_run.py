@@ -28,7 +28,7 @@ from master.evaluation.output_figures import output_figures
 from master.results.results_folder import FORCES, GEOMETRY, SUMMARY, WORK
 from master.results.run_results import Results
 from master.results.run_summary import peak_memory
-from master.run_session import run
+from master.run_session import RunOptions, run
 from master.system.components import System
 from master.system.pantograph_motion import pantographs, parameter_value
 
@@ -128,7 +128,8 @@ def carry_out(base: System, wanted: SweepRun, place: RunPlace) -> SweepResult:
     with _working_folder(place) as folder:
         try:
             system = _calibrated(wanted.system(base), wanted, folder)
-            done = run(system, folder / "run")
+            # All runs have the same ones: only a folder that stays whole has a use for them.
+            done = run(system, folder / "run", (), RunOptions(keep_definitions=place.keep in ("all", "failed")))
             stepping = float(done.summary["performance"]["wall_time"])
             rows = tuple(_rows(done, system))
             _kept(folder / "run", place, wanted.key)
@@ -199,7 +200,8 @@ def _calibrated(system: System, wanted: SweepRun, folder: Path) -> System:
         )
 
     def means(values: tuple[float, ...]) -> tuple[float, ...]:
-        found = {a.contact.pantograph: a.quality.mean for a in run(with_forces(values), folder / "trial").assessments()}
+        trial = run(with_forces(values), folder / "trial", (), RunOptions(keep_definitions=False))
+        found = {a.contact.pantograph: a.quality.mean for a in trial.assessments()}
         if missing := [name for name in names if name not in found]:
             raise MasterError(f"{', '.join(missing)} has no contact in the interval of interest")
         return tuple(found[name] for name in names)

@@ -192,18 +192,21 @@ class Cells:
         Which cells are hatched.
     hints : tuple of tuple of str, shape (n_y, n_x)
         Text that a page shows when a cell is pointed at.
+    span : (float, float), optional
+        Values of the palest and the darkest colour, for several maps to compare; the extremes of this one if None.
     """
 
     values: FloatArray
     words: tuple[tuple[str, ...], ...]
     hatched: BoolArray
     hints: tuple[tuple[str, ...], ...]
+    span: tuple[float, float] | None = None
 
     @property
     def colours(self) -> list[list[str]]:
         """The colour of each cell: pale for the least value, dark for the greatest."""
         there = self.values[np.isfinite(self.values)]
-        low, high = (float(there.min()), float(there.max())) if len(there) else (0.0, 0.0)
+        low, high = self.span or ((float(there.min()), float(there.max())) if len(there) else (0.0, 0.0))
         shares = (self.values - low) / (high - low if high > low else 1.0)
         return [[_scale_colour(s) if np.isfinite(s) else "" for s in row] for row in shares]
 

@@ -8,16 +8,26 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.vector_kernels import LANES, get, minus_product, nothing, part, plus_product, product, put
+from models.catenary.step.vector_kernels import (
+    LANES,
+    compiled,
+    get,
+    minus_product,
+    nothing,
+    part,
+    plus_product,
+    product,
+    put,
+)
 
 #: Attachments in lanes. ``slot``, see above. ``rows``, ``targets``, ``values``: -2 K and a2 M, of each row of vectors
 #: the upper triangle, both values one after the other, its diagonal first; a target beyond the segment is a row of the
-#: next. ``factor``: of each row that is not of a separator 1 / L_jj, L_j+k,j for k = 1 ... width, and the row of L^-1
-#: C, with C its coupling with the separator before the segment. ``middle``, ``shifts``: inverse of what is left for
-#: the separators, for each shift a block that leads from the separators so many segments on. ``before``, ``after``:
-#: neighbours of the segments. ``size``: rows without separator, rows of a separator, width, rows read beyond the
-#: segment.
-Lanes = namedtuple("Lanes", "slot rows targets values factor middle shifts before after size")
+#: next. ``factor``: of each row that is not of a separator 1 / L_jj, L_j+k,j for k = 1 ... ``widths[j]``, and the row
+#: of L^-1 C, with C its coupling with the separator before the segment. ``middle``, ``shifts``: inverse of what is
+#: left for the separators, for each shift a block that leads from the separators so many segments on. ``before``,
+#: ``after``: neighbours of the segments. ``size``: rows without separator, rows of a separator, width, rows read
+#: beyond the segment.
+Lanes = namedtuple("Lanes", "slot rows targets values widths factor middle shifts before after size")
 #: Arrays to work in, in lanes: displacements, velocities, forces that turn to the solution; separators, twice, and
 #: once.
 LanesWork = namedtuple("LanesWork", "x v right separators left")
@@ -25,35 +35,27 @@ _0, _1, _2 = (np.uint64(i) for i in range(3))
 _LANES = np.uint64(LANES)
 
 
-@part
-def load(lanes, back, attached, pressed, pull, work):
+@compiled
+def load(lanes, attached, pressed, pull, work):
     """Find the forces on the attachments that their change in this step balances.
 
     Parameters
     ----------
     lanes : Lanes
-    back : (ndarray, ndarray, ndarray)
-        Turn of the ends back to the attachments' axes: rows, columns and values, compressed by rows.
     attached : ndarray, shape (2, n_attached)
         Displacements and velocities at the beginning of the step.
-    pressed : ndarray, shape (n_attached,)
-        Known forces on them.
-    pull : ndarray, shape (n_ends,)
-        Forces on the ends.
+    pressed, pull : ndarray, shape (n_attached,)
+        Known forces on them, and those of the modes.
     work : LanesWork
         ``right`` is the result.
     """
     x, v, right = work.x, work.v, work.right
-    rows, columns, turned = back
     for at in range(_0, np.uint64(right.size), _LANES):
         put(right, at, nothing())
     for i in range(pressed.size):
         at = lanes.slot[i]
         x[at], v[at] = attached[0, i], attached[1, i]
-        force = pressed[i]
-        for k in range(rows[i], rows[i + _1]):
-            force += turned[k] * pull[columns[k]]
-        right[at] = force
+        right[at] = pressed[i] + pull[i]
     multiply(lanes, x, v, right)
 
 
@@ -95,12 +97,12 @@ def solve(lanes, work, change):
         Result.
     """
     factor, solution, left = lanes.factor, work.right, work.left
-    inner, width, border = lanes.size[0], lanes.size[2], lanes.size[1]
-    to_left = (_1 + width) * _LANES
+    inner, border = lanes.size[0], lanes.size[1]
     for at in range(_0, border * _LANES, _LANES):
         put(left, at, nothing())
     begin = _0
-    for here in range(_0, inner * _LANES, _LANES):
+    for row in range(inner):
+        here, to_left = row * _LANES, (_1 + lanes.widths[row]) * _LANES
         value = product(get(solution, here), get(factor, begin))
         put(solution, here, value)
         for k in range(_LANES, to_left, _LANES):
@@ -110,8 +112,9 @@ def solve(lanes, work, change):
             put(left, at, plus_product(get(left, at), get(factor, begin), value))
             begin += _LANES
     separate(lanes, work)
-    for here in range(inner * _LANES, _0, -_LANES):
-        here -= _LANES
+    for back in range(inner):
+        row = inner - _1 - back
+        here, to_left = row * _LANES, (_1 + lanes.widths[row]) * _LANES
         begin -= to_left + border * _LANES
         value = get(solution, here)
         for at in range(_0, border * _LANES, _LANES):
@@ -121,6 +124,16 @@ def solve(lanes, work, change):
         put(solution, here, product(value, get(factor, begin)))
     for i in range(change.size):
         change[i] = solution[lanes.slot[i]]
+
+
+@compiled
+def respond(lanes, load, work, change):
+    """Solve for the change of the attachments under a load, both of shape (n_attached,)."""
+    for at in range(_0, np.uint64(work.right.size), _LANES):
+        put(work.right, at, nothing())
+    for i in range(load.size):
+        work.right[lanes.slot[i]] = load[i]
+    solve(lanes, work, change)
 
 
 @part

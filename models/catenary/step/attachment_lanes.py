@@ -19,6 +19,7 @@ import scipy.sparse as sp
 from scipy.linalg.lapack import dpbtrf, dtbtrs
 
 from models.arrays import FloatArray, IntArray
+from models.catenary.linear_motion.attachment_solver import CUT
 
 #: Rows to either side of an even share, within which a segment may end where its separator is narrow.
 _PLAY = 16
@@ -36,7 +37,7 @@ def aligned(values: FloatArray) -> FloatArray:
 
 
 class AttachmentLanes:
-    """Matrices of the attachments in lanes.
+    """Matrices of the attachments in lanes, and a `Factor` that solves by them.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ class AttachmentLanes:
 
     Attributes
     ----------
-    arrays : Lanes
+    arrays, work : Lanes, LanesWork
         See `models.catenary.step.attachment_kernels`.
     """
 
@@ -60,9 +61,9 @@ class AttachmentLanes:
         self._lanes: int = kernels.LANES
         entries = matrix.tocoo()
         n = matrix.shape[0]
-        is_ring = bool((np.abs(entries.row - entries.col) > width).any())
-        self._count = int(np.clip(n // (2 * (width + 1)), 3 if is_ring else 1, self._lanes))
-        ends, self._border = _ends(entries, self._count, width, is_ring)
+        self._kernels, self._is_ring = kernels, bool((np.abs(entries.row - entries.col) > width).any())
+        self._count = int(np.clip(n // (2 * (width + 1)), 3 if self._is_ring else 1, self._lanes))
+        ends, self._border = _ends(entries, self._count, width, self._is_ring)
         begin = np.concatenate([[0], ends[:-1]])
         length = ends - begin
         self._length = int(length.max())
@@ -72,7 +73,7 @@ class AttachmentLanes:
         self._row = np.arange(n) - begin[self._lane] + (self._length - length)[self._lane]
         self._before = (np.arange(self._lanes) - 1) % self._lanes
         self._before[: self._count] = (np.arange(self._count) - 1) % self._count
-        factor, middle, shifts = self._factorised(entries)
+        widths, factor, middle, shifts = self._factorised(entries)
         rows, targets, values, beyond = self._products(*products)
         whole = [self._row * self._lanes + self._lane, rows, targets]
         size = [self._inner, self._border, width, beyond]
@@ -80,6 +81,7 @@ class AttachmentLanes:
         self.arrays = kernels.Lanes(
             *(part.astype(np.uint32) for part in whole),
             aligned(values),
+            widths.astype(np.uint64),
             aligned(factor),
             aligned(middle),
             *(np.asarray(part, dtype=np.uint64) for part in (shifts, *neighbours, size)),
@@ -88,6 +90,28 @@ class AttachmentLanes:
         self.work = kernels.LanesWork(
             *(aligned(np.zeros(k * self._lanes)) for k in (*3 * [rows_of_work], 2 * self._border, self._border))
         )
+
+    def solve(self, load: FloatArray) -> FloatArray:
+        """Return the solution for a load of shape (n,)."""
+        change = np.empty(len(load))
+        self._kernels.respond(self.arrays, load, self.work, change)
+        return change
+
+    def near(self, first: int, load: FloatArray) -> tuple[int, FloatArray]:
+        """Return solutions for loads of shape (k, m) on the rows from ``first``, where they are not zero: see `Factor`.
+
+        A whole solution takes less time here than one about the load.
+        """
+        n = self._row.size
+        turned = (first - n // 2) % n if self._is_ring else 0  # the far side comes first and last
+        whole = np.zeros((load.shape[1], n))
+        whole[:, (first + np.arange(len(load))) % n] = load.T
+        values = np.array([self.solve(each) for each in whole])
+        if turned:
+            values = np.roll(values, -turned, axis=1)
+        size = np.abs(values).max(axis=0)
+        kept = np.flatnonzero(size > CUT * size.max())
+        return int(kept[0] + turned) % n, np.ascontiguousarray(values[:, kept[0] : kept[-1] + 1].T)
 
     def _apart(self, entries: sp.coo_matrix) -> tuple[IntArray, IntArray]:
         """Return which entries are within a segment, and which lead from a separator to the next segment."""
@@ -98,8 +122,8 @@ class AttachmentLanes:
             to_next &= lane[one] < lane[other]
         return np.flatnonzero(within), np.flatnonzero(to_next)
 
-    def _factorised(self, entries: sp.coo_matrix) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return ``factor``, ``middle`` and ``shifts`` of `Lanes`."""
+    def _factorised(self, entries: sp.coo_matrix) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
+        """Return ``widths``, ``factor``, ``middle`` and ``shifts`` of `Lanes`."""
         lanes, inner, border, width = self._lanes, self._inner, self._border, self._width
         lane, row = self._lane, self._row
         within, to_next = self._apart(entries)
@@ -132,7 +156,12 @@ class AttachmentLanes:
         here = np.arange(lanes)
         blocks = [inverse[here, :, (here + shift) % lanes].transpose(2, 1, 0) for shift in range(lanes)]
         large = [k for k, block in enumerate(blocks) if np.abs(block).max() > _NOTHING * np.abs(inverse).max()]
-        return factor, np.stack([blocks[k] for k in large]), np.array(large)
+        is_used = np.abs(factor).max(axis=2) > 0.0
+        widths = width - is_used[:, width:0:-1].argmax(axis=1)
+        widths[~is_used[:, 1 : width + 1].any(axis=1)] = 0
+        is_used[:] = np.arange(1 + width + border) <= widths[:, None]
+        is_used[:, 1 + width :] = True
+        return widths, factor[is_used], np.stack([blocks[k] for k in large]), np.array(large)
 
     def _products(self, *matrices: sp.spmatrix) -> tuple[IntArray, IntArray, FloatArray, int]:
         """Return ``rows``, ``targets`` and ``values`` of `Lanes`, and how many rows of the next segments are read."""

@@ -29,6 +29,10 @@ _NO_STRIPS = np.zeros((0, 2, 2, 3)), np.zeros(0)
 _NONE, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
 
 
+#: Displacements of attachments from which on a solution about a load takes less time than a whole one.
+_LONG = 12000
+
+
 class UnsuitedError(Exception):
     """A line that the kernels are not made for."""
 
@@ -66,7 +70,8 @@ class CompiledLineStep:
         self.kernels, self.matrices, self._wires = kernels, matrices, line.wires
         self.units = ModeUnits(matrices, kernels)
         lanes = AttachmentLanes(factor.matrix, factor.width, (-2.0 * modes.K, newmark.a2 * modes.M), kernels)
-        compliance = Compliance(factor, droppers.B, droppers.by_change(newmark))
+        near = lanes if factor.matrix.shape[0] < _LONG else factor
+        compliance = Compliance(near, droppers.B, droppers.by_change(newmark))
         self._records = StepRecords(line.wires, matrices, compliance, self.units.slots)
         contact = line.contact
         constants = np.array([newmark.a1, contact.stiffness, contact.exponent, contact.restitution, line.gap])
@@ -81,14 +86,12 @@ class CompiledLineStep:
                 2.0 * droppers.rest_load,
             ),
             self._records.wires,
-            (*_by_rows(modes.turn), *_by_rows(modes.turn.T)),
         )
         intervals = [interval for wire in line.wires for interval in wire.intervals]
         self._sizes = max(i.size for i in intervals), max(len(i.ends) for i in intervals)
         self._work = (
             tuple(lanes.work),
             np.zeros(n_attached),
-            np.zeros(modes.turn.shape[0]),
             np.zeros(n_attached),
             np.zeros(n_droppers),
             np.zeros((2, self._sizes[0])),
@@ -136,7 +139,9 @@ class CompiledLineStep:
             self._answer(answer)
         packed.moved = True
         _, _, loaded, slack, ahead = report.tolist()
-        state.loaded, state.load = out[0][:loaded].copy(), out[1][:loaded].copy()
+        state.loaded, state.load = _NOWHERE, _NOTHING
+        if loaded:
+            state.loaded, state.load = out[0][:loaded].copy(), out[1][:loaded].copy()
         state.slack, state.compensation = _NONE, _NO_FORCES
         if slack:
             state.slack = np.flatnonzero(self._droppers[0])

@@ -7,8 +7,10 @@ of objects.
 import math
 from collections import namedtuple
 
+import numpy as np
+
 from models.catenary.step.mode_kernels import AMPLITUDE, HELD, INVERSE, RATE
-from models.catenary.step.vector_kernels import LANES, part
+from models.catenary.step.vector_kernels import LANES, get, part, plus_product, put, spread
 
 #: What `find` returns where a strip crosses no wire; a number below says which interval's record is lacking.
 NOWHERE = -1
@@ -42,6 +44,7 @@ Points = namedtuple(
 _FAR, _FAR_OFF = 1.0, 5.0
 #: Widths over which a contact sets in [m], see `models.catenary.contact_and_slack.crossing`.
 _STRIP_EDGE, _WIRE_EDGE = 0.05, 1.0
+_0, _LANES = np.uint64(0), np.uint64(LANES)
 #: From the place of a mode's amplitude in the table to others of the same mode.
 _TO_RATE, _TO_HELD, _TO_INVERSE = (LANES * (row - AMPLITUDE) for row in (RATE, HELD, INVERSE))
 
@@ -247,17 +250,22 @@ def press(records, record, row, force, table):
 def bend(records, record, load, force, change):
     """Add what a force on a point changes at the attachments in a step; ``load`` is that of the point."""
     interval = interval_at(records.whole, record)
+    reach = np.uint64(interval.reach)
     for j in range(interval.size):
         if load[j] != 0.0:
-            column = interval.columns + j * interval.reach
-            add_column(records.data, column, interval.first, interval.reach, force * load[j], change)
+            column = np.uint64(interval.columns) + np.uint64(j) * reach
+            add_column(records.data, column, np.uint64(interval.first), reach, force * load[j], change)
 
 
 @part
 def add_column(data, column, first, count, force, change):
     """Add ``count`` values from ``data[column]``, times a force, to displacements from ``first`` on, round the end."""
-    here = min(count, change.size - first)
-    for i in range(here):
+    here = min(count, np.uint64(change.size) - first)
+    whole = here // _LANES * _LANES
+    forces = spread(force)
+    for i in range(_0, whole, _LANES):
+        put(change, first + i, plus_product(get(change, first + i), get(data, column + i), forces))
+    for i in range(whole, here):
         change[first + i] += force * data[column + i]
     for i in range(here, count):
         change[i - here] += force * data[column + i]

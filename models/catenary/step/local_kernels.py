@@ -226,8 +226,8 @@ def _newton_step(records, points, contacts, coupling, free, unilateral, a1, cont
     for i in range(n + m):
         for j in range(n + m):
             system[i, j] = 1.0 if i == j else 0.0
-    place = np.empty(free.size, dtype=np.int64)
-    for j in range(free.size):
+    place = np.empty(free.size if m else 0, dtype=np.int64)
+    for j in range(place.size):
         place[j] = -1
     for k in range(m):
         place[slack[k]] = n + k
@@ -245,7 +245,7 @@ def _newton_step(records, points, contacts, coupling, free, unilateral, a1, cont
         for j in range(m):
             system[i, n + j] = -slope * coupling.by_dropper[i, j]
         interval = interval_at(records.whole, points.record[k])
-        for j in range(interval.stretched):
+        for j in range(interval.stretched if m else 0):
             dropper = records.whole[interval.droppers + j]
             if place[dropper] >= 0:
                 system[place[dropper], i] = unilateral[dropper] * coupling.stretch[i, j]

@@ -27,12 +27,13 @@ ENDS = 6
 #: Rows of a unit: the coupling mu G with its ends, 1 / K_hat, then the motion of its modes: amplitudes, rates, momenta,
 #: and the change of the amplitudes were the attachments held, of this step; for the next one once it is over.
 INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
-#: The modes of a line in units of eight, group by group: those of a group move with the same ends. ``end``: the first
-#: of these six; ``first``: the first unit of every group, and one more; ``rates``, shape (groups, 5): a1 / mu, a2 and
-#: a2 / mu of the modes, then c and d with -2 lambda / K_hat = c + d / K_hat, less to read than these themselves;
-#: ``more``, shape (k, 3): units that move with further ends, the first of six such, their group; ``more_coupling``,
-#: shape (k * 6 * 8,): mu G with these.
-Modes = namedtuple("Modes", "end first rates more more_coupling")
+#: The modes of a line in units of eight, group by group: those of a group move with the same six ends. ``first``: the
+#: first unit of every group, and one more; ``rates``, shape (groups, 5): a1 / mu, a2 and a2 / mu of the modes, then c
+#: and d with -2 lambda / K_hat = c + d / K_hat, less to read than these themselves; ``places``, ``shares``, shape
+#: (groups, 12): each end moves with two displacements of attachments, because intervals are turned in plan; ``more``,
+#: shape (k, 2): units that move with further ends, and their group; ``more_coupling``, ``more_places`` and
+#: ``more_shares``, shape (k, 6, 8), (k, 12), (k, 12): mu G with six such, and these.
+Modes = namedtuple("Modes", "first rates places shares more more_coupling more_places more_shares")
 _0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
 _LANES, _UNIT = np.uint64(LANES), np.uint64(ROWS * LANES)
 _R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
@@ -40,9 +41,22 @@ _R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
 )
 
 
+@part
+def end(places, shares, of, k, change):
+    """Return how an end of a group's intervals moves."""
+    return shares[of, _2 * k] * change[places[of, _2 * k]] + shares[of, _2 * k + _1] * change[places[of, _2 * k + _1]]
+
+
+@part
+def draw(places, shares, of, k, force, pull):
+    """Add a force on an end of a group's intervals to ``pull``."""
+    pull[places[of, _2 * k]] += shares[of, _2 * k] * force
+    pull[places[of, _2 * k + _1]] += shares[of, _2 * k + _1] * force
+
+
 @compiled
 def prepare(modes, table, pull):
-    """Find what modes do in the next step, were the attachments held, and what they do to the ends of their intervals.
+    """Find what modes do in the next step, were the attachments held, and what they do to these.
 
     Parameters
     ----------
@@ -51,9 +65,9 @@ def prepare(modes, table, pull):
     """
     for i in range(pull.size):
         pull[i] = 0.0
-    for group in range(modes.end.size):
-        end, rates = modes.end[group], modes.rates[group]
-        for begin in range(modes.first[group] * _UNIT, modes.first[group + 1] * _UNIT, _UNIT):
+    for group in range(np.uint64(modes.rates.shape[0])):
+        rates = modes.rates[group]
+        for begin in range(modes.first[group] * _UNIT, modes.first[group + _1] * _UNIT, _UNIT):
             for k in range(begin, begin + _LANES):
                 inverse = table[k + _INVERSE]
                 held = (rates[3] + rates[4] * inverse) * table[k + _AMPLITUDE]
@@ -61,12 +75,12 @@ def prepare(modes, table, pull):
                 table[k + _HELD] = held
                 value = rates[2] * table[k + _RATE] - held
                 for j in range(_0, np.uint64(ENDS)):
-                    pull[end + j] += table[k + j * _LANES] * value
+                    draw(modes.places, modes.shares, group, j, table[k + j * _LANES] * value, pull)
     draw_more(modes, table, pull)
 
 
 @part
-def advance(modes, a1, ends, table, pull):
+def advance(modes, a1, change, table, pull):
     """Let all modes follow the attachments, replace their motion, and prepare the next step.
 
     Parameters
@@ -74,23 +88,24 @@ def advance(modes, a1, ends, table, pull):
     modes : Modes
     a1 : float
         Of Newmark's method.
-    ends : ndarray, shape (n_ends,)
-        Change of the displacements of the intervals' ends.
+    change : ndarray, shape (n_attached,)
+        Of the attachments' displacements.
     table : ndarray, shape (N * 11 * 8,)
         Unit by unit eleven rows of eight modes, see `INVERSE`.
-    pull : ndarray, shape (n_ends,)
-        Result: forces on the ends in the next step, the attachments held.
+    pull : ndarray, shape (n_attached,)
+        Result: forces on the attachments in the next step, as long as these are held.
     """
     for i in range(pull.size):
         pull[i] = 0.0
-    follow_more(modes, ends, table)
-    fast = spread(a1)
-    for group in range(np.uint64(modes.end.size)):
-        end, rates = modes.end[group], modes.rates[group]
-        to_momentum, a2, from_rate = spread(rates[0]), spread(rates[1]), spread(rates[2])
-        stiff, less = spread(rates[3]), spread(rates[4])
-        e0, e1, e2 = spread(ends[end]), spread(ends[end + _1]), spread(ends[end + _2])
-        e3, e4, e5 = spread(ends[end + _3]), spread(ends[end + _4]), spread(ends[end + _5])
+    follow_more(modes, change, table)
+    fast, places, shares = spread(a1), modes.places, modes.shares
+    for group in range(np.uint64(modes.rates.shape[0])):
+        rates = modes.rates[group]
+        to_momentum, a2, from_rate = spread(rates[_0]), spread(rates[_1]), spread(rates[_2])
+        stiff, less = spread(rates[_3]), spread(rates[_4])
+        e0, e1 = spread(end(places, shares, group, _0, change)), spread(end(places, shares, group, _1, change))
+        e2, e3 = spread(end(places, shares, group, _2, change)), spread(end(places, shares, group, _3, change))
+        e4, e5 = spread(end(places, shares, group, _4, change)), spread(end(places, shares, group, _5, change))
         t0, t1, t2, t3, t4, t5 = nothing(), nothing(), nothing(), nothing(), nothing(), nothing()
         for k in range(modes.first[group] * _UNIT, modes.first[group + _1] * _UNIT, _UNIT):
             g0, g1, g2 = get(table, k), get(table, k + _R1), get(table, k + _R2)
@@ -98,9 +113,9 @@ def advance(modes, a1, ends, table, pull):
             moved = plus_product(plus_product(product(g0, e0), g1, e1), g2, e2)
             moved = plus_product(plus_product(plus_product(moved, g3, e3), g4, e4), g5, e5)
             inverse = get(table, k + _INVERSE)
-            change = minus_product(get(table, k + _HELD), moved, inverse)
-            quick = product(fast, change)
-            amplitude = plus_product(get(table, k + _AMPLITUDE), change, spread(1.0))
+            further = minus_product(get(table, k + _HELD), moved, inverse)
+            quick = product(fast, further)
+            amplitude = plus_product(get(table, k + _AMPLITUDE), further, spread(1.0))
             rate = minus_product(quick, get(table, k + _RATE), spread(1.0))
             momentum = minus_product(plus_product(quick, to_momentum, moved), get(table, k + _MOMENTUM), spread(1.0))
             held = product(product(a2, inverse), momentum)
@@ -112,25 +127,24 @@ def advance(modes, a1, ends, table, pull):
             value = minus_product(product(from_rate, rate), held, spread(1.0))
             t0, t1, t2 = plus_product(t0, g0, value), plus_product(t1, g1, value), plus_product(t2, g2, value)
             t3, t4, t5 = plus_product(t3, g3, value), plus_product(t4, g4, value), plus_product(t5, g5, value)
-        pull[end] += total(t0)
-        pull[end + _1] += total(t1)
-        pull[end + _2] += total(t2)
-        pull[end + _3] += total(t3)
-        pull[end + _4] += total(t4)
-        pull[end + _5] += total(t5)
+        draw(places, shares, group, _0, total(t0), pull)
+        draw(places, shares, group, _1, total(t1), pull)
+        draw(places, shares, group, _2, total(t2), pull)
+        draw(places, shares, group, _3, total(t3), pull)
+        draw(places, shares, group, _4, total(t4), pull)
+        draw(places, shares, group, _5, total(t5), pull)
     draw_more(modes, table, pull)
 
 
 @part
-def follow_more(modes, ends, table):
+def follow_more(modes, change, table):
     """Put what further ends do to the modes into ``table``, so that `advance` finds it there."""
     for i in range(np.uint64(modes.more.shape[0])):
-        begin, end, group = modes.more[i, 0] * _UNIT, modes.more[i, 1], modes.more[i, 2]
+        begin, group = modes.more[i, 0] * _UNIT, modes.more[i, 1]
         moved = nothing()
         for j in range(_0, np.uint64(ENDS)):
-            moved = plus_product(
-                moved, get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES), spread(ends[end + j])
-            )
+            coupling = get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES)
+            moved = plus_product(moved, coupling, spread(end(modes.more_places, modes.more_shares, i, j, change)))
         held, momentum = get(table, begin + _HELD), get(table, begin + _MOMENTUM)
         put(table, begin + _HELD, minus_product(held, moved, get(table, begin + _INVERSE)))
         put(table, begin + _MOMENTUM, minus_product(momentum, spread(modes.rates[group, 0]), moved))
@@ -140,8 +154,9 @@ def follow_more(modes, ends, table):
 def draw_more(modes, table, pull):
     """Add what modes do to further ends to ``pull``."""
     for i in range(np.uint64(modes.more.shape[0])):
-        begin, end, group = modes.more[i, 0] * _UNIT, modes.more[i, 1], modes.more[i, 2]
+        begin, group = modes.more[i, 0] * _UNIT, modes.more[i, 1]
         value = product(spread(modes.rates[group, 2]), get(table, begin + _RATE))
         value = minus_product(value, spread(1.0), get(table, begin + _HELD))
         for j in range(_0, np.uint64(ENDS)):
-            pull[end + j] += total(product(value, get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES)))
+            force = total(product(value, get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES)))
+            draw(modes.more_places, modes.more_shares, i, j, force, pull)

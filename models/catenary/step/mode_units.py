@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
 from models.catenary.linear_motion.interval_modes import IntervalModes
@@ -55,12 +57,16 @@ class ModeUnits:
         (alpha, beta), a2 = damping[groups].T, np.full(len(groups), newmark.a2)
         # K_hat = lambda (1 + a1 alpha) + mu
         mu, stiff = newmark.a0 + newmark.a1 * beta, -2.0 / (1.0 + newmark.a1 * alpha)
+        places, shares = _turned(modes.turn, np.concatenate([where[groups], end])[:, None] + np.arange(width))
         self.arrays = kernels.Modes(
-            end=where[groups].astype(np.uint64),
             first=np.append(groups, n_units).astype(np.uint64),
             rates=np.stack([newmark.a1 / mu, a2, newmark.a2 / mu, stiff, -stiff * mu], axis=1),
-            more=np.stack([pairs[:, 0], end, group[pairs[:, 0]]], axis=1).astype(np.uint64),
+            places=places[: len(groups)],
+            shares=shares[: len(groups)],
+            more=np.stack([pairs[:, 0], group[pairs[:, 0]]], axis=1).astype(np.uint64),
             more_coupling=aligned(more),
+            more_places=places[len(groups) :],
+            more_shares=shares[len(groups) :],
         )
         begin = unit * kernels.ROWS * lanes + lane
         self.slots, self.rate, self.momentum, self.held = (
@@ -68,7 +74,7 @@ class ModeUnits:
         )
         self.table = table.ravel()
         self.table[begin + kernels.INVERSE * lanes] = matrices.inverse
-        self.step, self.n_ends = newmark.step, n_ends
+        self.step, self.n_attached = newmark.step, modes.turn.shape[1]
 
 
 def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:
@@ -78,6 +84,20 @@ def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:
     unit = np.zeros(len(modes.eigenvalue), dtype=np.int64)
     unit[first[1:]] = 1
     return np.array(first, dtype=np.int64), np.cumsum(unit)
+
+
+def _turned(turn: sp.csr_matrix, ends: IntArray) -> tuple[Any, FloatArray]:
+    """Return which two displacements of attachments each end moves with, and how, both of shape (N, 2 n_ends)."""
+    rows = sp.csr_matrix(turn)
+    counts = np.diff(rows.indptr)
+    assert counts.max(initial=0) <= 2, "an interval is turned in plan alone"
+    places, shares = np.zeros((rows.shape[0], 2), dtype=np.uint32), np.zeros((rows.shape[0], 2))
+    for k in (1, 0):  # where there is one alone, it is written to both places, and counts once
+        has = counts > k
+        at = rows.indptr[:-1][has]
+        places[has, k], shares[has, k] = rows.indices[at + k], rows.data[at + k]
+    places[counts == 1, 1] = places[counts == 1, 0]
+    return places[ends].reshape(len(ends), -1), shares[ends].reshape(len(ends), -1)
 
 
 class PackedMotion:
@@ -97,7 +117,7 @@ class PackedMotion:
         self.table = aligned(units.table)
         self.table[units.slots], self.table[units.rate] = modal
         self.table[units.momentum] = momentum
-        self.pull = np.zeros(units.n_ends)
+        self.pull = np.zeros(units.n_attached)
         if prepared.size:
             self.table[units.held], self.pull[:] = np.split(prepared[1:], [len(momentum)])
 
@@ -110,5 +130,5 @@ class PackedMotion:
             self.moved = False
 
     def prepared(self) -> FloatArray:
-        """Return what has been found for the next step: step size, changes of the modes, forces on the ends."""
+        """Return what has been found for the next step: step size, changes of the modes, forces on the attachments."""
         return np.concatenate(([self.units.step], self.table[self.units.held], self.pull))

@@ -47,11 +47,9 @@ def step(line, moving, state, strips, given, records, work, report, out):
 
     Parameters
     ----------
-    line : (constants, Lanes, Modes, Droppers, Wires, turn and back), as plain tuples
+    line : (constants, Lanes, Modes, Droppers, Wires), as plain tuples
         constants : ndarray, shape (5,)
             a1, then ``contact`` of `law_of`.
-        turn, back : six ndarray
-            To the axes of the intervals and back, rows, columns and values each, compressed by rows.
     moving : (attached, table, pull)
         attached : ndarray, shape (2, n_attached)
         table, pull
@@ -63,7 +61,7 @@ def step(line, moving, state, strips, given, records, work, report, out):
     given : (loaded, load)
         Known forces on the wires at the end of the step.
     records : Records
-    work : (lanes, change, ends, pressed, free, local, whole, numbers, row, load, chosen), arrays to work in
+    work : (lanes, change, pressed, free, local, whole, numbers, row, load, chosen), arrays to work in
     report : ndarray of int, shape (5,)
         See above; all zero at first.
     out : (force, point, loaded, load, points, slack, lacks, pull)
@@ -79,29 +77,29 @@ def step(line, moving, state, strips, given, records, work, report, out):
     int
         DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS or DROPPER_LACKS; ``report[LACKS]`` says which.
     """
-    constants, lanes, modes, droppers, wires, turns = line
+    constants, lanes, modes, droppers, wires = line
     droppers, wires, records = Droppers(*droppers), Wires(*wires), Records(*records)
     lanes, modes = Lanes(*lanes), Modes(*modes)
     attached, table, pull = moving
     element, impact = state[0], state[1]
-    whole, numbers = work[6], work[7]
+    whole, numbers = work[5], work[6]
     points = Points(
         whole[0], whole[1], whole[2], whole[3], whole[4],
         numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6],
-        work[8], work[9],
+        work[7], work[8],
     )  # fmt: skip
-    change, free, chosen, size = work[1], work[4], work[10], attached.shape[1]
+    change, free, chosen, size = work[1], work[3], work[9], attached.shape[1]
     motion = constants[0], table, change, attached
     if report[STAGE] < _BEGUN:
         lacking = _unknown(wires, records, state[2], given[0])
         if lacking >= 0:
             report[LACKS] = lacking
             return INTERVAL_LACKS
-        _begin(lanes, droppers, wires, records, moving, state, turns, work)
+        _begin(lanes, droppers, wires, records, moving, state, work)
         _push(wires, records, given, points, motion)
         _put_free(droppers, motion, free)
         report[STAGE] = _BEGUN
-    lacking, count = _meet(wires, records, element, impact, strips[0], constants[4], motion, work[5], points, report)
+    lacking, count = _meet(wires, records, element, impact, strips[0], constants[4], motion, work[4], points, report)
     if lacking >= 0:
         report[LACKS] = lacking
         return INTERVAL_LACKS
@@ -123,7 +121,7 @@ def step(line, moving, state, strips, given, records, work, report, out):
         report[SLACK], report[LOADED] = _count(out[5]), n
         return NO_SOLUTION if answer == SINGULAR else NOT_SETTLED
     _apply(records, points, contacts, out, motion)
-    _follow(modes, turns, motion, work[2], pull)
+    _follow(modes, motion, pull)
     _note(points, contacts, given, impact, out, report)
     _put_result(wires, records, points, contacts, count, strips[0], motion, out)
     return DONE
@@ -141,11 +139,11 @@ def _unknown(wires, records, loaded, given):
 
 
 @part
-def _begin(lanes, droppers, wires, records, moving, state, turns, work):
+def _begin(lanes, droppers, wires, records, moving, state, work):
     """Find the change of the attachments under the forces at the beginning of the step, and known ones at its end."""
     attached, table, pull = moving
     loaded, force, slack, compensation = state[2], state[3], state[4], state[5]
-    change, pressed = work[1], work[3]
+    change, pressed = work[1], work[2]
     for i in range(pressed.size):
         pressed[i] = droppers.known[i]
     for k in range(slack.size):
@@ -154,14 +152,14 @@ def _begin(lanes, droppers, wires, records, moving, state, turns, work):
     for k in range(loaded.shape[0]):
         number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
         record, place = records.intervals[number], loaded[k, 1] - wires.begins[number]
-        row, share = work[8][0], work[9][0]
+        row, share = work[7][0], work[8][0]
         point(records, record, place, force[k, 0], table, row, share)
         press(records, record, row, force[k, 1], table)
         interval = interval_at(records.whole, record)
         for j in range(interval.size):
             pressed[records.whole[interval.ends + j]] += force[k, 1] * share[j]
     lanes_work = LanesWork(*work[0])
-    load(lanes, (turns[3], turns[4], turns[5]), attached, pressed, pull, lanes_work)
+    load(lanes, attached, pressed, pull, lanes_work)
     solve(lanes, lanes_work, change)
 
 
@@ -259,23 +257,24 @@ def _apply(records, points, contacts, out, motion):
     for j in range(is_slack.size):
         if is_slack[j]:
             dropper = dropper_at(records.whole, records.droppers[j])
-            add_column(records.data, dropper.column, dropper.first, dropper.reach, -lacks[j], change)
+            add_column(
+                records.data,
+                np.uint64(dropper.column),
+                np.uint64(dropper.first),
+                np.uint64(dropper.reach),
+                -lacks[j],
+                change,
+            )
 
 
 @part
-def _follow(modes, turns, motion, ends, pull):
+def _follow(modes, motion, pull):
     """Replace the motion by that at the end of the step."""
     a1, table, change, attached = motion
-    rows, columns, values = turns[0], turns[1], turns[2]
-    for i in range(ends.size):
-        moved = 0.0
-        for k in range(rows[i], rows[i + _1]):
-            moved += values[k] * change[columns[k]]
-        ends[i] = moved
     for i in range(change.size):
         attached[0, i] += change[i]
         attached[1, i] = a1 * change[i] - attached[1, i]
-    advance(modes, a1, ends, table, pull)
+    advance(modes, a1, change, table, pull)
 
 
 @part

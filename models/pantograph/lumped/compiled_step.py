@@ -35,13 +35,15 @@ class CompiledStep:
         self._model = model
         self._constants = np.array(kernels.Constants(**_constants(model.definition)))
         self._known = np.zeros(kernels.WIDTH)
+        self._following: dict[float, FloatArray] = {}
         self._step = kernels.step
         self.rehearse()
 
     def rehearse(self) -> None:
         """Take a trial step, so that the first real one finds everything compiled: a paced run must not wait for it."""
         n, h = self._model.size, self._model.definition.time_step
-        self.step(np.zeros(4 * n), (0.0, 0.0, h), 1, (0.0, 0.0), np.zeros(2), np.zeros(12 + 3 * n))
+        when, nothing = (0.0, 0.0, h), (0.0, 0.0, 0.0)
+        self.step(np.zeros(4 * n), when, 1, (0.0, 0.0), np.zeros(2), nothing, np.zeros(n), np.zeros(12 + 3 * n))
 
     def take(self, force: ForceExtrapolation) -> None:
         """Go on from what is known of the contact force."""
@@ -59,9 +61,11 @@ class CompiledStep:
         count: int,
         contact: tuple[float, float],
         base: FloatArray,
+        hung: tuple[float, float, float],
+        own: FloatArray,
         outputs: FloatArray,
-    ) -> None:
-        """Make a macro step.
+    ) -> float:
+        """Make a macro step; return the reference that the lowest spring hangs on, if it follows the height [m].
 
         Parameters
         ----------
@@ -75,11 +79,29 @@ class CompiledStep:
             Contact force [N] and its place along the track [m].
         base : ndarray, shape (2,)
             Height and velocity of the roof [m, m/s].
+        hung : (float, float, float)
+            That reference, the height of the roof at the end of the step before, and the rate given from outside
+            [m, m, m/s].
+        own : ndarray, shape (n,)
+            Loads that do not change in the step [N].
         outputs : ndarray, shape (12 + 3 n,)
             Result.
         """
-        transition = self._model.transition(when[2] / count)
-        self._step(self._known, values, transition, self._constants, *when, count, *contact, base, outputs)
+        h = when[2] / count
+        transition, following = self._model.transition(h), self._follower(h)
+        known, constants = self._known, self._constants
+        return self._step(
+            known, values, transition, constants, *when, count, *contact, base, *hung, following, own, outputs
+        )
+
+    def _follower(self, h: float) -> FloatArray:
+        """Return stiffness and coefficients of the reference in a step [s], shape (5,); stiffness 0: it is fixed."""
+        found = self._following.get(h)
+        if found is None:
+            found = self._following[h] = np.zeros(5)
+            if self._model.follows:
+                found[:] = self._model.definition.stage[0].stiffness, *self._model.following(h)[1:]
+        return found
 
 
 def compiled_step(model: LumpedModel) -> CompiledStep | None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from models.definition_files import field_schema
-from models.definition_files.field_schema import quantity, text
+from models.definition_files.field_schema import count, quantity, series, text
 from models.definition_files.parameter import Parameter
 from models.definition_files.toml_reader import Quantity, Table
 from models.pantograph.operation import Operation
@@ -44,7 +44,32 @@ class LumpedDefinition(Operation):
     static_force: float = quantity(
         "N", "static uplift on the lowest mass at the reference height", minimum=0.0, maximum=5e3
     )
+    follow_height: int = count(
+        "whether the lowest spring hangs on a reference that follows the working height: 0 on the roof, 1 following",
+        default=0,
+        maximum=1,
+    )
+    reference_time: float = quantity(
+        "s", "time constant of the reference that follows the height", default=0.5, minimum=0.05, maximum=100.0
+    )
+    aerodynamic_share: tuple[float, ...] = series(
+        "1", "share of the aerodynamic uplift that acts on each stage", default=(), minimum=0.0, maximum=1.0
+    )
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield what is wrong with the direction and the shares of the air's force."""
+        yield from super().problems()
+        share, stages = self.aerodynamic_share, len(self.stage)
+        if share and len(share) != stages:
+            yield "aerodynamic_share", f"has {len(share)} values for {stages} stages"
+        elif share and abs(sum(share) - 1.0) > 1e-9:
+            yield "aerodynamic_share", f"sums to {sum(share):.6g}, not to 1"
+
+    @property
+    def air_shares(self) -> tuple[float, ...]:
+        """Share of the aerodynamic uplift on each stage, all on the lowest unless the definition says otherwise."""
+        return self.aerodynamic_share or (1.0, *[0.0] * (len(self.stage) - 1))
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return every tunable number."""

@@ -12,7 +12,8 @@ from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 class LumpedBalance:
     """Add up, step by step, the work of all loads on the masses and what the dampers take.
 
-    Energy counts from where the springs carry the weights; the roof's motion is a load.
+    Energy counts from where the springs carry the weights; the roof's motion is a load. A lowest spring that hangs on a
+    reference is counted apart: what it stores, what the reference takes in following, what moves it and the roof do.
 
     Parameters
     ----------
@@ -21,12 +22,21 @@ class LumpedBalance:
         Load on the masses at the beginning, the contact force included [N].
     force : float
         Contact force at the beginning [N].
+
+    Attributes
+    ----------
+    stretch : float
+        Of a lowest spring that hangs on a reference, as it is [m].
     """
 
     def __init__(self, model: LumpedModel, load: FloatArray, force: float) -> None:
         self._model = model
         self._load, self._force = load.copy(), force
         self._ledger = Ledger(np.zeros(1))
+        self._stiffness = model.K.copy()
+        self._hung = model.definition.stage[0].stiffness if model.follows else 0.0
+        self._stiffness[0, 0] -= self._hung
+        self.stretch = 0.0
 
     @property
     def contact_work(self) -> FloatArray:
@@ -53,16 +63,35 @@ class LumpedBalance:
         ledger.at_contact += 0.5 * (self._force + force) * change[-1]
         self._load, self._force = load, force
 
+    def add_reference(self, integrals: tuple[float, float], rate: float) -> None:
+        """Add what the lowest spring does in a step if it hangs on a reference that follows the height.
+
+        Parameters
+        ----------
+        integrals : (float, float)
+            Of its stretch and of the stretch's square over the step [m.s, m2.s].
+        rate : float
+            Of the roof and of the reference, as given from outside, together [m/s].
+        """
+        first, second = integrals
+        self._ledger.work -= self._hung * rate * first
+        self._ledger.dissipated += self._hung / self._model.definition.reference_time * second
+
     def balance(self, state: LumpedState) -> FloatArray:
         """Return the values of `models.numerics.energy_ledger.BALANCE` [J], shape (4,)."""
         d, v, model = state.displacement, state.velocity, self._model
-        return self._ledger.balance(0.5 * float(v @ model.M @ v + d @ model.K @ d))
+        stored = v @ model.M @ v + d @ self._stiffness @ d + self._hung * self.stretch**2
+        return self._ledger.balance(0.5 * float(stored))
 
     def snapshot(self) -> Snapshot:
         """Return the whole state."""
-        return self._ledger.snapshot() | {"energy.load": self._load.copy(), "energy.force": np.array([self._force])}
+        return self._ledger.snapshot() | {
+            "energy.load": self._load.copy(),
+            "energy.force": np.array([self._force, self.stretch]),
+        }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
         self._ledger.restore(snapshot)
-        self._load, self._force = snapshot["energy.load"].astype(np.float64), float(snapshot["energy.force"][0])
+        self._load = snapshot["energy.load"].astype(np.float64)
+        self._force, self.stretch = (float(v) for v in snapshot["energy.force"])

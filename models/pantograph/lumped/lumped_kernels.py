@@ -35,7 +35,10 @@ _compiled = njit(cache=True, error_model="numpy")
 
 
 @_compiled
-def step(known, values, transition, constants, began, time, duration, count, force, x, base, outputs):
+def step(
+    known, values, transition, constants, began, time, duration, count, force, x, base,
+    reference, roof, rate, following, own, outputs,
+):  # fmt: skip
     """Step from ``time`` over ``duration`` in ``count`` equal steps.
 
     Parameters
@@ -55,8 +58,19 @@ def step(known, values, transition, constants, began, time, duration, count, for
         Contact force [N] and place along the track [m] where it acts, as received.
     base : ndarray, shape (2,)
         Height and velocity of the roof [m, m/s].
+    reference, roof, rate : float
+        What the lowest spring hangs on, height of the roof before, rate given from outside [m, m, m/s].
+    following : ndarray, shape (5,)
+        Stiffness of a spring that follows (0: none), keep, before, after, lead; see `FollowingReference`.
+    own : ndarray, shape (n,)
+        Loads that do not change in the step [N].
     outputs : ndarray, shape (12 + 3 n,)
         Result: ends of the strip and what is observed of the masses.
+
+    Returns
+    -------
+    float
+        The reference after the step [m].
     """
     c = Constants(*constants_of(constants))
     rows, columns = transition.shape
@@ -66,9 +80,12 @@ def step(known, values, transition, constants, began, time, duration, count, for
     for k in range(1, count + 1):
         end = time + k * h
         height, velocity = base[0] + k * h * base[1], base[1]
-        values[rows:] = 0.0
+        values[rows:] = own
         uplift = c.static_force * raised(end - began, c.raise_start, c.raise_duration)
-        values[rows] = uplift + (c.stiffness * height + c.damping * velocity)
+        values[rows] += uplift + (c.stiffness * height + c.damping * velocity)
+        before = values[0] - roof
+        reference = following[1] * reference + following[2] * before + following[4] * rate
+        values[rows] += following[0] * (reference - following[3] * height)
         values[rows + n - 1] -= at(known, c.order, end)
         for i in range(rows):
             total = 0.0
@@ -76,7 +93,10 @@ def step(known, values, transition, constants, began, time, duration, count, for
                 total += transition[i, j] * values[j]
             result[i] = total
         values[:rows] = result
+        reference += following[3] * (values[0] - height)
+        roof = height
     place(values, c.start_position + c.speed * (time + duration - began), c.reference_height, n, outputs)
+    return reference
 
 
 @_compiled

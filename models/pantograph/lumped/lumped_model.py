@@ -8,6 +8,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.numerics.newmark import Newmark
+from models.pantograph.lumped.following_reference import FollowingReference
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 
 
@@ -19,11 +20,14 @@ class LumpedState:
     ----------
     displacement, velocity, acceleration : ndarray, shape (n,)
         Of the masses, bottom to top, from where the springs carry the weights [m, m/s, m/s2].
+    reference : float
+        Where the lowest spring hangs, above the roof, if that follows the height [m].
     """
 
     displacement: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
+    reference: float = 0.0
 
 
 class LumpedModel:
@@ -42,6 +46,8 @@ class LumpedModel:
         self.C = _chain([s.damping for s in definition.stage])
         self.K = _chain([s.stiffness for s in definition.stage])
         self.size = n
+        self.follows = bool(definition.follow_height)
+        self._following: dict[float, FollowingReference] = {}
         self._inverse: dict[float, tuple[Newmark, FloatArray]] = {}
         self._transition: dict[float, FloatArray] = {}
 
@@ -49,6 +55,38 @@ class LumpedModel:
         """Return the pantograph at rest at its reference height, its acceleration that of ``load``, shape (n,) [N]."""
         acceleration = np.zeros(self.size) if load is None else load / np.diag(self.M)
         return LumpedState(np.zeros(self.size), np.zeros(self.size), acceleration)
+
+    def following(self, step: float) -> FollowingReference:
+        """Return how the reference moves in a step [s], if it follows."""
+        found = self._following.get(step)
+        if found is None:
+            found = FollowingReference.within(step, self.definition.reference_time)
+            self._following[step] = found
+        return found
+
+    def stiffness_within(self, step: float) -> FloatArray:
+        """Return K of a step [s]: the part of the lowest spring that does not follow within it."""
+        if not self.follows:
+            return self.K
+        K = self.K.copy()
+        K[0, 0] -= self.definition.stage[0].stiffness * self.following(step).after
+        return K
+
+    def reference_load(self, reference: float, above_roof: float, rate: float, step: float) -> float:
+        """Return the load of the reference on the lowest mass in a step [N], 0 if it does not follow.
+
+        Parameters
+        ----------
+        reference, above_roof : float
+            Of the reference and of the lowest mass at the beginning of the step [m].
+        rate : float
+            Given from outside [m/s].
+        step : float
+            [s]
+        """
+        if not self.follows:
+            return 0.0
+        return self.definition.stage[0].stiffness * self.following(step).known(reference, above_roof, rate)
 
     def free_response(self, state: LumpedState, step: float, load: FloatArray) -> FloatArray:
         """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value."""
@@ -58,6 +96,9 @@ class LumpedModel:
         motion = list(zip(displacement.tolist(), velocity.tolist(), acceleration.tolist(), strict=True))
         inertia = [m * (n.a0 * d + n.a2 * v + n.a3 * a) for m, (d, v, a) in zip(self._masses, motion, strict=True)]
         damping = [n.a1 * d + n.a4 * v + n.a5 * a for d, v, a in motion]
+        if self.follows:
+            load = load.copy()
+            load[0] += self.reference_load(state.reference, float(displacement[0]), 0.0, step)
         result: FloatArray = inverse.dot(load + inertia + self.C.dot(damping))
         return result
 
@@ -73,6 +114,9 @@ class LumpedModel:
     def advance(self, state: LumpedState, step: float, displacement: FloatArray) -> None:
         """Replace the state by the one that belongs to a new displacement."""
         velocity, acceleration = self._rates(state, step, displacement)
+        if self.follows:
+            before, after = float(state.displacement[0]), float(displacement[0])
+            state.reference = self.following(step).moved(state.reference, before, after, 0.0)
         state.displacement = displacement
         state.velocity, state.acceleration = np.array(velocity), np.array(acceleration)
 
@@ -98,8 +142,9 @@ class LumpedModel:
         motion, load = known[: 3 * self.size], known[3 * self.size :]
         velocity = motion[1::3] + (1.0 - gamma) * h * motion[2::3]
         displacement = motion[0::3] + h * motion[1::3] + (0.5 - beta) * h**2 * motion[2::3]
-        inertia = self.M + gamma * h * self.C + beta * h**2 * self.K
-        acceleration = np.linalg.solve(inertia, load - self.C @ velocity - self.K @ displacement)
+        K = self.stiffness_within(h)
+        inertia = self.M + gamma * h * self.C + beta * h**2 * K
+        acceleration = np.linalg.solve(inertia, load - self.C @ velocity - K @ displacement)
         result = np.empty((3 * self.size, 4 * self.size))
         result[0::3] = displacement + beta * h**2 * acceleration
         result[1::3] = velocity + gamma * h * acceleration
@@ -132,7 +177,7 @@ class LumpedModel:
     def _effective(self, step: float) -> tuple[Newmark, FloatArray]:
         if step not in self._inverse:
             newmark = Newmark(step)
-            inverse = np.linalg.inv(self.K + newmark.a0 * self.M + newmark.a1 * self.C)
+            inverse = np.linalg.inv(self.stiffness_within(step) + newmark.a0 * self.M + newmark.a1 * self.C)
             self._inverse[step] = newmark, np.asarray(inverse, dtype=np.float64)
         return self._inverse[step]
 

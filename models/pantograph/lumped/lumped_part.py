@@ -12,6 +12,7 @@ from models.pantograph.lumped.compiled_step import CompiledStep, compiled_step
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+from models.pantograph.operation import NO_DRIVE, Drive
 
 
 class LumpedPantographPart:
@@ -50,11 +51,16 @@ class LumpedPantographPart:
         self._rest = np.array([definition.reference_height, 0.0, 0.0] * n)
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._base = np.zeros(2)
+        self._roof = 0.0
+        self._shares = np.array(definition.air_shares)
+        self._own = np.zeros(n)
         self._balance: LumpedBalance | None = None
         self._compiled: CompiledStep | None = None
         self.observed = _observed(n)
 
-    def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
+    def initialise(
+        self, time: float, force: float, point: FloatArray, base: FloatArray, drive: Drive = NO_DRIVE
+    ) -> None:
         """Set the pantograph to rest at its reference height at ``time``.
 
         Parameters
@@ -65,10 +71,16 @@ class LumpedPantographPart:
             Its point of application [m]; unused by masses on a line.
         base : ndarray, shape (2,)
             Height and vertical velocity of the roof [m, m/s].
+        drive : Drive
+            What else acts.
         """
         del point
         self.time = self._start_time = time
-        load = self.model.load(0.0, base)
+        self._roof = float(base[0])
+        self.state.reference = -self._roof
+        load = self.model.load(0.0, base) + self._drive_loads(drive)
+        if self.model.follows:  # the reference starts where the mass is
+            load[0] -= self.definition.stage[0].stiffness * self._roof
         load[-1] -= force
         self._motion[:] = 0.0
         self.state.acceleration[:] = self.model.initial_state(load).acceleration
@@ -77,12 +89,18 @@ class LumpedPantographPart:
         self._compile()
         self._place()
 
-    def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
+    def step(self, force: float, point: FloatArray, base: FloatArray, step: float, drive: Drive = NO_DRIVE) -> None:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
         start, x, count = self.time, point.item(0), steps_within(step, self.definition.time_step)
         self.time = start + step
+        self._own[:] = self._drive_loads(drive)
         if self._compiled is not None:
-            self._compiled.step(self._values, (self._start_time, start, step), count, (force, x), base, self.outputs)
+            when, contact = (self._start_time, start, step), (force, x)
+            hung = (self.state.reference, self._roof, drive.reference_rate)
+            self.state.reference = self._compiled.step(
+                self._values, when, count, contact, base, hung, self._own, self.outputs
+            )
+            self._roof = float(base[0]) + step * float(base[1])
             return
         self._force.receive_at(start, force, x, self._x(start), self.definition.speed, step)
         h = step / count
@@ -90,7 +108,7 @@ class LumpedPantographPart:
         for k in range(1, count + 1):
             # Received for the step's beginning; the roof continues with its velocity.
             self._base[...] = height + k * h * velocity, velocity
-            self._substep(start + k * h, h)
+            self._substep(start + k * h, h, drive.reference_rate)
         self._place()
 
     @property
@@ -116,6 +134,7 @@ class LumpedPantographPart:
             "displacement": self.state.displacement.copy(),
             "velocity": self.state.velocity.copy(),
             "acceleration": self.state.acceleration.copy(),
+            "reference": np.array([self.state.reference, self._roof]),
             **self._force.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
@@ -125,6 +144,7 @@ class LumpedPantographPart:
         self.time, self._start_time = (float(t) for t in snapshot["time"])
         for name in ("displacement", "velocity", "acceleration"):
             getattr(self.state, name)[:] = snapshot[name]
+        self.state.reference, self._roof = (float(v) for v in snapshot["reference"])
         self._force.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
@@ -138,15 +158,44 @@ class LumpedPantographPart:
         if self._compiled is not None:
             self._compiled.take(self._force)
 
-    def _substep(self, time: float, h: float) -> None:
-        load = self.model.load(time - self._start_time, self._base)
+    def _substep(self, time: float, h: float, rate: float) -> None:
+        load = self.model.load(time - self._start_time, self._base) + self._own
         force = self._force.at(time)
         load[-1] -= force
+        outer = load.copy()
+        before = self._motion.item(0) - self._roof
+        if self.model.follows:
+            self._hang(load, outer, before, h, rate)
         self._load[:] = load
         after = self.model.transition(h).dot(self._values)
         if self._balance is not None:
-            self._balance.add(h, after[0::3] - self.state.displacement, load, force)
+            self._balance.add(h, after[0::3] - self.state.displacement, outer, force)
+        if self.model.follows:
+            self._follow(before, float(after[0]) - self._base.item(0), h, rate)
+        self._roof = self._base.item(0)
         self._motion[:] = after
+
+    def _hang(self, load: FloatArray, outer: FloatArray, before: float, h: float, rate: float) -> None:
+        """Let the lowest spring hang on the reference; its work is not that of an outer load."""
+        stiffness, height = self.definition.stage[0].stiffness, self._base.item(0)
+        load[0] += self.model.reference_load(self.state.reference, before, rate, h)
+        load[0] -= stiffness * self.model.following(h).after * height
+        outer[0] -= stiffness * height
+
+    def _follow(self, before: float, after: float, h: float, rate: float) -> None:
+        following = self.model.following(h)
+        if self._balance is not None:
+            motion, roof = (before - self.state.reference, (after - before) / h), (self._base.item(0) - self._roof) / h
+            self._balance.add_reference(following.integrals(*motion, rate, h), roof + rate)
+        self.state.reference = following.moved(self.state.reference, before, after, rate)
+        if self._balance is not None:
+            self._balance.stretch = after - self.state.reference
+
+    def _drive_loads(self, drive: Drive) -> FloatArray:
+        """Return what the air and a force from outside load the masses with, shape (n,) [N]."""
+        loads = self._shares * self.definition.aerodynamic_force(drive.air)
+        loads[0] += drive.uplift
+        return loads
 
     def _x(self, time: float) -> float:
         return self.definition.start_position + self.definition.speed * (time - self._start_time)

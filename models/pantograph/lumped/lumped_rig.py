@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.arrays import ComplexArray, FloatArray
+from models.pantograph.lumped.following_reference import link_stiffness
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel
 
@@ -28,7 +30,11 @@ class LumpedMode:
 
 
 def chain_stiffness(
-    frequency: FloatArray, masses: FloatArray, dampings: FloatArray, stiffnesses: FloatArray
+    frequency: FloatArray,
+    masses: FloatArray,
+    dampings: FloatArray,
+    stiffnesses: FloatArray,
+    reference_time: float = math.inf,
 ) -> ComplexArray:
     """Return the dynamic stiffness at the top of a chain of masses on fixed ground, shape (f,) [N/m].
 
@@ -38,11 +44,15 @@ def chain_stiffness(
         [Hz]
     masses, dampings, stiffnesses : ndarray, shape (n,)
         Bottom to top; damper and spring i connect mass i to the one below.
+    reference_time : float
+        Time constant of a lowest spring that hangs on a reference following the height [s]; infinite: on the ground.
     """
     s = 2j * np.pi * np.asarray(frequency)
     total: ComplexArray | None = None
     for m, c, k in zip(masses, dampings, stiffnesses, strict=True):
         link = k + s * c
+        if total is None and math.isfinite(reference_time):
+            link = link_stiffness(np.asarray(frequency), k, c, reference_time)
         total = s**2 * m + (link if total is None else link * total / (link + total))
     if total is None:
         raise ValueError("a chain needs at least one stage")
@@ -51,6 +61,8 @@ def chain_stiffness(
 
 def contact_force_over_height(definition: LumpedDefinition, heights: FloatArray) -> FloatArray:
     """Return the static contact force that holds the strip at given heights above top of rail [N].
+
+    The static force itself where the lowest spring follows the height.
 
     Parameters
     ----------
@@ -61,6 +73,8 @@ def contact_force_over_height(definition: LumpedDefinition, heights: FloatArray)
     -------
     ndarray, shape (h,)
     """
+    if definition.follow_height:
+        return np.full(len(heights), definition.static_force)
     flexibility = np.linalg.inv(LumpedModel(definition).K)
     free_rise = flexibility[-1, 0] * definition.static_force
     result: FloatArray = (free_rise - (heights - definition.reference_height)) / flexibility[-1, -1]
@@ -69,14 +83,29 @@ def contact_force_over_height(definition: LumpedDefinition, heights: FloatArray)
 
 def modes(definition: LumpedDefinition) -> tuple[LumpedMode, ...]:
     """Return the modes with a free strip, slowest first."""
-    model = LumpedModel(definition)
-    inverse = np.linalg.inv(model.M)
-    n = model.size
-    system = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ model.K, -inverse @ model.C]])
-    eigenvalues = np.linalg.eigvals(system)
+    eigenvalues = np.linalg.eigvals(_motion(definition))
     kept = [s for s in eigenvalues if s.imag > 0.0 or abs(s.imag) < 1e-9]
-    found = [LumpedMode(float(abs(s)) / (2.0 * np.pi) if s.imag > 0.0 else 0.0, float(-s.real / abs(s))) for s in kept]
+    found = [LumpedMode(float(abs(s)) / (2.0 * np.pi) if s.imag > 0.0 else 0.0, _damping(complex(s))) for s in kept]
     return tuple(sorted(found, key=lambda mode: mode.frequency))
+
+
+def _damping(s: complex) -> float:
+    return -s.real / abs(s) if abs(s) > 1e-9 else 0.0
+
+
+def _motion(definition: LumpedDefinition) -> FloatArray:
+    """Return the matrix of the free motion: displacements, velocities, and the reference if it follows the height."""
+    model = LumpedModel(definition)
+    n, inverse = model.size, np.linalg.inv(model.M)
+    system = np.zeros((2 * n + 1, 2 * n + 1))
+    system[:n, n : 2 * n] = np.eye(n)
+    system[n : 2 * n, :n] = -inverse @ model.K
+    system[n : 2 * n, n : 2 * n] = -inverse @ model.C
+    if not model.follows:
+        return system[:-1, :-1]
+    system[n : 2 * n, -1] = inverse[:, 0] * definition.stage[0].stiffness
+    system[-1, 0], system[-1, -1] = np.array([1.0, -1.0]) / definition.reference_time
+    return system
 
 
 def apparent_mass(definition: LumpedDefinition, frequency: FloatArray) -> ComplexArray:
@@ -87,5 +116,6 @@ def apparent_mass(definition: LumpedDefinition, frequency: FloatArray) -> Comple
         np.array([s.mass for s in stages]),
         np.array([s.damping for s in stages]),
         np.array([s.stiffness for s in stages]),
+        definition.reference_time if definition.follow_height else math.inf,
     )
     return -stiffness / (2.0 * np.pi * np.asarray(frequency)) ** 2

@@ -51,12 +51,15 @@ class Inputs(NamedTuple):
         Contact force, positive pushes the strip down [N].
     lateral : float
         y of its point of application [m].
+    uplift : float
+        Force that the lifting element brings to the strip besides [N].
     """
 
     base: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lift: float = 0.0
     force: float = 0.0
     lateral: float = 0.0
+    uplift: float = 0.0
 
 
 class State(NamedTuple):
@@ -257,16 +260,19 @@ class Mechanism:
         if vectors is None:
             vectors = self.pool.evaluate(kinematics)
         w = y[10 * self.count :].reshape(-1, 3)
-        loads = self.forces.loads(kinematics, vectors, w, inputs.lift, lifted=lifted)
+        lift = self.forces.lift_value(kinematics, inputs.lift, inputs.uplift) if lifted else 0.0
+        loads = self.forces.loads(kinematics, vectors, w, lift)
         loads += self._weights
         if inputs.force != 0.0:
             frame = kinematics.frames[self.strip_body, :3]
             loads[self.strip_body] += self.contact_load(y, inputs, frame)
         return loads
 
-    def lift_value(self, y: FloatArray, lift: float) -> float:
+    def lift_value(self, y: FloatArray, inputs: Inputs) -> float:
         """Return the force or moment of the lifting element [N or N.m] for what is set of it."""
-        return lift if self.forces.cam is None else self.forces.lift_value(self.kinematics(y), lift)
+        if self.forces.cam is None and inputs.uplift == 0.0:
+            return inputs.lift
+        return self.forces.lift_value(self.kinematics(y), inputs.lift, inputs.uplift)
 
     def constraint_values(self, kinematics: Kinematics) -> ConstraintValues:
         """Return all constraints."""

@@ -533,6 +533,9 @@ class MechanismDefinition(Operation):
 
     def problems(self) -> Iterator[tuple[str, str]]:
         """Yield what is wrong with the values of what lifts."""
+        yield from super().problems()
+        if any(self.aerodynamic_uplift) and self.lifting is None:
+            yield "aerodynamic_uplift", "does nothing: no force element has lift = true"
         wanted = self.lift_parameter
         cam = getattr(self.lifting, "cam", None)
         for key in ("static_force", "static_moment"):

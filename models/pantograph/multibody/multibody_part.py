@@ -10,6 +10,7 @@ import numpy as np
 from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
+from models.pantograph.multibody.analysis.cam_design import fit_force
 from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
@@ -18,6 +19,7 @@ from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
+from models.pantograph.operation import NO_DRIVE, Drive
 
 
 class MultibodyPantographPart:
@@ -51,6 +53,7 @@ class MultibodyPantographPart:
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._lateral = LateralExtrapolation()
         self._base = BaseMotion()
+        self._uplift = 0.0
         self._y = np.zeros(0)
         self._last: _Last | None = None
         self._history: History | None = None
@@ -59,7 +62,9 @@ class MultibodyPantographPart:
         self._built: _Built | None = None
         self._balance: MechanismBalance | None = None
 
-    def initialise(self, time: float, force: float, point: FloatArray, base: FloatArray) -> None:
+    def initialise(
+        self, time: float, force: float, point: FloatArray, base: FloatArray, drive: Drive = NO_DRIVE
+    ) -> None:
         """Set the pantograph to rest (on its roof) at its reference height at ``time``.
 
         Parameters
@@ -72,6 +77,8 @@ class MultibodyPantographPart:
             Its point of application [m].
         base : ndarray, shape (2,)
             Height and vertical velocity of the roof [m, m/s].
+        drive : Drive
+            What else acts.
 
         Raises
         ------
@@ -79,6 +86,7 @@ class MultibodyPantographPart:
             If the mechanism cannot be assembled or balanced.
         """
         built = self._ready()
+        self._lift_besides(drive)
         self.time = self._start_time = time
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
@@ -94,7 +102,7 @@ class MultibodyPantographPart:
         watched = self.definition.monitor_energy
         self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
 
-    def step(self, force: float, point: FloatArray, base: FloatArray, step: float) -> None:
+    def step(self, force: float, point: FloatArray, base: FloatArray, step: float, drive: Drive = NO_DRIVE) -> None:
         """Advance by ``step`` [s].
 
         Parameters
@@ -107,6 +115,8 @@ class MultibodyPantographPart:
             Height and vertical velocity of the roof at the beginning of the step [m, m/s].
         step : float
             [s]
+        drive : Drive
+            What else acts, held over the step.
 
         Raises
         ------
@@ -117,6 +127,7 @@ class MultibodyPantographPart:
         values = (force, *point.tolist(), *base.tolist())
         if not all(map(math.isfinite, values)):
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
+        self._lift_besides(drive)
         operation = self.definition
         expected = float(self.strip[:, 0, 0].mean())
         self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
@@ -211,7 +222,12 @@ class MultibodyPantographPart:
         acted, as far as they follow from the last inputs.
         """
         last, inputs, history = self._last, self._inputs(0.0), self._history
-        if last is None or last.inputs.lift != inputs.lift or last.inputs.base[:2] != inputs.base[:2]:
+        if (
+            last is None
+            or last.inputs.lift != inputs.lift
+            or last.inputs.uplift != inputs.uplift
+            or last.inputs.base[:2] != inputs.base[:2]
+        ):
             return None, None
         mechanism = self._ready().mechanism
         first, change = mechanism.with_inputs(self._y, last.acceleration, last.response, last.inputs, inputs)
@@ -231,7 +247,17 @@ class MultibodyPantographPart:
         """Return what acts ``tau`` [s] after the beginning of the step."""
         time = self.time + tau
         force = self._force.at(time)
-        return Inputs(self._base.at(tau), self._lift(time), force, self._lateral.at(time))
+        lift, uplift = self._lift(time), self._uplift
+        if self.definition.holds_force:
+            lift, uplift = lift + uplift, 0.0
+        return Inputs(self._base.at(tau), lift, force, self._lateral.at(time), uplift)
+
+    def _lift_besides(self, drive: Drive) -> None:
+        """Take the uplift of the air and of a controller."""
+        self._uplift = self.definition.aerodynamic_force(drive.air) + drive.uplift
+        if self._uplift != 0.0:
+            built = self._ready()
+            fit_force(built.mechanism, built.reference)
 
     def _lift(self, time: float) -> float:
         built = self._ready()
@@ -258,13 +284,13 @@ class MultibodyPantographPart:
         # Along the strip, which may roll and yaw.
         offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
         values = evaluation.constraints
-        lift = self._lift(self.time)
-        held = (lift,) if operation.holds_force else ()
+        acting = self._inputs(0.0) if self._last is None else self._last.inputs
+        held = (acting.lift,) if operation.holds_force else ()
         own = (
             roll,
             roll_rate,
             offset,
-            mechanism.lift_value(self._y, lift),
+            mechanism.lift_value(self._y, acting),
             *held,
             np.abs(values.violation).max(initial=0.0),
             np.abs(values.rate).max(initial=0.0),
@@ -290,8 +316,8 @@ class _Last(NamedTuple):
         """Return what a snapshot holds."""
         if "last.inputs" not in snapshot:
             return None
-        z, vz, az, lift, force, lateral = snapshot["last.inputs"].tolist()
-        inputs = Inputs((z, vz, az), lift, force, lateral)
+        z, vz, az, *others = snapshot["last.inputs"].tolist()
+        inputs = Inputs((z, vz, az), *others)
         acceleration, response = (snapshot[f"last.{name}"].astype(np.float64) for name in ("acceleration", "response"))
         return cls(acceleration, response, inputs)
 

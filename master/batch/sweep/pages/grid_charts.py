@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final, TypeVar
 
 import numpy as np
@@ -42,6 +42,8 @@ MOST_CURVES: Final = 7
 MOST_CHARTS: Final = 24
 _MOST_MAPS: Final = 4
 _MOST_CELLS: Final = 40
+#: Most values of a parameter along a curve.
+_MOST_LEVELS: Final = 500
 #: Up to how many points of a curve are marked.
 _MARKED: Final = 40
 #: Figures that are mapped, those of them that there are.
@@ -72,22 +74,23 @@ def curve_charts(view: SweepView, rows: Sequence[Row], parameters: Sequence[Swep
     Where there are samples too, a curve is their median, and what lies between their quantiles is shaded.
     """
     first, *others = parameters
-    found = levels(rows, first.title)
+    found = evenly(levels(rows, first.title), _MOST_LEVELS)
     if len(found) < 2:
         return []
     axis, places = axis_of(view.short_title(first.title), found)
     groups = grouped(view, rows, others)
     drawn = evenly(list(groups), MOST_CURVES)
     note = "" if len(drawn) == len(groups) else f"{len(drawn)} of {len(groups)} curves; the table has all."
+    cells = [_by_level(groups[group], first.title, found) for group in drawn]
+    whole = _by_level(rows, first.title, found)
     made = []
     for number, figure in enumerate(view.figures[:MOST_CHARTS]):
         parts: list[Part] = []
         for k, group in enumerate(drawn):
-            name = group or figure.name
-            parts += _curve(name, figure, [at_level(groups[group], first.title, v) for v in found], places, k)
+            parts += _curve(group or figure.name, figure, cells[k], places, k)
         if not any(np.isfinite(p.y).any() for p in parts if isinstance(p, Curve)):
             continue
-        parts += limit_parts(view, figure, [at_level(rows, first.title, v) for v in found], places)
+        parts += limit_parts(view, figure, whole, places)
         ordinate = Axis(figure.name, figure.unit, shown_range(parts))
         made.append(Chart(f"{key}_{number}", figure.heading, axis, ordinate, tuple(parts), note, height=300))
     return made
@@ -145,22 +148,28 @@ def map_charts(view: SweepView, rows: Sequence[Row], parameters: Sequence[SweptC
     if any(map(is_judged, rows)):
         figures.insert(0, _UNMET)
     kept = (evenly(columns, _MOST_CELLS), evenly(lines, _MOST_CELLS))
-    made = []
-    for number, (figure, group) in enumerate(itertools.product(figures, drawn)):
-        cells = _cells(view, figure, groups[group], (first.title, second.title), kept)
-        if not np.isfinite(cells.values).any():
-            continue
-        axes = (
-            _cell_axis(view.short_title(first.title), kept[0]),
-            _cell_axis(broken(view.short_title(second.title)), kept[1]),
-        )
-        title = f"{figure.heading}{f' [{figure.unit}]' if figure.unit else ''}{f', {group}' if group else ''}"
-        note = " ".join(_map_notes(cells, (len(columns), len(lines)), kept, (len(groups), len(drawn))))
-        width = 110 + _CELL_WIDTH * len(kept[0])
-        height = 80 + max(34 * len(kept[1]), 130)
-        chart = Chart(f"{key}_{number}", title, axes[0], axes[1], (cells,), note, height=height, least_width=width)
-        made.append(chart)
+    axes = (
+        _cell_axis(view.short_title(first.title), kept[0]),
+        _cell_axis(broken(view.short_title(second.title)), kept[1]),
+    )
+    width, height = 110 + _CELL_WIDTH * len(kept[0]), 80 + max(34 * len(kept[1]), 130)
+    made: list[Chart] = []
+    for figure in figures:
+        maps = {g: _cells(view, figure, groups[g], (first.title, second.title), kept) for g in drawn}
+        for group, cells in _alike(maps).items():
+            title = f"{figure.heading}{f' [{figure.unit}]' if figure.unit else ''}{f', {group}' if group else ''}"
+            note = " ".join(_map_notes(cells, (len(columns), len(lines)), kept, (len(groups), len(drawn))))
+            name = f"{key}_{len(made)}"
+            made.append(Chart(name, title, axes[0], axes[1], (cells,), note, height=height, least_width=width))
     return made
+
+
+def _alike(maps: dict[str, Cells]) -> dict[str, Cells]:
+    """Return maps in which one colour means one value; those without any value are left out."""
+    there = {name: cells for name, cells in maps.items() if np.isfinite(cells.values).any()}
+    ends = [(float(np.nanmin(c.values)), float(np.nanmax(c.values))) for c in there.values()]
+    span = (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
+    return {name: replace(cells, span=span) for name, cells in there.items()}
 
 
 def _map_notes(
@@ -250,9 +259,12 @@ def grouped(view: SweepView, rows: Sequence[Row], parameters: Sequence[SweptColu
     return dict(sorted(found.items(), key=lambda each: keys[each[0]]))
 
 
-def at_level(rows: Sequence[Row], title: str, value: float | str) -> list[Row]:
-    """Return the rows in which a parameter has a value."""
-    return [row for row in rows if row.get(title) == value]
+def _by_level(rows: Sequence[Row], title: str, found: Sequence[float | str]) -> list[list[Row]]:
+    """Return the rows in which a parameter has each of its values."""
+    by_value: dict[float | str | None, list[Row]] = {}
+    for row in rows:
+        by_value.setdefault(row.get(title), []).append(row)
+    return [by_value.get(value, []) for value in found]
 
 
 def evenly(found: Sequence[T], most: int) -> list[T]:

@@ -21,6 +21,8 @@ from master.report.charts.force_charts import TRACK
 MOST_DRAWN: Final = 4
 MOST_LISTED: Final = 60
 _MOST_BINS: Final = 40
+#: Most points of a running estimate.
+_MOST_STEPS: Final = 500
 #: Limits that every contact is judged by.
 _ALWAYS: Final = ("mean force", "sigma / mean", "maximum force", "statistical minimum", "NQ (estimate)")
 _ANY: Final = "any limit"
@@ -157,7 +159,8 @@ def running_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart
 
 
 def _settling(name: str, value: FloatArray, low: FloatArray, high: FloatArray) -> tuple[Part, ...]:
-    count = np.arange(1.0, len(value) + 1.0)
+    kept = np.array(evenly(range(len(value)), _MOST_STEPS))
+    count, value, low, high = kept + 1.0, value[kept], low[kept], high[kept]
     return (Envelope("95 % confidence interval", count, low, high, COLOURS[0]), Curve(name, count, value, stroke(0)))
 
 

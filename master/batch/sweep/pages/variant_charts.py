@@ -7,17 +7,20 @@ from typing import Final
 
 import numpy as np
 
-from master.batch.sweep.pages.grid_charts import MOST_CHARTS, limit_parts, shown_range
+from master.batch.sweep.pages.grid_charts import MOST_CHARTS, evenly, limit_parts, shown_range
 from master.batch.sweep.pages.sweep_view import SweepView, level_text, values_of
 from master.batch.sweep.sweep_run import Row
 from master.report.charts.chart import COLOURS, Axis, Chart, Part, Points
 
-#: Most runs whose names stand below their points.
+#: Most runs whose names stand below their points, and that are drawn.
 _MOST_NAMES: Final = 12
+_MOST_POINTS: Final = 1000
 
 
 def variant_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart]:
     """Return a chart for each figure, with a point for each run."""
+    note = "" if len(rows) <= _MOST_POINTS else f"{_MOST_POINTS} of {len(rows)} runs; the table has all."
+    rows = evenly(rows, _MOST_POINTS)
     numbers = values_of(rows, "run")
     names = [str(row.get("variant") or level_text(row.get("run"))) for row in rows]
     axis = Axis("run")
@@ -38,6 +41,7 @@ def variant_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart
                     axis,
                     Axis(f.name, f.unit, shown_range(parts)),
                     tuple(parts),
+                    note,
                     height=280,
                 )
             )

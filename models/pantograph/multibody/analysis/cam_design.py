@@ -45,6 +45,21 @@ def stand(mechanism: Mechanism) -> FloatArray:
     return standing
 
 
+def fit_force(mechanism: Mechanism, standing: FloatArray) -> None:
+    """Find what the lifting element must give for a force on the strip, where nothing says that yet.
+
+    A lifting moment whose cam does not hold a force needs it for the uplift of the air and of a controller.
+    """
+    forces, lifting = mechanism.forces, mechanism.definition.lifting
+    if forces.per_force is not None or mechanism.definition.holds_force or not isinstance(lifting, LiftingMoment):
+        return
+    cam, forces.cam = forces.cam, None
+    try:
+        forces.per_force = _constant_force(mechanism, standing).per_lift
+    finally:
+        forces.cam = cam
+
+
 def working_range(mechanism: Mechanism, standing: FloatArray) -> tuple[float, float]:
     """Return the lowest and the highest place of the lifting element [rad or m].
 
@@ -81,7 +96,8 @@ def _from_table(mechanism: Mechanism, standing: FloatArray, given: CamTable) -> 
 
 def _constant_force(mechanism: Mechanism, standing: FloatArray) -> Cam:
     places = np.linspace(*working_range(mechanism, standing), _POINTS)
-    force = abs(mechanism.definition.lift) or _USUAL_FORCE
+    set_force = abs(mechanism.definition.lift) if mechanism.definition.holds_force else 0.0
+    force = set_force or _USUAL_FORCE
     own = _lifts(mechanism, standing, places, 0.0)
     loaded = _lifts(mechanism, standing, places, force)
     return Cam(CubicCurve(places, own), CubicCurve(places, (loaded - own) / force))

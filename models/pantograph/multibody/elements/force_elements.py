@@ -12,6 +12,7 @@ from typing import Final, NamedTuple, get_args
 import numpy as np
 
 from models.arrays import FloatArray
+from models.numerics.cubic_curve import CubicCurve
 from models.pantograph.multibody.elements.angle_elements import AngleStops, BodyAngle, Cam, PointDistance
 from models.pantograph.multibody.elements.moving_vectors import Handle, Kinematics, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross
@@ -93,6 +94,7 @@ class ForceElements:
         self._transition = np.array([f.transition for f, _ in slides])
         self.stops = AngleStops([f for f in forces if isinstance(f, AngleStop)], numbers, orientations)
         self.cam: Cam | None = None
+        self.per_force: CubicCurve | None = None
         self.lift_place = self._place_of_lift(forces, numbers, orientations)
         self._others: list[_Friction | _Bushing] = []
         for f in forces:
@@ -123,9 +125,7 @@ class ForceElements:
             if isinstance(element, _Bushing):
                 element.untwist(orientations)
 
-    def loads(
-        self, kinematics: Kinematics, vectors: MovingVectors, w: FloatArray, lift: float, *, lifted: bool = True
-    ) -> FloatArray:
+    def loads(self, kinematics: Kinematics, vectors: MovingVectors, w: FloatArray, lift: float) -> FloatArray:
         """Return the loads of all elements.
 
         Parameters
@@ -135,14 +135,11 @@ class ForceElements:
         w : ndarray, shape (n, 3)
             Body-fixed angular velocities [rad/s].
         lift : float
-            What is set of the lifting element [N, N.m or 1]; with a cam, what the cam makes of it acts.
-        lifted : bool
-            Whether the lifting element acts at all.
+            Value of the lifting element [N or N.m].
         """
-        value = self.lift_value(kinematics, lift) if lifted else 0.0
-        total = self.lines.loads(vectors, value)
+        total = self.lines.loads(vectors, lift)
         if self._moments.count:
-            total[:, 3:] += self._moments.moments(vectors, value)
+            total[:, 3:] += self._moments.moments(vectors, lift)
         if self._slides.count:
             speed = self._slides.lengths(vectors).rate
             total += self._slides.spread(self._friction * np.tanh(speed / self._transition), vectors)
@@ -152,11 +149,24 @@ class ForceElements:
             total += element.loads(kinematics, w)
         return total
 
-    def lift_value(self, kinematics: Kinematics, lift: float) -> float:
-        """Return the force or moment of the lifting element for what is set of it [N or N.m]."""
-        if self.cam is None or self.lift_place is None:
+    def lift_value(self, kinematics: Kinematics, lift: float, uplift: float = 0.0) -> float:
+        """Return the force or moment of the lifting element [N or N.m].
+
+        Parameters
+        ----------
+        kinematics : Kinematics
+        lift : float
+            What is set of it [N, N.m or 1]: with a cam, what the cam makes of it acts.
+        uplift : float
+            Force that it brings to the strip besides [N]; a force that lifts takes it as it is.
+        """
+        if self.lift_place is None or (self.cam is None and uplift == 0.0):
             return lift
-        return self.cam.value(self.lift_place.at(kinematics), lift)
+        if self.cam is None and self.per_force is None:
+            return lift + uplift
+        place = self.lift_place.at(kinematics)
+        value = lift if self.cam is None else self.cam.value(place, lift)
+        return value if self.per_force is None else value + uplift * self.per_force.at(place)
 
     def energy(self, vectors: MovingVectors) -> float:
         """Return the potential energy of springs and bump stops [J]; that of angle stops is with ``stops``."""

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from master import run_session
 from master.batch.sweep.pages import grid_charts
 from master.batch.sweep.sweep_engines import HereEngine
 from master.batch.sweep.sweep_plan import SweepRequest
@@ -120,6 +121,14 @@ def test_what_is_kept(swept, tmp_path, keep, kept):
         assert keep != "thinned" or "timeseries.csv" not in found
         assert bool(names) == folder.is_dir()
     assert list((tmp_path / "out").glob(f"runs/{WORK}*")) == []
+
+
+@pytest.mark.parametrize(("keep", "copied"), [("figures", 0), ("thinned", 0), ("failed", 2), ("all", 2)])
+def test_definitions_are_copied_only_into_folders_that_stay_whole(swept, monkeypatch, keep, copied):
+    calls = []
+    monkeypatch.setattr(run_session, "write_definitions", lambda folder, components: calls.append(folder))
+    swept(over={"catenary.stiffness": "4000,8000"}, keep=keep)
+    assert len(calls) == copied
 
 
 def test_the_static_force_is_found_for_the_mean_force(swept):

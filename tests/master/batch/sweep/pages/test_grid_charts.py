@@ -111,3 +111,17 @@ def test_limits_are_seen_with_their_words(grid):
         points = np.concatenate([p.y for p in chart.parts if isinstance(p, Curve)])
         assert low <= np.nanmin(points)
         assert high > max([*levels, np.nanmax(points)])
+
+
+def test_maps_of_one_figure_have_one_scale_of_colours():
+    rows = [
+        row(100 * i + k, {"v": v, "t": t, "law": law}, sigma=v + t + 100.0 * i)
+        for i, law in enumerate("ab")
+        for k, (v, t) in enumerate(((1.0, 1.0), (1.0, 2.0), (2.0, 1.0), (2.0, 2.0)))
+    ]
+    whole = view(rows, {"v": "", "t": "", "law": ""}, over=("v", "t", "law"))
+    charts = map_charts(whole, rows, ordered(whole, whole.of_kind("grid")), "m")
+    first, second = (next(c.parts[0] for c in charts if c.title == f"Sigma [N], law {law}") for law in "ab")
+    assert first.span == second.span == (2.0, 104.0)
+    assert first.colours[0][0] != second.colours[0][0]
+    assert second.colours[1][1] == "#252d64"

@@ -124,6 +124,15 @@ def test_five_hundred_runs_are_a_page_of_bounded_size():
     assert len(html) < _FIXED + 2_000_000
 
 
+def test_twenty_thousand_runs_are_a_page_of_bounded_size():
+    listed = [row(k, {"a": float(k % 7), "b": float(k)}, variant=f"v{k}", sigma=40.0 + k % 11) for k in range(20_000)]
+    html = page(view(listed, {"a": "", "b": ""}))
+    assert "1000 of 20000 runs; the table has all." in html
+    assert len(html) < _FIXED + 1_000_000
+    html = page(view(listed, {"b": ""}, over=("b",)))
+    assert len(html) < _FIXED + 1_000_000
+
+
 def test_indices_have_a_chapter_of_their_own(grid):
     found = view(grid.rows, {}, indices=[indices(), indices(method="morris")])
     (chapter,) = (c for c in chapters(found) if c.key == "indices")

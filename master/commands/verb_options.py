@@ -217,6 +217,8 @@ def _add_values(parser: argparse.ArgumentParser) -> None:
     text = "which parameters matter: blocks of runs for Sobol indices, or Morris' trajectories; --samples says how many"
     parser.add_argument("--sensitivity", choices=SENSITIVITIES, help=text)
     parser.add_argument("--from-csv", type=Path, metavar="FILE", help="a row for each run, a column for each parameter")
+    text = "break each dropper of these spans of the line in turn, e.g. 14 or 14,15; the first run has none broken"
+    parser.add_argument("--faults", type=spans, metavar="SPAN,..", default=(), help=text)
     parser.add_argument("--static-force", metavar="'F0 N + c v^2'", help="static force over the speed v in km/h")
     parser.add_argument("--mean-force", metavar="'F0 N + c v^2'", help="mean force that the static force is found for")
     parser.add_argument("--mean-tolerance", type=positive_number, metavar="N", help="how near is enough; default 0.2")
@@ -342,6 +344,14 @@ def finite_number(text: str) -> float:
     if not math.isfinite(value) or "_" in text or not text.isascii():
         raise argparse.ArgumentTypeError(f"'{text}' is not a finite number{number_advice(text)}")
     return value
+
+
+def spans(text: str) -> tuple[int, ...]:
+    """Return the numbers of spans in a list such as ``14,15``, for argparse."""
+    numbers = text.split(",")
+    if not all(n.strip().isascii() and n.strip().isdigit() and 0 < int(n) < 10_000 for n in numbers):
+        raise argparse.ArgumentTypeError(f"'{text}' is no list of spans, such as 14 or 14,15, counted from 1")
+    return tuple(dict.fromkeys(int(n) for n in numbers))
 
 
 def positive_number(text: str) -> float:

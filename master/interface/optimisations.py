@@ -130,6 +130,6 @@ def optimise(
     with scenario_files.open_scenario(chosen.path, chosen.overrides) as opened:
         folder = Path(out) if out is not None else Path("results") / "optimise" / opened.system.name
         keep_apart(folder, opened.package)
-        prepared = PreparedOptimisation.of(opened.system, request)
+        prepared = PreparedOptimisation.of(opened.system, request, str(chosen.path))
         engine = engine_of(jobs, scheduler, tell)
         return Optimisation(folder, run_optimisation(prepared, folder, page, engine, tell, tell))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,6 +98,7 @@ def sweep(
     method: Method | None = None,
     sensitivity: SensitivityMethod | None = None,
     table: str | Path | None = None,
+    faults: Sequence[int] = (),
     static_force: str | None = None,
     mean_force: str | None = None,
     keep: Keep = "figures",
@@ -124,6 +125,8 @@ def sweep(
         ``sobol`` or ``morris``: as many blocks of runs as ``samples`` says, for indices of what matters.
     table : str or Path, optional
         CSV file with a row for each run.
+    faults : sequence of int
+        Spans of the line whose droppers break one after the other; the first run has none broken.
     static_force, mean_force : str, optional
         Static force over the speed, ``70 N + 0.00097 v^2`` with v in km/h; or the mean force that it is found for.
     keep : str
@@ -149,6 +152,7 @@ def sweep(
     given = {
         "sensitivity": sensitivity,
         "table": table,
+        "faults": tuple(faults),
         "static_force": static_force,
         "mean_force": mean_force,
         "keep": keep,
@@ -160,7 +164,8 @@ def sweep(
         if progress:
             console.print(str(text), markup=False, highlight=False)
 
-    with scenario_files.open_scenario(chosen.path, chosen.overrides) as opened:
+    overrides = replace(chosen.overrides, faults=request.faults)
+    with scenario_files.open_scenario(chosen.path, overrides) as opened:
         folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name
         keep_apart(folder, opened.package)
         prepared = PreparedSweep.of(opened.system, request)

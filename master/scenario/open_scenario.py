@@ -92,7 +92,7 @@ def load_system(
     if structure is EMPTY:  # without it everything would be missing
         raise ScenarioError(reader.problems)
     provision = _Provision(build and package.writable, tell, scratch, package.root)
-    fmus = _fmus(sources, structure.components, reader.problems, provision)
+    fmus = _fmus(sources, structure.components, reader.problems, provision, overrides)
     checker = ScenarioChecks(structure, fmus, reader.problems, reader.warnings)
     connections = checker.connections()
     components = checker.components(connections)
@@ -149,6 +149,7 @@ def _fmus(
     components: Iterable[SsdComponent],
     problems: list[Problem],
     provision: _Provision,
+    overrides: Overrides,
 ) -> dict[str, Fmu]:
     found: dict[str, Fmu] = {}
     by_path: dict[Path, Fmu | str] = {}
@@ -157,7 +158,8 @@ def _fmus(
             if not any(p.line == c.line and "'source'" in p.text for p in problems):
                 problems.append(Problem(SSD_NAME, c.line, "source", f"component '{c.name}' has an empty source"))
             continue
-        path = sources.find(c.source)
+        source = overrides.source(c.source)
+        path = sources.find(source)
         if path is None:
             text = f"'{c.source}' does not lie inside the scenario; --allow-outside DIR allows a folder beside it"
             problems.append(Problem(SSD_NAME, c.line, "source", text))
@@ -167,7 +169,7 @@ def _fmus(
             by_path[path] = _provide(path, replace(provision, build=may_build))
         fmu = by_path[path]
         if isinstance(fmu, str):
-            problems.append(_unprovided(c.name, c.source, c.line, fmu))
+            problems.append(_unprovided(c.name, source, c.line, fmu))
         else:
             found[c.name] = fmu
     return found

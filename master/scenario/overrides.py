@@ -43,6 +43,8 @@ class Overrides:
         Parameters, ``component.parameter``, of a table that has no value for them; a line's must have one.
     may_stop_early : bool
         Whether the stop time may lie before the end of the interval of interest.
+    faults : tuple of int
+        Spans for whose droppers a line FMU of ours lists a fault each, none of them active.
     """
 
     stop: float | None = None
@@ -56,6 +58,20 @@ class Overrides:
     absent: tuple[str, ...] = ()
     empty: tuple[str, ...] = ()
     may_stop_early: bool = False
+    faults: tuple[int, ...] = ()
+
+    def source(self, written: str) -> str:
+        """Return the source of a component, which is another for a line FMU of ours that lists faults.
+
+        Examples
+        --------
+        >>> Overrides(faults=(14, 15)).source("resources/Catenary_LN2.fmu")
+        'resources/Catenary_LN2_F14F15.fmu'
+        """
+        folder, separator, name = written.rpartition("/")
+        if not self.faults or not (name.startswith("Catenary_") and name.endswith(".fmu")):
+            return written
+        return f"{folder}{separator}{name.removesuffix('.fmu')}_F{'F'.join(map(str, self.faults))}.fmu"
 
 
 def effective_settings(

@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_table(
         f"{arguments.pantograph}: {result.title}",
         result.static_columns,
-        ([f"{v:.3f}" if i == 0 else f"{v:.2f}" for i, v in enumerate(row)] for row in result.statics),
+        ([f"{v:.3f}" if i == 0 else f"{round(v, 2) + 0.0:.2f}" for i, v in enumerate(row)] for row in result.statics),
     )
     freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
     print_table(
@@ -180,7 +180,8 @@ def _frequencies_of(dynamics: Dynamics) -> list[float]:
 
 def _mode_rows(result: Characteristics) -> list[tuple[str, str, str, str]]:
     return [
-        (f"{f:.3f}" if f > 0.0 else "-", f"{100.0 * d:.2f}", motion, remark) for f, d, motion, remark in result.modes
+        (f"{f:.3f}" if f > 0.0 else "-", "-" if remark.startswith("neutral") else f"{100.0 * d:.2f}", motion, remark)
+        for f, d, motion, remark in result.modes
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 
-from scipy.interpolate import CubicSpline
+import numpy as np
 
 from models.arrays import FloatArray
 
@@ -30,9 +30,8 @@ class CubicCurve:
     """
 
     def __init__(self, places: FloatArray, values: FloatArray) -> None:
-        spline = CubicSpline(places, values)
         self._places = [float(x) for x in places]
-        self._pieces = [tuple(map(float, piece)) for piece in spline.c.T]
+        self._pieces = [tuple(map(float, piece)) for piece in _pieces(places, values)]
         self._ends = float(values[0]), float(values[-1])
 
     @property
@@ -51,3 +50,31 @@ class CubicCurve:
         a, b, c, d = self._pieces[k]
         t = x - places[k]
         return d + t * (c + t * (b + t * a))
+
+
+def _pieces(places: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the coefficients of the pieces, highest power first, shape (n - 1, 4).
+
+    The derivatives at the points follow from the continuity of the second one, and of the third one at the second point
+    from either end. Not scipy's `CubicSpline`, which would bring `scipy.optimize` and more into a standalone FMU.
+    """
+    h = np.diff(places)
+    slopes = np.diff(values) / h
+    n = len(places)
+    matrix, right = np.zeros((n, n)), np.zeros(n)
+    for k in range(1, n - 1):
+        matrix[k, k - 1 : k + 2] = h[k], 2 * (h[k - 1] + h[k]), h[k - 1]
+        right[k] = 3 * (h[k] * slopes[k - 1] + h[k - 1] * slopes[k])
+    if n == 3:  # a parabola
+        matrix[0, :2] = matrix[2, 1:] = 1.0
+        right[0], right[2] = 2 * slopes
+    else:
+        both = h[0] + h[1]
+        matrix[0, :2] = h[1], both
+        right[0] = ((h[0] + 2 * both) * h[1] * slopes[0] + h[0] ** 2 * slopes[1]) / both
+        both = h[-1] + h[-2]
+        matrix[-1, -2:] = both, h[-2]
+        right[-1] = (h[-1] ** 2 * slopes[-2] + (2 * both + h[-1]) * h[-2] * slopes[-1]) / both
+    rates = np.linalg.solve(matrix, right)
+    bend = (rates[:-1] + rates[1:] - 2 * slopes) / h
+    return np.stack([bend / h, (slopes - rates[:-1]) / h - bend, rates[:-1], values[:-1]], axis=1)

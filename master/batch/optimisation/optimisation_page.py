@@ -88,7 +88,7 @@ def command(outcome: OptimisationOutcome, run: SweepRun) -> str:
     own = {b.parameter.name: v for b, v in zip(outcome.bounds, outcome.point(run), strict=True)}
     times = [f"--{name} {own[name]!r}" for name in ("step", "stop") if name in own]
     settings = [f"--set {shlex.quote(f'{name}={value}')}" for name, value in values.items()]
-    return " ".join(["openpanto run", outcome.scenario, *settings, *times])
+    return " ".join(["openpanto run", shlex.quote(outcome.place), *settings, *times])
 
 
 def page(outcome: OptimisationOutcome) -> str:

@@ -60,6 +60,8 @@ class OptimisationOutcome(BatchState):
         The points that were tried, in their order; the first is where the search began.
     found : dict
         What has become of them, by key.
+    place : str
+        Where the scenario is, as a command names it.
     ended : str
         Why the search ended, empty if it has not.
     """
@@ -70,6 +72,7 @@ class OptimisationOutcome(BatchState):
     bounds: tuple[BoundedParameter, ...]
     runs: tuple[SweepRun, ...] = ()
     found: Mapping[str, SweepResult] = field(default_factory=dict)
+    place: str = ""
     ended: str = ""
 
     @property
@@ -211,8 +214,8 @@ class PreparedOptimisation:
     outcome: OptimisationOutcome
 
     @classmethod
-    def of(cls, base: System, request: OptimisationRequest) -> PreparedOptimisation:
-        """Return the optimisation that a request asks for.
+    def of(cls, base: System, request: OptimisationRequest, place: str = "") -> PreparedOptimisation:
+        """Return the optimisation that a request asks for; ``place`` is how a command names the scenario.
 
         Raises
         ------
@@ -225,7 +228,8 @@ class PreparedOptimisation:
         corners = itertools.product(*((b.low, b.high) for b in bounds)) if len(bounds) <= _MOST_CORNERS else ()
         points = (tuple(b.start for b in bounds), *corners)
         make_runs(base, SweepPlan(tuple(b.parameter for b in bounds), points), asked)
-        return cls(base, asked, OptimisationOutcome(scenario=base.name, request=request, goal=goal, bounds=bounds))
+        begun = OptimisationOutcome(base.name, request, goal, bounds, place=place or base.name)
+        return cls(base, asked, begun)
 
 
 def optimise(

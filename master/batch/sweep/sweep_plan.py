@@ -31,6 +31,7 @@ MOST_RUNS: Final = 100_000
 #: Column of a table that names its rows.
 VARIANT: Final = "variant"
 STUDY: Final = "study.toml"
+_FAULT: Final = re.compile(r"fault\[\d+\]\.active", re.ASCII)
 _HEAD: Final = re.compile(r"\s*(.+?)\s*(?:\[([^\]]*)\])?\s*")
 
 
@@ -75,6 +76,9 @@ class SweepRequest(PlainRequest):
         every figure depends on every parameter.
     table : Path, optional
         CSV file with a row for each run and a column for each parameter.
+    faults : tuple of int
+        Spans whose droppers break one after the other; the first run has none broken. The scenario must have been
+        opened with them.
     stop : float, optional
         Stop time of all runs [s]; it follows the speed if not given.
     static_force, mean_force : str, optional
@@ -94,6 +98,7 @@ class SweepRequest(PlainRequest):
     method: Method = "lhs"
     sensitivity: SensitivityMethod | None = None
     table: Path | None = None
+    faults: tuple[int, ...] = ()
     stop: float | None = None
     static_force: str | None = None
     mean_force: str | None = None
@@ -172,6 +177,10 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
         raise RequestError(f"samples need {missing}")
     _check_sensitivity(request)
     table, names = (None, ()) if request.table is None else _read_table(system, request.table)
+    if request.faults:
+        if table is not None:
+            raise RequestError("--faults and --from-csv both list runs: leave one out")
+        table, names = broken_in_turn(system)
     grid = [_listed(system, name, text) for name, text in request.over.items()]
     distributions = tuple(read_distribution(ParameterReader(system, n), text) for n, text in request.vary.items())
     sizes = [len(part.rows) for part in (table, *grid) if part is not None]
@@ -195,8 +204,9 @@ def _check_sensitivity(request: SweepRequest) -> None:
         return
     if not request.vary:
         raise RequestError("--sensitivity needs --vary NAME=DISTRIBUTION, of what, and --samples N, how many blocks")
-    if request.over or request.table is not None:
-        raise RequestError("--sensitivity looks at what --vary samples, alone: leave out --over and --from-csv")
+    if request.over or request.table is not None or request.faults:
+        text = "leave out --over, --from-csv and --faults"
+        raise RequestError(f"--sensitivity looks at what --vary samples, alone: {text}")
     if "method" in request.model_fields_set:
         raise RequestError("--sensitivity has samples of its own: leave out --method")
 
@@ -249,6 +259,23 @@ def _read_table(system: System, path: Path) -> tuple[_Part, tuple[str, ...]]:
         raise RequestError(f"{path}: {error}") from error
     values = list(zip(*(cells for _, cells in read), strict=True))
     return _Part(tuple(p for p, _ in read), values), names or tuple(map(str, range(1, len(rows))))
+
+
+def broken_in_turn(system: System) -> tuple[_Part, tuple[str, ...]]:
+    """Return runs in which every fault that is not active becomes so in turn, the first without, and their names."""
+    found = [
+        (f"{c.name}.{v.name}", v.description)
+        for c in system.components
+        for v in c.fmu.variables.values()
+        if _FAULT.fullmatch(v.name) and float(v.start or 0.0) == 0.0
+    ]
+    if not found:
+        raise RequestError("--faults: no component is a line FMU of ours, Catenary_NAME.fmu, that could list faults")
+    count = len(found)
+    cells = [["1" if row == k + 1 else "0" for row in range(count + 1)] for k in range(count)]
+    read = [_column(system, name, column) for (name, _), column in zip(found, cells, strict=True)]
+    values = list(zip(*(column for _, column in read), strict=True))
+    return _Part(tuple(p for p, _ in read), values), ("healthy", *(name for name, _ in found))
 
 
 def _read_lines(path: Path) -> list[tuple[int, list[str]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import zipfile
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from fmus.builder.fmu_build import build
 from fmus.builder.recipe import EMPTIED, ROOTS, recipe
-from fmus.builder.source_bundle import BundleError, Module, check_rewritten, collect, rewrite
+from fmus.builder.source_bundle import OPTIONAL, BundleError, Module, check_rewritten, collect, rewrite
 
 HERE = {"models": Path(), "fmus": Path()}
 
@@ -78,6 +79,14 @@ def test_the_adapter_can_be_packed():
     assert not {"fmus.builder.fmu_build", "pythonfmu.builder"} & modules.keys()
     for module in modules.values():
         check_rewritten(rewrite(module, "private", ROOTS), module.name, ROOTS)
+
+
+@pytest.mark.parametrize("name", ["Catenary_CA160", "Pantograph_CX"])
+def test_an_fmu_is_built_without_what_is_optional(name, tmp_path, monkeypatch):
+    """What it carries is imported while it is built, so no kernel may be among it, not by way of another one either."""
+    for package in OPTIONAL:
+        monkeypatch.setitem(sys.modules, package, None)
+    assert build(recipe(name), tmp_path).is_file()
 
 
 @pytest.mark.parametrize("name", ["Catenary_LN2", "Pantograph_CX", "Pantograph_generic_multibody"])

@@ -103,12 +103,13 @@ def test_another_folder_is_left_alone(optimised, tmp_path):
 def test_the_command_that_is_told_makes_the_best_run_again(toy_system, toy, tmp_path):
     """With the mean force held: the static force that was found is part of the command."""
     request = {"minimise": "sigma", "vary": {"pantograph.damping": "100:400"}, "subject_to": ["mean=120N"]}
-    prepared = PreparedOptimisation.of(toy_system, OptimisationRequest.read({**request, "max_runs": 1}))
+    prepared = PreparedOptimisation.of(toy_system, OptimisationRequest.read({**request, "max_runs": 1}), str(toy))
     done = optimise(prepared, tmp_path / "out", page)
     best = done.best
     assert done.rows_of(best)[0]["mean [N]"] == pytest.approx(120.0, abs=0.2)
     assert done.value(best) == min(done.value(r) for r in done.runs)
     words = command(done, best).split(" --set ")
+    assert words[0] == f"openpanto run {toy}"
     values = dict(word.strip("'").split("=") for word in words[1:])
     assert set(values) == {"pantograph.damping", "pantograph.static_force"}
     values["pantograph.static_force"] = values["pantograph.static_force"].removesuffix(" N")  # the toy has no units

@@ -4,6 +4,8 @@ import pytest
 
 from master.batch.sweep.sweep_plan import SweepRequest, make_plan, stored_request
 from master.errors import RequestError
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 
 def _plan(system, **request):
@@ -38,6 +40,7 @@ def test_a_table_names_its_rows_and_has_units_in_heads_or_cells(toy_system, tmp_
         ({}, "nothing is varied"),
         ({"vary": {"speed": "normal(1, 1)"}}, "samples need --samples"),
         ({"samples": 3}, "samples need --vary"),
+        ({"faults": (3,)}, "--faults: no component is a line FMU of ours"),
         ({"over": {"speed": "1,2", "pantograph.speed": "1,2"}}, "'pantograph.speed' is varied twice"),
         ({"over": {"speed": "1:1000:1", "catenary.stiffness": "1:1000:1"}}, "more than 100000"),
         ({"over": {"speed": "1,2"}, "colour": "red"}, "colour"),
@@ -84,3 +87,25 @@ def test_a_study_may_hold_a_sweep(toy_system, toy):
     (toy / "study.toml").write_text("sweep = 1\n")
     with pytest.raises(RequestError, match="must be a table"):
         stored_request(toy)
+
+
+@pytest.fixture(scope="module")
+def faulted():
+    with open_scenario("cx_ln2", Overrides(faults=(3,), stop=1.0, may_stop_early=True)) as scenario:
+        yield scenario.system
+
+
+def test_droppers_break_one_after_the_other_the_first_run_has_none_broken(faulted):
+    plan = _plan(faulted, faults=(3,))
+    assert [p.name for p in plan.parameters] == [f"catenary.fault[{k}].active" for k in range(1, 8)]
+    assert plan.points[0] == ("0",) * 7
+    assert [point.index("1") for point in plan.points[1:]] == list(range(7))
+    assert {point.count("1") for point in plan.points[1:]} == {1}
+    assert plan.variants[:2] == ("healthy", "catenary.fault[1].active")
+    assert len(_plan(faulted, faults=(3,), over={"speed": "70,80"}).points) == 16
+
+
+def test_faults_and_a_table_both_list_runs(faulted, tmp_path):
+    (tmp_path / "t.csv").write_text("speed\n70\n")
+    with pytest.raises(RequestError, match="--faults and --from-csv both list runs"):
+        _plan(faulted, faults=(3,), table=tmp_path / "t.csv")

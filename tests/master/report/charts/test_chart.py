@@ -27,6 +27,7 @@ from master.report.charts.chart import (
     stroke,
 )
 from master.report.charts.interactive_figure import interactive_figure
+from master.report.charts.sample_packing import packed
 from master.report.charts.static_figure import static_figure
 from master.report.html_markup import asset
 
@@ -186,7 +187,8 @@ def test_bars_that_lie_have_their_intervals_along_the_abscissa():
     )
     (trace,) = interactive_figure(chart(bars))["data"]
     assert trace["orientation"] == "h"
-    assert "error_x" in trace
+    assert trace["error_x"]["array"] == packed(np.array([0.5, 2.0]))
+    assert trace["error_x"]["arrayminus"] == packed(np.array([1.0, 2.0]))
     (axes,) = static_figure([chart(bars)]).axes
     assert [(p.get_y() + 0.5 * p.get_height(), p.get_width()) for p in axes.patches] == [(0.0, 2.0), (1.0, -3.0)]
     (lines,) = (c for c in axes.collections if len(c.get_segments()) == 2)

@@ -54,6 +54,12 @@ def test_indices_have_their_intervals_and_the_greatest_total_on_top():
     assert chart.x.unit == ""
 
 
+def test_a_parameter_that_acts_with_others_alone_lies_where_its_total_says():
+    chart = index_chart({**indices(), "total": [0.9, 0.2, 0.3]}, "i")
+    assert [w.split(" ")[0] for w in chart.y.words] == ["line.p1", "line.p2", "line.p0"]
+    assert chart.parts[0].y.tolist() == [0.1, 0.2, 0.0]
+
+
 def test_morris_has_other_words_its_unit_and_mu_for_its_order():
     data = {**indices(method="morris"), "total": [9.0, 1.0, 0.0]}
     chart = index_chart(data, "i")

@@ -9,6 +9,7 @@ from master.batch.sweep.pages.sweep_page import page
 from master.batch.sweep.pages.sweep_view import levels, read_view, view_of
 from master.batch.sweep.sweep_session import as_data
 from master.errors import MasterError
+from master.system.pantograph_motion import parameter_value
 from tests.master.batch.sweep.pages.conftest import failure, row, view
 
 
@@ -33,7 +34,8 @@ def test_indices_are_on_the_page_of_the_sweep_and_of_its_files(swept, tmp_path):
 
 def test_the_setting_names_speeds_contacts_and_the_interval(swept, toy_system):
     setting = as_data(swept(over={"catenary.stiffness": "4000,5000"}))["setting"]
-    (name,) = setting["speeds"]
+    ((name, speed),) = setting["speeds"].items()
+    assert speed == pytest.approx(3.6 * parameter_value(toy_system.component(name), "speed"))
     assert setting["contacts"].keys() == {name}
     assert setting["interval"] == [toy_system.settings.interval.start, toy_system.settings.interval.end]
 
@@ -69,6 +71,12 @@ def test_limits_follow_the_speed_of_the_row():
     assert found.bounds(figures["maximum"], fast) == (-math.inf, 350.0)
     assert found.bounds(figures["mean"], fast)[1] == pytest.approx(0.00097 * 300.0**2 + 70.0)
     assert found.bounds(figures["sigma"], fast)[1] == pytest.approx(0.3 * 150.0)
+    assert found.bounds(figures["uplift"], fast) == (-math.inf, 120.0)
+
+
+def test_figures_know_what_judges_them():
+    names = ["mean force", "sigma / mean", "sigma / mean", "maximum force", "uplift at supports"]
+    assert [f.criterion for f in view([row(1, {})], {}).figures] == names
 
 
 def test_a_speed_in_another_unit_is_the_same_speed():
@@ -89,6 +97,8 @@ def test_runs_that_failed_are_no_rows_of_a_pantograph():
     found = view([row(1, {"a": 1.0}), failure(2, {"a": 2.0}, "no")], {"a": ""})
     assert [r["run"] for r in found.rows_of("front")] == [1.0]
     assert found.failures == {"2": "no"}
+    assert found.pantographs == ("front",)
+    assert len(found.complete) == 1
 
 
 def test_a_setting_of_own_limits_is_read(tmp_path):

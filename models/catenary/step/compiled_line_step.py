@@ -53,6 +53,7 @@ class CompiledLineStep:
     kernels, matrices
         The parameters.
     units : ModeUnits
+    lanes : AttachmentLanes
 
     Raises
     ------
@@ -70,7 +71,9 @@ class CompiledLineStep:
             raise UnsuitedError("they do not know the line's contact law")
         self.kernels, self.matrices, self._wires = kernels, matrices, line.wires
         self.units = ModeUnits(matrices, kernels)
-        lanes = AttachmentLanes(factor.matrix, factor.width, (-2.0 * modes.K, newmark.a2 * modes.M), kernels)
+        self.lanes = lanes = AttachmentLanes(
+            factor.matrix, factor.width, (-2.0 * modes.K, newmark.a2 * modes.M), kernels
+        )
         near = lanes if factor.matrix.shape[0] < _LONG else factor
         compliance = Compliance(near, droppers.B, droppers.by_change(newmark))
         self._records = StepRecords(line.wires, matrices, compliance, self.units.slots)

@@ -1,4 +1,4 @@
-"""What a macro step of a whole run costs, and on what: ``python benchmarks/whole_run.py [SCENARIO] [--beside WORKTREE]``.
+"""What a macro step of a whole run costs, and on what: ``python benchmarks/whole_run.py [--beside WORKTREE]``.
 
 A run as ``openpanto run`` makes it, recording and all observers included, without its start and its report. With
 ``--beside`` the same run in another working tree of the project, say of an earlier commit: both take turns, block by

@@ -1,7 +1,7 @@
-"""What a macro step of a whole run costs, and on what: ``python benchmarks/whole_run.py [SCENARIO] [--against TREE]``.
+"""What a macro step of a whole run costs, and on what: ``python benchmarks/whole_run.py [--beside WORKTREE]``.
 
 A run as ``openpanto run`` makes it, recording and all observers included, without its start and its report. With
-``--against`` the same run in another working tree of the project, say of an earlier commit: both take turns, block by
+``--beside`` the same run in another working tree of the project, say of an earlier commit: both take turns, block by
 block, and the ratio is that of the processor time of this one to that of the other. The shares are measured in a run of
 their own, by clocks, which take a few microseconds of a step themselves.
 """
@@ -34,7 +34,7 @@ def main() -> None:
         run_in_turns(options)
         return
     on_one_thread()
-    trees = {"this": ROOT, **({"other": options.against.resolve()} if options.against else {})}
+    trees = {"this": ROOT, **({"other": options.beside.resolve()} if options.beside else {})}
     blocks = taking_turns(trees, options, with_clocks=False)
     each = {name: [1e6 * row[0] / BLOCK for row in rows] for name, rows in blocks.items()}
     columns = ("", "us a macro step", "times real time", "this / other", "median of the blocks' ratios")
@@ -51,7 +51,7 @@ def main() -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("scenario", nargs="?", default="cx_ln2", help="scenario of the library, default cx_ln2")
-    parser.add_argument("--against", type=Path, metavar="TREE", help="another working tree of the project")
+    parser.add_argument("--beside", type=Path, metavar="WORKTREE", help="another working tree of the project")
     parser.add_argument("--stop", type=float, default=3.0, help="simulated time [s], default 3")
     parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--clocks", action="store_true", help=argparse.SUPPRESS)

@@ -25,7 +25,7 @@ from master.batch.sweep.lane_system import LaneGroup, check_scenario, grouped
 from master.batch.sweep.sweep_engines import MakeRuns
 from master.batch.sweep.sweep_run import RunPlace, SweepResult, figure_rows, reason_of
 from master.batch.sweep.swept_systems import SweepRun
-from master.errors import MasterError, RequestError
+from master.errors import InterruptedRunError, MasterError, RequestError
 from master.results.run_summary import peak_memory
 from master.run_session import run as run_system
 from master.system.components import System
@@ -171,6 +171,8 @@ def _made(group: LaneGroup) -> Iterator[tuple[SweepRun, SweepResult, FloatArray]
             code, said = process.wait(), _last_line(folder)
         if code < 0:
             raise MasterError(f"python -m models lanes was ended by signal {-code}; the same command goes on from here")
+        if waiting and said == "error: interrupted":  # no fault of the runs
+            raise InterruptedRunError("python -m models lanes was interrupted")
         if waiting and not said.startswith("error: "):
             raise MasterError(f"python -m models lanes has ended early: {said or f'exit code {code}'}")
         for wanted in waiting.values():  # the line has no equilibrium, say
@@ -202,11 +204,7 @@ def _process(folder: Path) -> Iterator[subprocess.Popen[str]]:
         yield process
     finally:
         if process.poll() is None:
-            process.terminate()
-            try:
-                process.wait(10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
+            process.kill()
         process.wait()
         if process.stdout is not None:
             process.stdout.close()

@@ -124,6 +124,13 @@ def test_slack_droppers(both, line_maker, law, ratio):
     assert slack.max() >= 2
 
 
+def test_slack_droppers_under_a_law_that_is_not_linear(both, short_line):
+    line = short_line.with_values({"contact.exponent": 1.5, "contact.stiffness": 5e5})
+    forces, slack = run(both, line, (70.0,), steps=60, lift=0.06)
+    assert slack.max() >= 1
+    assert forces[slack > 0].max() > 50.0
+
+
 def _thrown_up(model, state):
     """Give the contact wire a velocity that lets all droppers go slack."""
     velocity = np.zeros(model.mesh.fixed.shape)

@@ -458,7 +458,7 @@ def _copy(options: argparse.Namespace) -> int:
     project = places.project_folder(Path())
     copy = (project or Path()) / options.kind / f"{name}.toml"
     copy.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(copy, text.encode())
+    write_atomically(copy, text.encode(), "another folder to work in")
     print(copy)
     if project is None:
         text = f"for other folders, add {Path().resolve()} to {places.VARIABLE}"

@@ -1,7 +1,7 @@
-"""What a macro step of a whole run costs, and on what: ``python benchmarks/whole_run.py [SCENARIO] [--against TREE]``.
+"""What a macro step of a whole run costs, and on what: ``python benchmarks/whole_run.py [--beside WORKTREE]``.
 
 A run as ``openpanto run`` makes it, recording and all observers included, without its start and its report. With
-``--against`` the same run in another working tree of the project, say of an earlier commit: both take turns, block by
+``--beside`` the same run in another working tree of the project, say of an earlier commit: both take turns, block by
 block, and the ratio is that of the processor time of this one to that of the other. The shares are measured in a run of
 their own, by clocks, which take a few microseconds of a step themselves.
 """
@@ -34,7 +34,7 @@ def main() -> None:
         run_in_turns(options)
         return
     on_one_thread()
-    trees = {"this": ROOT, **({"other": options.against.resolve()} if options.against else {})}
+    trees = {"this": ROOT, **({"other": options.beside.resolve()} if options.beside else {})}
     blocks = taking_turns(trees, options, with_clocks=False)
     each = {name: [1e6 * row[0] / BLOCK for row in rows] for name, rows in blocks.items()}
     columns = ("", "us a macro step", "times real time", "this / other", "median of the blocks' ratios")
@@ -51,7 +51,7 @@ def main() -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("scenario", nargs="?", default="cx_ln2", help="scenario of the library, default cx_ln2")
-    parser.add_argument("--against", type=Path, metavar="TREE", help="another working tree of the project")
+    parser.add_argument("--beside", type=Path, metavar="WORKTREE", help="another working tree of the project")
     parser.add_argument("--stop", type=float, default=3.0, help="simulated time [s], default 3")
     parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--clocks", action="store_true", help=argparse.SUPPRESS)
@@ -59,7 +59,7 @@ def _options() -> argparse.Namespace:
 
 
 def taking_turns(trees: Mapping[str, Path], options: argparse.Namespace, with_clocks: bool) -> dict[str, list[Any]]:
-    """Return for every tree what each block took: processor time, and the parts if there are clocks [s]."""
+    """Return for every tree what each block took: processor time, or medians of its steps if there are clocks [s]."""
     blocks: dict[str, list[Any]] = {name: [] for name in trees}
     with tempfile.TemporaryDirectory() as folder:
         runs = {name: _started(tree, options, Path(folder) / name, with_clocks) for name, tree in trees.items()}
@@ -97,16 +97,16 @@ def _started(tree: Path, options: argparse.Namespace, folder: Path, with_clocks:
 def show_shares(blocks: Mapping[str, Sequence[Sequence[float]]]) -> None:
     """Print what a macro step is spent on in each tree."""
     means = {}
-    for name, rows in blocks.items():
-        totals = [sum(column) * 1e6 / BLOCK / len(rows) for column in zip(*rows, strict=True)]
-        whole, kernels, line, line_fmu, pantographs = totals
+    for name, of_blocks in blocks.items():
+        medians = [1e6 * median(column) for column in zip(*of_blocks, strict=True)]
+        whole, kernels, line, line_fmu, pantographs = medians
         means[name] = (kernels, line - kernels, line_fmu - line, pantographs, whole - line_fmu - pantographs)
-    rows_of_parts = [
-        (part, *(f"{values[i]:.1f}" for values in means.values()), f"{means['this'][i] / values[i]:.2f}")
+    mine, last = means["this"], means[list(means)[-1]]
+    rows = [
+        (part, *(f"{values[i]:.1f}" for values in means.values()), f"{mine[i] / last[i]:.2f}" if last[i] else "")
         for i, part in enumerate(PARTS)
-        if (values := list(means.values())[-1])
     ]
-    table("What it is spent on, with clocks", ("", *(f"{name}, us" for name in means), "this / last"), rows_of_parts)
+    table("What it is spent on, with clocks", ("", *(f"{name}, us" for name in means), "this / last"), rows)
 
 
 def run_in_turns(options: argparse.Namespace) -> None:
@@ -128,19 +128,24 @@ class _Turns:
     def __init__(self, with_clocks: bool) -> None:
         self._clocks = _Clocks() if with_clocks else None
         self._begin = 0.0
+        self._steps: list[list[float]] = []
 
-    def begin(self, time: float, network: Any) -> None:
+    def begin(self, start: float, network: Any) -> None:
         """Set the clocks."""
         if self._clocks is not None:
             self._clocks.set(network)
         self._start()
 
-    def observe(self, index: int, time: float, network: Any) -> None:
+    def observe(self, index: int, end: float, network: Any) -> None:
         """Hand over after the last step of a block."""
+        if self._clocks is not None:
+            self._steps.append(self._clocks.read())
         if index % BLOCK:
             return
-        spent = [self._now() - self._begin, *(self._clocks.read() if self._clocks is not None else ())]
-        print(*spent, flush=True)
+        if self._clocks is None:
+            print(time.process_time() - self._begin, flush=True)
+        else:  # by the wall: what other programs take of a few steps does not move the median
+            print(*map(median, zip(*self._steps, strict=True)), flush=True)
         sys.stdin.readline()
         self._start()
 
@@ -148,12 +153,10 @@ class _Turns:
         """Nothing to close."""
 
     def _start(self) -> None:
+        self._steps.clear()
         if self._clocks is not None:
             self._clocks.read()
-        self._begin = self._now()
-
-    def _now(self) -> float:
-        return time.perf_counter() if self._clocks is not None else time.process_time()
+        self._begin = time.process_time()
 
 
 class _Clocks:
@@ -161,7 +164,7 @@ class _Clocks:
 
     def __init__(self) -> None:
         self._spent = {"kernels": 0.0, "line": 0.0}
-        self._before = (0.0, 0.0)
+        self._before = (0.0, 0.0, 0.0)
         self._slaves: list[Any] = []
 
     def set(self, network: Any) -> None:
@@ -176,12 +179,14 @@ class _Clocks:
                         setattr(module, kernel, self._around("kernels", value))
 
     def read(self) -> list[float]:
-        """Return the time since the last call in kernels, in the line, in its FMU and in all others [s]."""
+        """Return the time since the last call, and of it in kernels, in the line, in its FMU and in all others [s]."""
+        now = time.perf_counter()
         lines = sum(s.stepping_time for s in self._slaves if s.name.startswith("catenary"))
         others = sum(s.stepping_time for s in self._slaves if not s.name.startswith("catenary"))
-        found = [self._spent["kernels"], self._spent["line"], lines - self._before[0], others - self._before[1]]
+        whole, of_lines, of_others = (a - b for a, b in zip((now, lines, others), self._before, strict=True))
+        found = [whole, self._spent["kernels"], self._spent["line"], of_lines, of_others]
         self._spent.update(kernels=0.0, line=0.0)
-        self._before = lines, others
+        self._before = now, lines, others
         return found
 
     def _around(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,6 +6,10 @@ empty, a folder for a file and a file for a folder.
 
 from __future__ import annotations
 
+import builtins
+import errno
+import io
+import os
 import re
 import shlex
 import shutil
@@ -56,6 +60,9 @@ COMMANDS: Final = (
     "sweep toy.ssp --no-build --from-csv {in:csv}",
     "sweep toy.ssp --no-build --over pantograph.static_force=100N,120N --allow-outside {gone:d}",
     "sweep toy.ssp --no-build --over pantograph.static_force=100N,120N --out {dir}",
+    "optimise {in:ssp} --minimise sigma --vary pantograph.static_force=100:120N",
+    "optimise toy.ssp --no-build --minimise sigma --vary pantograph.static_force=100:120N --allow-outside {gone:d}",
+    "optimise toy.ssp --no-build --minimise sigma --vary pantograph.static_force=100:120N --out {dir}",
     "compare {in:run} run",
     "compare run {in:run}",
     "compare run run --report {file:html}",
@@ -110,7 +117,7 @@ def workplace(tmp_path, monkeypatch, request):
 #: How the system says it, which helps nobody.
 BARE: Final = re.compile(r"\[Errno|(No such file or directory|(File exists|Not a directory|Is a directory))\)?$")
 REMEDY: Final = re.compile(
-    r"choose|name |give|known|check|write|take|must be|by its name|named|list|another|is needed|is no "
+    r"choose|name |copy|give|known|check|write|take|must be|by its name|named|list|another|is needed|is no "
 )
 
 
@@ -131,6 +138,61 @@ def test_a_bad_path_ends_in_one_sentence(line, workplace, monkeypatch, capfd):
     assert REMEDY.search(errors[0]), errors
     assert Path.cwd() == workplace
     assert not (workplace / "project").exists()
+
+
+#: Places that the user may not write into. A study builds its FMUs first, and a film needs more than the run here has.
+LOCKED: Final = (
+    *(re.sub(r"{dir}", "locked/x", c) for c in COMMANDS if "{dir}" in c and "study" not in c),
+    *(re.sub(r"{file:(\w+)}", r"locked/x.\1", c) for c in COMMANDS if "{file:" in c and "--film" not in c),
+    "report locked",
+    "new-line mine --like CA160",
+)
+
+
+@pytest.fixture
+def locked(workplace, monkeypatch):
+    """A folder with a run in it that nobody may write into; who runs the tests may well be allowed to."""
+    folder = workplace / "locked"
+    shutil.copytree(workplace / "run", folder)
+
+    def guarded(what, writes):
+        def call(path, *more, **named):
+            if isinstance(path, str | Path) and folder in Path(path).absolute().parents and writes(*more, **named):
+                raise PermissionError(errno.EACCES, "Permission denied", str(path))
+            return what(path, *more, **named)
+
+        return call
+
+    def opens_to_write(mode="r", *_, **__):
+        return mode.strip("rbt") != ""
+
+    for module in (builtins, io):
+        monkeypatch.setattr(module, "open", guarded(open, opens_to_write))
+    changes = os.O_WRONLY | os.O_RDWR | os.O_CREAT
+    monkeypatch.setattr(os, "open", guarded(os.open, lambda flags, *_, **__: bool(flags & changes)))
+    monkeypatch.setattr(os, "mkdir", guarded(os.mkdir, lambda *_, **__: True))
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).absolute() != folder and access(path, mode))
+    return folder
+
+
+@pytest.mark.parametrize("line", LOCKED)
+def test_what_permissions_forbid_ends_in_one_sentence(line, locked, monkeypatch, capfd):
+    if line.startswith("new-line"):
+        monkeypatch.chdir(locked)
+    monkeypatch.setattr(openpanto, "supervised", lambda work: work())
+    before = sorted(locked.rglob("*"))
+    code = openpanto.main(shlex.split(line))
+    said = capfd.readouterr().err
+    errors = [text for text in said.splitlines() if "error: " in text]
+    assert code == 1, said
+    assert len(errors) == 1, said
+    assert not any(text in said for text in UNWORDED)
+    assert "ermission" in errors[0]
+    assert REMEDY.search(errors[0])
+    assert sorted(locked.rglob("*")) == before
+    for option in re.findall(r"--\w+", errors[0]):  # one that the verb has
+        assert option in openpanto._verbs(openpanto.command_line())[line.split()[0]].format_help()
 
 
 MAINS: Final = {"python -m master": master_main, "python -m models": models_main, "python -m fmus": fmus_main}

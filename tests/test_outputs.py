@@ -34,6 +34,8 @@ WHOLE = {
     "master/report/report_files.py": {"write_charts"},
     "master/results/parquet_export.py": {"_write"},
     "master/batch/sweep/sweep_table.py": {"write_parquet"},
+    "master/batch/sweep/lane_system.py": {"write"},
+    "master/batch/sweep/lanes_engine.py": {"_process"},
     "master/report/film_file.py": {"write_film"},
     "master/fmu/kept_fingerprints.py": {"keep_answer"},
     "master/ssp/pack.py": {"pack"},

@@ -130,7 +130,7 @@ def test_an_edit_of_the_line_changes_the_figures_with_nothing_else_done_by_hand(
     line.write_text(text.replace("45.3, 45.5, 45.0, 45.0, 45.0", "45.3, 45.5, 45.0, 47.0, 43.0"))  # within the interval
     code, out, err = call("run demo --out after --no-report")
     assert code == 0, err
-    assert "building Catenary_demo_LN2.fmu again: its sources have changed" in err
+    assert "building Catenary_demo_LN2.fmu again: what it is made of has changed" in err
     assert "building Pantograph" not in err
     found = [json.loads((tmp_path / name / "summary.json").read_text()) for name in ("before", "after")]
     (before,), (after,) = (summary["quality"] for summary in found)

@@ -336,6 +336,7 @@ def test_the_choices_of_the_verbs_are_the_kinds_that_there_are():
     assert verb_options.SCHEMES == SCHEMES
     assert verb_options.FORMATS == tuple(report_files.FORMATS)
     assert typing.get_args(sweep_plan.Keep) == verb_options.KEPT
+    assert typing.get_args(sweep_plan.Engine) == verb_options.ENGINES
     assert typing.get_args(distributions.Method) == verb_options.SAMPLINGS
     assert typing.get_args(sensitivity.SensitivityMethod) == verb_options.SENSITIVITIES
     assert physics_verbs.RESPONSES == identification.RESPONSE_KINDS

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from models.catenary.definition.line_reading import load
 from models.library.search_path import definition_files
 
 #: Catenary_LN2_F14F15: faults in the spans 14 and 15.
@@ -42,6 +41,8 @@ def fault_tables(definition: Path, spans: Iterable[int]) -> str:
     ValueError
         If the line cannot be read, or has no such span, or none with droppers.
     """
+    from models.catenary.definition.line_reading import load  # NumPy, which names alone do without
+
     section = load(definition).sections[0]
     tables = []
     for number in dict.fromkeys(spans):

@@ -44,6 +44,7 @@ _BUILDERS = (
     "builder/source_bundle.py",
     "builder/fmu_page.py",
     "loader/pythonfmu_repair.py",
+    "loader/syntax_trees.py",
 )
 #: Most pantograph ports of a line: each costs variables, and no train has more.
 MAX_PORTS = 16

@@ -8,11 +8,14 @@ content hash.
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+from fmus.loader.syntax_trees import statements
 
 #: What a machine that runs an FMU must have besides Python itself.
 REQUIREMENTS = ("numpy", "scipy")
@@ -113,13 +116,16 @@ def rewrite(module: Module, package: str, roots: Mapping[str, Path]) -> str:
 def check_rewritten(source: str, where: str, roots: Mapping[str, Path]) -> None:
     """Raise ``BundleError`` if a source still imports from ``roots`` under their public names."""
     tree = ast.parse(source)
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             left = [name for name in _imported_names(node) if _root(name) in roots]
             if left:
                 raise BundleError(f"{where}: import of {left[0]} could not be moved into the FMU")
-        elif isinstance(node, ast.Call) and _called(node) in _DYNAMIC_IMPORTS:
-            raise BundleError(f"{where}, line {node.lineno}: {_called(node)} cannot be moved into an FMU")
+    if not any(name in source for name in _DYNAMIC_IMPORTS):
+        return
+    for call in ast.walk(tree):
+        if isinstance(call, ast.Call) and _called(call) in _DYNAMIC_IMPORTS:
+            raise BundleError(f"{where}, line {call.lineno}: {_called(call)} cannot be moved into an FMU")
 
 
 def _with_parents(name: str) -> list[str]:
@@ -168,10 +174,14 @@ def _modules_of(node: ast.Import | ast.ImportFrom, name: str, roots: Mapping[str
                 yield inner
 
 
-def _imports(module: Module) -> Iterator[ast.Import | ast.ImportFrom]:
-    for node in ast.walk(ast.parse(module.source, str(module.path))):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            yield node
+def _imports(module: Module) -> Iterable[ast.Import | ast.ImportFrom]:
+    return _import_statements(module.source, str(module.path))
+
+
+@functools.lru_cache(maxsize=1024)  # asked for several times a build, and many FMUs carry the same modules
+def _import_statements(source: str, path: str) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    found = statements(ast.parse(source, path))
+    return tuple(node for node in found if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 def _imported_names(node: ast.Import | ast.ImportFrom) -> list[str]:

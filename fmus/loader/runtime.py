@@ -32,6 +32,7 @@ from fmus.loader.module_rehearsal import LoadedModules, RehearsalError, rehearse
 from fmus.loader.python_installation import PACKAGES, Installation, InstallationError, own
 from fmus.loader.runtime_licences import COMPILED_HERE, licences
 from fmus.loader.shared_libraries import BlasError, Libraries, collect_libraries
+from fmus.loader.syntax_trees import statements
 from models.definition_files.message_text import said
 
 #: Version of this layout, for the loader.
@@ -286,7 +287,7 @@ def _byte_code(name: str, source: bytes) -> bytes:
 def _without_docstrings(source: bytes) -> ast.Module:
     """Return a module's syntax tree without docstrings, a sixth of its byte code; assertions stay."""
     tree = ast.parse(source)
-    for node in ast.walk(tree):
+    for node in [tree, *statements(tree)]:
         if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             node.body[:1] = [ast.copy_location(ast.Pass(), node.body[0])] if len(node.body) == 1 else []
     return tree

@@ -208,8 +208,7 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
                 self._look_at_step(step_size)
             self._advance(self._part, self._variables.checked_inputs(current_time), step_size)
             self._time = current_time + step_size
-            self._variables.read_outputs(self._part)
-            self._variables.check_outputs(self._time)
+            self._variables.read_outputs(self._part, self._time)
         except BaseException as error:
             self._break_down(error)
             return False

@@ -39,6 +39,7 @@ class VariableValues:
         self._starts = self.parameters.copy()
         self._outputs = self.values[table.outputs]
         self._first_input, self._first_output = table.inputs.start, table.outputs.start
+        self._first_local = table.local.start
         self._references = list(range(len(table)))
         self._output_places = self._places(table.outputs, table.ports.outputs)
         self._local_places = self._places(table.local, table.ports.local)
@@ -135,10 +136,19 @@ class VariableValues:
         for places in (self._output_places, self._local_places, self._calculated_places):
             _read(places, part)
 
-    def read_outputs(self, part: Any) -> None:
-        """Read the outputs after a step; local variables are read once they are asked for."""
-        _read(self._output_places, part)
-        self.stale_from = self.table.local.start
+    def read_outputs(self, part: Any, time: float) -> None:
+        """Read the outputs after a step; local variables are read once they are asked for.
+
+        Raises
+        ------
+        AdapterError
+            If an output is not finite.
+        """
+        for place, port in self._output_places:
+            place[...] = port.read(part)
+        self.stale_from = self._first_local
+        if not _surely_finite(self._outputs):
+            self.check_outputs(time)
 
     def read_local(self, part: Any) -> None:
         """Read the local variables; then nothing is out of date."""
@@ -156,9 +166,7 @@ class VariableValues:
 
     def check_outputs(self, time: float) -> None:
         """Raise ``AdapterError`` if an output is not finite."""
-        if not _surely_finite(self._outputs):
-            why = "the model is unstable, try a shorter step"
-            self._check_finite(self.table.outputs, time, "output", why)
+        self._check_finite(self.table.outputs, time, "output", "the model is unstable, try a shorter step")
 
     def forget_results(self) -> None:
         """Make everything computed NaN, so that nobody can take it for a result."""

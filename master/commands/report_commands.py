@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -70,8 +70,11 @@ def _report_sweep(options: argparse.Namespace) -> int:
 def _claimed(folder: Path) -> Iterator[None]:
     """Keep others out of a results folder while its report is written."""
     with ExitStack() as claim:
-        with suppress(PermissionError):  # writing the report will say it
+        try:
             claim.enter_context(folder_lock.claimed(folder, "wait for it to end"))
+        except PermissionError as error:  # before figures are made for nothing
+            text = "its permissions do not allow it: change them, or copy the folder and report on the copy"
+            raise MasterError(f"{folder} cannot be written into: {text}") from error
         yield
 
 

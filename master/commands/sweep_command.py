@@ -44,7 +44,7 @@ def sweep_verb(options: argparse.Namespace) -> int:
             return 0
         folder = options.out or Path("results") / "sweep" / scenario.system.name
         keep_apart(folder, scenario.package)
-        engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after)
+        engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after, request)
         with progress_lines(console, options.quiet) as show:
             done = sweep(prepared, folder, engine, note, show, options.again)
     _print(options, folder, done)
@@ -67,6 +67,8 @@ def _request(options: argparse.Namespace) -> SweepRequest:
         "mean_force": options.mean_force,
         "tolerance": options.mean_tolerance,
         "keep": options.keep,
+        "engine": options.engine,
+        "check": options.check,
     }
     asked = {name: value for name, value in given.items() if value not in (None, {}, ())}
     # A plan is taken whole, from here or from there: half of each would be neither's.
@@ -86,3 +88,7 @@ def _print(options: argparse.Namespace, folder: Path, done: SweepOutcome) -> Non
         count = f"{len(done.finished)} runs, {len(done.failures)} failed"
         text = f"{count}; page: {folder / PAGE}; table: {', '.join(files)}"
         console.print(text, markup=False, soft_wrap=True)
+        if done.checks:
+            largest = max(check["largest difference [N]"] for check in done.checks)
+            text = f"{len(done.checks)} of them made by FMUs as well: contact forces differ by at most {largest:.1e} N"
+            console.print(text, markup=False, soft_wrap=True)

@@ -20,6 +20,7 @@ from master.ssp.ssp_units import number_advice
 SCHEMES: Final = ("jacobi", "gauss-seidel", "iterative")
 FORMATS: Final = ("png", "svg")
 KEPT: Final = ("all", "thinned", "figures", "failed")
+ENGINES: Final = ("fmu", "lanes")
 SAMPLINGS: Final = ("lhs", "sobol")
 SENSITIVITIES: Final = ("sobol", "morris")
 
@@ -159,11 +160,19 @@ def add_sweep(verbs: Any) -> None:
     add_overrides(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: results/sweep/NAME")
     parser.add_argument("--keep", choices=KEPT, help="what stays of the runs beside the table; default: figures")
+    text = "what makes the runs: their FMUs (default), or many side by side without FMUs, for lumped pantographs"
+    parser.add_argument("--engine", choices=ENGINES, help=text)
+    text = "with --engine lanes: runs that are made as FMUs as well, to compare; default: 1"
+    parser.add_argument("--check", type=_count_or_none, metavar="N", help=text)
     _add_engine(parser)
     parser.add_argument("--again", action="store_true", help="also make the runs again that failed")
     parser.add_argument("--dry-run", action="store_true", help="check everything and say how many runs there are")
     parser.add_argument("--quiet", action="store_true", help="no progress; files and exit code only")
     parser.add_argument("--json", action="store_true", help="print sweep.json")
+
+
+def _count_or_none(text: str) -> int:
+    return 0 if text == "0" else _count(text)
 
 
 def add_optimise(verbs: Any) -> None:

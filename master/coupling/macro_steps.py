@@ -119,12 +119,12 @@ def _run(
         check_inputs(network, grid.begin, None)
         for observer in observers:
             observer.begin(grid.begin, network)
-        previous = network.outputs.copy()
+        previous, observed = network.outputs.copy(), [observer.observe for observer in observers]
         with phase("stepping"):
             for index in range(grid.first, grid.count):
                 if stop_wanted():
                     return RunOutcome("interrupted", index, grid.time(index))
-                _advance(network, algorithm, grid, index, observers, previous)
+                _advance(network, algorithm, grid, index, observed, previous)
     except KeyboardInterrupt:
         return RunOutcome("interrupted", index, grid.time(index))
     except MasterError as error:
@@ -151,7 +151,7 @@ def _advance(
     algorithm: Algorithm,
     grid: TimeGrid,
     index: int,
-    observers: Sequence[Observer],
+    observed: Sequence[Callable[[int, float, Network], None]],
     previous: FloatArray,
 ) -> None:
     algorithm.step(network, grid.time(index), grid.step)
@@ -162,8 +162,8 @@ def _advance(
     if not network.is_plain:
         check_inputs(network, end, previous)
     previous[:] = network.outputs
-    for observer in observers:
-        observer.observe(index + 1, end, network)
+    for observe in observed:
+        observe(index + 1, end, network)
 
 
 def check_finite(network: Network, time: float, last_good: FloatArray | None) -> None:

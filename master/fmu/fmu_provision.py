@@ -89,7 +89,7 @@ def provide_fmu(
     place = scratch / path.name if scratch else path
     if place.is_file() and _matches(wanted, stored_guid(place)):
         return place
-    tell(f"building {path.name}" + (" again: its sources have changed" if place.is_file() else ""))
+    tell(f"building {path.name}" + (" again: what it is made of has changed" if place.is_file() else ""))
     build(place, lookup)
     return place
 

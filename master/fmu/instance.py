@@ -109,11 +109,15 @@ class Instance:
         self.output_names = component.outputs
         self.time = float("nan")
         self.stepping_time = 0.0
+        self._bound: tuple[FloatArray, FloatArray] | None = None
         self._dead = False
         fmi_log.clear(self.name)
         self._fmu = self._load()
         self.handle = self._fmu.component
-        self._do_step: Callable[..., int] = self.function("fmi2DoStep")
+        self._do_step = self.bare_function("fmi2DoStep")
+        # Of the C types already, see `Group`.
+        self._at, self._length = c_double(), c_double()
+        self._step_arguments = (c_void_p(self.handle), self._at, self._length, c_int(1))
 
     def function(self, name: str) -> Callable[..., int]:
         """Return an FMI function of the library; FMPy has declared its argument types."""
@@ -143,6 +147,18 @@ class Instance:
         """Exchange through these arrays from now on."""
         self._inputs = Group(self, self.input_names, inputs)
         self._outputs = Group(self, self.output_names, outputs)
+        self._bound = None
+
+    def read_along(self, names: Sequence[str]) -> FloatArray:
+        """Return where further variables are from now on, which are read with the bound outputs, by the same call.
+
+        To be called once, after `bind`.
+        """
+        count = len(self.output_names)
+        together = Group(self, (*self.output_names, *names))
+        self._bound = together.values[:count], self._outputs.values
+        self._outputs = together
+        return together.values[count:]
 
     def start(self, start: float, stop: float) -> None:
         """Set up the experiment, set the parameters, enter initialization mode."""
@@ -165,12 +181,16 @@ class Instance:
     def read(self) -> None:
         """Take the bound outputs from the FMU."""
         self._outputs.read()
+        if self._bound is not None:
+            found, bound = self._bound
+            bound[:] = found
 
     def step(self, time: float, step: float) -> None:
         """Advance from ``time`` to ``time + step``."""
-        self.time = time
+        self.time = self._at.value = time
+        self._length.value = step
         began = perf_counter()
-        status = self._do_step(self.handle, time, step, 1)
+        status = self._do_step(*self._step_arguments)
         self.stepping_time += perf_counter() - began
         if status not in _GOOD:
             raise self.error("a step", status, self._ended() if status == _DISCARD else "")

@@ -11,7 +11,7 @@ from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sensitivity import SensitivityMethod
 from master.batch.sweep.sensitivity_table import sensitivity_heads, sensitivity_rows
-from master.batch.sweep.sweep_plan import Keep, SweepRequest
+from master.batch.sweep.sweep_plan import Engine, Keep, SweepRequest
 from master.batch.sweep.sweep_session import PAGE, PreparedSweep, SweepOutcome
 from master.batch.sweep.sweep_session import sweep as run_sweep
 from master.batch.sweep.sweep_table import typed_columns
@@ -101,6 +101,8 @@ def sweep(
     mean_force: str | None = None,
     mean_tolerance: float | None = None,
     keep: Keep = "figures",
+    engine: Engine = "fmu",
+    check: int = 1,
     jobs: int | None = None,
     scheduler: str | None = None,
     progress: bool = False,
@@ -132,6 +134,8 @@ def sweep(
         How near to the mean force is enough, 0.2 N by default.
     keep : str
         What stays beside the table: ``all``, ``thinned``, ``figures`` or ``failed``.
+    engine, check
+        ``lanes`` makes runs with lumped pantographs side by side without FMUs, and ``check`` of them as FMUs as well.
     jobs : int, optional
         Runs at a time, each in a process; a script that gives it begins with ``if __name__ == "__main__":``.
     scheduler : str, optional
@@ -158,6 +162,8 @@ def sweep(
         "static_force": static_force,
         "mean_force": mean_force,
         "keep": keep,
+        "engine": engine,
+        "check": check,
     }
     request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
     console = Terminal(stderr=True)
@@ -171,7 +177,7 @@ def sweep(
         folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name
         keep_apart(folder, opened.package)
         prepared = PreparedSweep.of(opened.system, request)
-        return Sweep(folder, run_sweep(prepared, folder, engine_of(jobs, scheduler, tell), tell, tell))
+        return Sweep(folder, run_sweep(prepared, folder, engine_of(jobs, scheduler, tell, request=request), tell, tell))
 
 
 def _listed(name: str, values: Values) -> str:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from master.arrays import FloatArray
 from master.coupling.network import Network
 from master.errors import ForeignResultsError, MasterError, said
@@ -70,11 +72,13 @@ class Recorder:
     ) -> None:
         self.names = tuple(n for s in sources for n in s.names)
         self.units = tuple(units.get(n, "") for n in self.names)
-        self._sources = tuple(sources)
         self._every = every
-        self._format = (",".join([NUMBER_FORMAT] * (len(self.names) + 1)) + "\n").encode()
+        ends = list(itertools.accumulate((len(s.names) for s in sources), initial=1))
+        self._places = [(s, slice(*ends)) for s, ends in zip(sources, itertools.pairwise(ends), strict=True)]
         self._is_steady = is_steady
-        self._waiting: list[list[float]] = []
+        self._format = (",".join([NUMBER_FORMAT] * ends[-1]) + "\n").encode()
+        self._waiting: FloatArray = np.empty((1 if is_steady else ROWS_PER_FLUSH, ends[-1]))
+        self._unformatted = 0  # rows that wait there
         self._lines: list[bytes] = []
         self._count = 0  # rows not written yet, as numbers or as lines
         self._oldest = self._latest = -math.inf
@@ -137,15 +141,16 @@ class Recorder:
         return found
 
     def _record(self, time: float) -> None:
-        values = [time]
-        for source in self._sources:
+        row = self._waiting[self._unformatted]
+        row[0] = time
+        for source, place in self._places:
             source.read()
-            values += source.values.tolist()
+            row[place] = source.values
         if self._count == 0:
             self._oldest = time
         self._count += 1
         self._rows += 1
-        self._waiting.append(values)
+        self._unformatted += 1
         if self._is_steady:
             self._format_rows()
         spacing, self._latest = time - self._latest, time
@@ -153,8 +158,8 @@ class Recorder:
             self._write()
 
     def _format_rows(self) -> None:
-        self._lines += [self._format % tuple(row) for row in self._waiting]
-        self._waiting.clear()
+        count, self._unformatted = self._unformatted, 0
+        self._lines.append((self._format * count) % tuple(self._waiting[:count].ravel().tolist()))
 
     def _write(self) -> None:
         self._format_rows()

@@ -35,6 +35,14 @@ class Recordable(Protocol):
         """Return a group for further variables."""
 
 
+@runtime_checkable
+class Companion(Protocol):
+    """A slave that can read further variables together with its outputs."""
+
+    def read_along(self, names: Sequence[str]) -> FloatArray:
+        """Return where further variables are from now on."""
+
+
 @dataclass(frozen=True)
 class RecordingPlan:
     """Which variables are recorded how often.
@@ -90,9 +98,12 @@ def make_recorder(
     for component, slave in zip(system.components, network.slaves, strict=True):
         units |= {f"{component.name}.{v.name}": v.unit for v in component.fmu.variables.values()}
         names = plan.names.get(component.name, [])
-        if names and isinstance(slave, Recordable):
+        full_names = [f"{component.name}.{n}" for n in names]
+        if names and plan.every == 1 and isinstance(slave, Companion):
+            sources.append(RecordedValues(full_names, slave.read_along(names)))
+        elif names and isinstance(slave, Recordable):
             group = slave.group(names)
-            sources.append(RecordedValues([f"{component.name}.{n}" for n in names], group.values, group.read))
+            sources.append(RecordedValues(full_names, group.values, group.read))
     keep = 0 if made is None else made // plan.every + 1
     return Recorder(folder / recording_name(plan, system.step), sources, units, plan.every, keep, is_steady)
 

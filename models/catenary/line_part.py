@@ -238,12 +238,13 @@ class CatenaryPart:
         """
         count = steps_within(step, self.definition.time_step)
         start, h = self.time, step / count
-        motion, exchange, advance = self._motion, self.exchange, (self._balance or self.model).step
+        state, motion, exchange = self.state, self._motion, self.exchange
+        advance = (self._balance or self.model).step
         exchange.receive(start, step, strips, start + h, motion.strip)
-        result = advance(self.state, h, motion)
+        result = advance(state, h, motion)
         for k in range(2, count + 1):
             exchange.at(start + k * h, motion.strip)
-            result = advance(self.state, h, motion)
+            result = advance(state, h, motion)
         self.time = start + step
         self._publish(motion.strip, result)
 

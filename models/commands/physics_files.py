@@ -1,6 +1,6 @@
 """Files that the verbs write: each replaces the old one as a whole or leaves it, and every error names its file.
 
-`master.recording.safe_files` writes a run's files by the same rules; the packages do not import each other's tools, so
+`master.safety.safe_files` writes a run's files by the same rules; the packages do not import each other's tools, so
 the few lines stand in both.
 """
 
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from models.arrays import FloatArray
+from models.definition_files.message_text import said
 from models.definition_files.parameter import ParameterError
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def check_figure(path: Path) -> str:
     Raises
     ------
     ParameterError
-        If there is no such format, or no folder to write the figure into.
+        If there is no such format, or no folder to write the figure into, or one that permissions close.
     """
     from matplotlib.backend_bases import FigureCanvasBase
 
@@ -91,4 +92,6 @@ def check_figure(path: Path) -> str:
         raise ParameterError(f"{path}: a figure must be named .png or .svg, or another of {', '.join(sorted(known))}")
     if not path.parent.is_dir():
         raise ParameterError(f"{path}: there is no folder {path.parent}; make it, or name another place")
+    if not os.access(path.parent, os.W_OK):
+        raise ParameterError(f"{path}: {said(PermissionError(errno.EACCES, ''))}")
     return kind

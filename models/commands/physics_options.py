@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import errno
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,7 +15,7 @@ from rich.table import Table
 from master.evaluation.filters import DEFAULT, ForceFilter
 from models.commands.physics_verbs import Setting
 from models.definition_files.given_value import in_si
-from models.definition_files.message_text import printable
+from models.definition_files.message_text import printable, said
 from models.definition_files.parameter import Definition, ParameterError
 
 
@@ -88,10 +90,12 @@ def check_folder(path: Path | None) -> None:
     Raises
     ------
     ParameterError
-        If a file is in its way.
+        If a file is in its way, or permissions.
     """
     if path is None:
         return
     there = next(place for place in (path, *path.absolute().parents) if place.exists())
     if not there.is_dir():
         raise ParameterError(f"--out {path}: {there} is a file; name a folder, a new one or one of results")
+    if not os.access(there, os.W_OK):
+        raise ParameterError(f"--out {path}: {said(PermissionError(errno.EACCES, ''))}")

@@ -96,6 +96,15 @@ def add_couple(verbs: Any) -> None:
     parser.set_defaults(run=_later("couple_command"))
 
 
+def add_lanes(verbs: Any) -> None:
+    """Declare ``lanes``."""
+    parser = verbs.add_parser("lanes", help="make many runs of one line side by side (a sweep's engine)")
+    parser.add_argument("job", type=Path, help="JSON file that openpanto sweep --engine lanes writes")
+    text = "folder for line.arrays and a lane_N.arrays for every run that has ended"
+    parser.add_argument("--out", type=Path, required=True, help=text)
+    parser.set_defaults(run=_later("lanes_command"))
+
+
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """Add ``--set part.parameter=value``, repeatable."""
     parser.add_argument(

@@ -83,6 +83,14 @@ def load_kernels(name: str, source: bytes) -> ModuleType:
     return _load(module_name, _kept_source(source, f"{name}-{key}")) if found is None else found
 
 
+def wanted_kernels() -> str:
+    """Return what the environment asks for: auto, numpy or numba; raises ``KernelError`` if it is something else."""
+    wanted = os.environ.get(SWITCH, "auto")
+    if wanted not in ("auto", "numpy", "numba"):
+        raise KernelError(f"{SWITCH} is '{wanted}'; use auto, numpy or numba")
+    return wanted
+
+
 def kernels_if_wanted(name: str, source: bytes) -> ModuleType | None:
     """Return kernels as `load_kernels` does, None if there are none or `SWITCH` says to do without.
 
@@ -91,9 +99,7 @@ def kernels_if_wanted(name: str, source: bytes) -> ModuleType | None:
     KernelError
         If the environment asks for kernels that cannot be had, or for ones that do not exist.
     """
-    wanted = os.environ.get(SWITCH, "auto")
-    if wanted not in ("auto", "numpy", "numba"):
-        raise KernelError(f"{SWITCH} is '{wanted}'; use auto, numpy or numba")
+    wanted = wanted_kernels()
     if wanted == "numpy":
         return None
     try:

@@ -115,9 +115,14 @@ def test_bits_of_the_ordinary_ones_on_a_machine_with_nothing_but_libc(bare_machi
     assert numbers(run_host([*in_prison(bare_machine), "/host"], orders(system, there))) == ordinary
 
 
-def test_one_runtime_beside_the_fmus_serves_both(bare_machine, system, ordinary):
+@pytest.fixture(scope="module")
+def shared_runtime(bare_machine):
+    """The Python that several FMUs share, on the bare machine."""
+    return write_runtime(runtime_of(None), bare_machine / "runtime")
+
+
+def test_one_runtime_beside_the_fmus_serves_both(bare_machine, shared_runtime, system, ordinary):
     there = put_into(bare_machine, [c.fmu.path for c in system.components])
-    write_runtime(runtime_of(None), bare_machine / "runtime")
     command = [*in_prison(bare_machine), "/host"]
     assert numbers(run_host(command, orders(system, there), OPENPANTO_RUNTIME="/runtime")) == ordinary
 
@@ -138,14 +143,12 @@ def test_without_a_runtime_there_is_a_sentence(bare_machine, system):
         ("runtime.txt", "which holds no runtime.txt"),
     ],
 )
-def test_an_incomplete_runtime_is_one_sentence(bare_machine, system, lack, text):
+def test_an_incomplete_runtime_is_one_sentence(bare_machine, shared_runtime, system, tmp_path, lack, text):
     there = put_into(bare_machine, [c.fmu.path for c in system.components])
-    place = bare_machine / "broken"
-    write_runtime(runtime_of(None), place)
-    path = place / lack
-    shutil.rmtree(path) if path.is_dir() else path.unlink()
-    done = run_host([*in_prison(bare_machine), "/host"], orders(system, there), OPENPANTO_RUNTIME="/broken")
-    shutil.rmtree(place)
+    lacking = shared_runtime / lack
+    shutil.move(lacking, tmp_path / "away")
+    done = run_host([*in_prison(bare_machine), "/host"], orders(system, there), OPENPANTO_RUNTIME="/runtime")
+    shutil.move(tmp_path / "away", lacking)
     assert done.returncode == 1
     assert text in done.stderr
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from master.batch.sweep.sweep_engines import MakeRuns
 from master.batch.sweep.sweep_run import ATTEMPTS, DIED, RunPlace, SweepResult
@@ -42,6 +42,8 @@ class ChildEngine:
     tell: Callable[[str], None] = lambda _: None
     renew_after: int = 200
     width: int = 1
+    is_rehearsed: bool = True
+    checks: Sequence[Mapping[str, Any]] = ()
 
     @contextmanager
     def opened(self, base: System, place: RunPlace) -> Iterator[MakeRuns]:

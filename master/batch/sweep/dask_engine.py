@@ -15,7 +15,7 @@ import time
 import uuid
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -122,6 +122,8 @@ class DaskEngine:
     renew_after: int = 200
     tell: Callable[[str], None] = lambda _: None
     width: int = field(default=1, init=False)
+    is_rehearsed: bool = field(default=True, init=False)
+    checks: Sequence[Mapping[str, Any]] = field(default=(), init=False)
 
     @contextmanager
     def opened(self, base: System, place: RunPlace) -> Iterator[MakeRuns]:

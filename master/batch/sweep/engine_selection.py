@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from master.batch.sweep.child_engine import ChildEngine, can_start_processes
+from master.batch.sweep.lanes_engine import LanesEngine
 from master.batch.sweep.sweep_engines import HereEngine, SweepEngine
+from master.batch.sweep.sweep_plan import SweepRequest
 from master.errors import MasterError, UsageError
 
 
@@ -15,6 +17,7 @@ def engine_of(
     tell: Callable[[str], None],
     memory_limit: str = "auto",
     renew_after: int = 200,
+    request: SweepRequest | None = None,
 ) -> SweepEngine:
     """Return what makes the runs.
 
@@ -28,16 +31,22 @@ def engine_of(
         Shows the user what workers do.
     memory_limit, renew_after
         See `dask_engine.DaskEngine`.
+    request : SweepRequest, optional
+        Says whether runs are made side by side, see `lanes_engine.LanesEngine`.
 
     Raises
     ------
     UsageError
-        If both are asked for, or a limit of processes that none starts.
+        If both are asked for, or one of them with lanes, or a limit of processes that none starts.
     MasterError
         If Dask is not installed.
     """
     if jobs is None and memory_limit != "auto":
         raise UsageError("--memory-limit is of the processes that --jobs starts: give that too, or leave it out")
+    if request is not None and request.engine == "lanes":
+        if jobs is not None or scheduler is not None:
+            raise UsageError("--engine lanes makes its runs in one process: leave --jobs and --scheduler out")
+        return LanesEngine(request.check)
     if jobs is None and scheduler is None:
         return ChildEngine(tell, renew_after) if can_start_processes() else HereEngine()
     if jobs is not None and scheduler is not None:

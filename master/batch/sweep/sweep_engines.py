@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from typing import Protocol
+from typing import Any, Protocol
 
 from master.batch.sweep.sweep_run import RunPlace, SweepResult, carry_out
 from master.batch.sweep.swept_systems import SweepRun
@@ -21,6 +21,14 @@ class SweepEngine(Protocol):
     def width(self) -> int:
         """How many runs it makes at a time."""
 
+    @property
+    def is_rehearsed(self) -> bool:
+        """Whether a few steps of FMUs tell how long its runs take."""
+
+    @property
+    def checks(self) -> Sequence[Mapping[str, Any]]:
+        """Runs that it has made in another way as well, and by how much the two differ."""
+
     def opened(self, base: System, place: RunPlace) -> AbstractContextManager[MakeRuns]:
         """Get ready for the runs of a scenario, and yield what makes them.
 
@@ -35,6 +43,8 @@ class HereEngine:
     """Makes runs in this process."""
 
     width = 1
+    is_rehearsed = True
+    checks: Sequence[Mapping[str, Any]] = ()
 
     @contextmanager
     def opened(self, base: System, place: RunPlace) -> Iterator[MakeRuns]:

@@ -27,6 +27,7 @@ from master.system.components import System
 from master.system.pantograph_motion import STATIC_FORCE
 
 Keep = Literal["all", "thinned", "figures", "failed"]
+Engine = Literal["fmu", "lanes"]
 #: Most runs of a sweep.
 MOST_RUNS: Final = 100_000
 #: Column of a table that names its rows.
@@ -90,6 +91,10 @@ class SweepRequest(PlainRequest):
     keep : str
         What stays of the runs beside the table: ``all``; ``thinned``, the contact force and the summary;
         ``figures``, nothing; ``failed``, what those left that failed.
+    engine : str
+        What makes the runs: ``fmu``, or ``lanes``, which steps them side by side without FMUs.
+    check : int
+        How many runs ``lanes`` makes as FMUs as well, to compare.
     """
 
     over: dict[str, str] = Field(default_factory=dict)
@@ -105,6 +110,8 @@ class SweepRequest(PlainRequest):
     mean_force: str | None = None
     tolerance: float = Field(0.2, gt=0)
     keep: Keep = "figures"
+    engine: Engine = "fmu"
+    check: int = Field(1, ge=0)
 
 
 def stored_request(folder: Path) -> dict[str, Any]:

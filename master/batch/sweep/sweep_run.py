@@ -133,12 +133,12 @@ def carry_out(base: System, wanted: SweepRun, place: RunPlace) -> SweepResult:
             # All runs have the same ones: only a folder that stays whole has a use for them.
             done = run(system, folder / "run", (), RunOptions(keep_definitions=place.keep in ("all", "failed")))
             stepping = float(done.summary["performance"]["wall_time"])
-            rows = tuple(_rows(done, system))
+            rows = tuple(figure_rows(done, system))
             _kept(folder / "run", place, wanted.key)
         except InterruptedRunError:
             raise
         except Exception as error:  # one of a thousand runs must not end them all, whatever it is
-            rows, reason = (), _reason(error)
+            rows, reason = (), reason_of(error)
             with suppress(OSError):
                 _kept(folder / "run", place, wanted.key, failed=True)
     # An FMU in Python leaves its model in cycles of references: before Python takes them for many, they are gigabytes.
@@ -175,7 +175,7 @@ def _kept(made: Path, place: RunPlace, key: str, failed: bool = False) -> None:
     made.replace(place.of(key))
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """Return why a run has failed, without the place where it was made."""
     if isinstance(error, RunError) and isinstance(error.__cause__, MasterError):
         error = error.__cause__
@@ -211,7 +211,7 @@ def _calibrated(system: System, wanted: SweepRun, folder: Path) -> System:
     return with_forces(tuple(r.value for r in find_values(means, wanted.target, starts, wanted.tolerance)))
 
 
-def _rows(done: Results, system: System) -> Iterator[Row]:
+def figure_rows(done: Results, system: System) -> Iterator[Row]:
     """Yield the figures of every pantograph; without one, those of the recorded outputs."""
     found = {a.contact: a for a in done.assessments()}
     for contact in leading_first(done.recordings[0], list(found)) if found else ():

@@ -83,6 +83,8 @@ class SweepOutcome(BatchState):
         What has become of runs, by key.
     setting : dict
         What the page needs to know of the scenario, as in ``sweep.json``.
+    checks : sequence of dict
+        Runs that were made in two ways, and by how much these differ; see `SweepEngine`.
     """
 
     scenario: str
@@ -91,6 +93,7 @@ class SweepOutcome(BatchState):
     runs: tuple[SweepRun, ...]
     found: Mapping[str, SweepResult] = field(default_factory=dict)
     setting: Mapping[str, Any] = field(default_factory=dict)
+    checks: Sequence[Mapping[str, Any]] = ()
 
     @property
     def finished(self) -> tuple[SweepRun, ...]:
@@ -130,6 +133,7 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
         ],
         "runs": len(outcome.runs),
         "finished": len(outcome.finished),
+        "checks": list(outcome.checks),
         "failures": {str(number): reason for number, reason in outcome.failures.items()},
     }
 
@@ -232,7 +236,7 @@ def sweep(
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
                 found |= {r.key: old[r.key] for r in state.runs if r.key in old}
                 missing = list({r.key: r for r in state.runs if r.key not in found}.values())
-                state = replace(state, found=found)
+                state = replace(state, found=found, checks=chosen.checks)
 
                 def finish(so_far: SweepOutcome, result: SweepResult) -> SweepOutcome:
                     journal.add(result)
@@ -324,6 +328,8 @@ def _announcement(
     begun = f"{total} runs" if len(missing) == total else f"{total} runs, {which}"
     if any(r.target is not None for r in missing):
         return f"{begun}; the static force of each is found in several trials"
+    if not engine.is_rehearsed:
+        return f"{begun}, {min(engine.width, len(missing))} at a time"
     seconds = _rehearsed(make, start, missing, engine)
     if seconds is None:  # the runs themselves will say why
         return begun

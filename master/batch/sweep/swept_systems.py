@@ -22,6 +22,8 @@ from master.system.contacts import find_contacts
 from master.system.pantograph_motion import STATIC_FORCE, pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
+#: Swept values that the title of a run names.
+_MOST_NAMED: Final = 4
 _NUMBER: Final = r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
 _LAW: Final = re.compile(rf"\s*({_NUMBER})\s*N?\s*(?:\+\s*({_NUMBER})\s*\*?\s*v(?:\^2|\*\*2|²)\s*)?", re.ASCII)
 
@@ -107,9 +109,21 @@ class SweepRun:
     def system(self, base: System) -> System:
         """Return the system of the run, from the scenario's own."""
         changed = tuple(replace(c, parameters=dict(self.parameters.get(c.name, c.parameters))) for c in base.components)
-        whole = replace(base, name=f"{base.name}: run {self.number}", components=changed, stop=self.stop)
+        name = f"{base.name}: run {self.number}"
+        # The scenario's own title may say a speed that this run does not have.
+        title = f"{base.title or base.name}, with {text}" if (text := self._differences()) else base.title
+        whole = replace(base, name=name, title=title, components=changed, stop=self.stop)
         changed_whole = replace(whole, step=self.step, may_stop_early=whole.may_stop_early or self.is_rehearsal)
         return without(changed_whole, self.absent)
+
+    def _differences(self) -> str:
+        """Return the swept values as text, the first few of many."""
+        given = [(title.partition(" ["), value) for title, value in self.inputs.items() if value is not None]
+        texts = [
+            f"{name} = {value:g} {unit[:-1]}".strip() if isinstance(value, float) else f"{name} = {value}"
+            for (name, _, unit), value in given
+        ]
+        return ", ".join(texts[:_MOST_NAMED]) + (f" and {n} more" if (n := len(texts) - _MOST_NAMED) > 0 else "")
 
     def rehearsal(self, start: float, steps: int) -> SweepRun:
         """Return its first steps, as a run of its own that nothing is found for."""

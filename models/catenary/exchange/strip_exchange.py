@@ -69,7 +69,7 @@ class StripExchange:
             Which of them are the rises of the contact wire at the supports.
         """
         pantographs, sections = result.force.shape
-        result.force.sum(axis=1, out=outputs[:pantographs])
+        outputs[:pantographs] = result.force[:, 0] if sections == 1 else result.force.sum(axis=1)
         points = outputs[pantographs : 4 * pantographs].reshape(pantographs, 3)
         for place, *contact in zip(points, result.force, result.point, strips, strict=True):
             place[...] = application_point(*contact)

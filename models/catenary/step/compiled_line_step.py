@@ -16,6 +16,7 @@ from models.catenary.linear_motion.attachment_solver import Sparse
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.step_matrices import StepMatrices
+from models.catenary.step.array_book import ArrayBook
 from models.catenary.step.attachment_lanes import AttachmentLanes
 from models.catenary.step.mode_units import ModeUnits, PackedMotion
 from models.catenary.step.step_engine import GivenForce, SteppedLine
@@ -52,6 +53,7 @@ class CompiledLineStep:
     kernels, matrices
         The parameters.
     units : ModeUnits
+    lanes : AttachmentLanes
 
     Raises
     ------
@@ -69,33 +71,24 @@ class CompiledLineStep:
             raise UnsuitedError("they do not know the line's contact law")
         self.kernels, self.matrices, self._wires = kernels, matrices, line.wires
         self.units = ModeUnits(matrices, kernels)
-        lanes = AttachmentLanes(factor.matrix, factor.width, (-2.0 * modes.K, newmark.a2 * modes.M), kernels)
+        self.lanes = lanes = AttachmentLanes(
+            factor.matrix, factor.width, (-2.0 * modes.K, newmark.a2 * modes.M), kernels
+        )
         near = lanes if factor.matrix.shape[0] < _LONG else factor
         compliance = Compliance(near, droppers.B, droppers.by_change(newmark))
         self._records = StepRecords(line.wires, matrices, compliance, self.units.slots)
         contact = line.contact
         constants = np.array([newmark.a1, contact.stiffness, contact.exponent, contact.restitution, line.gap])
         n_attached, n_droppers = len(modes.attached), len(droppers.stiffness)
-        self._line = (
-            constants,
-            tuple(lanes.arrays),
-            tuple(self.units.arrays),
-            (
-                *_by_rows(droppers.B),
-                *(droppers.elastic_at_rest, droppers.stiffness, droppers.slack_delay, droppers.unilateral),
-                2.0 * droppers.rest_load,
-            ),
-            self._records.wires,
+        arrays = (
+            *(constants, *lanes.arrays, *self.units.arrays, *_by_rows(droppers.B), droppers.elastic_at_rest),
+            *(droppers.stiffness, droppers.slack_delay, droppers.unilateral, 2.0 * droppers.rest_load),
+            *(*self._records.wires, *lanes.work, np.zeros(n_attached), np.zeros(n_attached), np.zeros(n_droppers)),
         )
+        self._book = ArrayBook(arrays)
         intervals = [interval for wire in line.wires for interval in wire.intervals]
         self._sizes = max(i.size for i in intervals), max(len(i.ends) for i in intervals)
-        self._work = (
-            tuple(lanes.work),
-            np.zeros(n_attached),
-            np.zeros(n_attached),
-            np.zeros(n_droppers),
-            np.zeros((2, self._sizes[0])),
-        )
+        self._local = np.zeros((2, self._sizes[0]))
         self._droppers = np.zeros(n_droppers, dtype=np.bool_), np.zeros(n_droppers), np.zeros(n_droppers)
         self._report = np.zeros(5, dtype=np.int64)
         self._places: tuple[int, tuple[Any, ...], tuple[Any, ...]] = (0, (), ())
@@ -134,7 +127,7 @@ class CompiledLineStep:
         records.begin()
         report[0] = 0
         while answer := self.kernels.step(
-            self._line, moving, before, strips, given, records.arrays, work, report, (force, point, *out)
+            self._book.entries, moving, before, strips, given, records.arrays, work, report, (force, point, *out)
         ):
             self._answer(answer)
         packed.moved = True
@@ -167,7 +160,7 @@ class CompiledLineStep:
         if places > known or not work:
             known = max(places, 1)
             work = (
-                *self._work,
+                self._local,
                 np.zeros((5, known), dtype=np.int64),
                 np.zeros((7, known)),
                 *(np.zeros((known, size)) for size in self._sizes),

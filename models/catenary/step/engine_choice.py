@@ -6,7 +6,6 @@ numba is installed.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -15,7 +14,7 @@ from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.step.compiled_line_step import CompiledLineStep, UnsuitedError
 from models.catenary.step.plain_step import PlainStep
 from models.catenary.step.step_engine import StepEngine, SteppedLine
-from models.numerics.kernel_cache import SWITCH, KernelError, joined, load_kernels
+from models.numerics.kernel_cache import SWITCH, KernelError, joined, load_kernels, wanted_kernels
 from models.numerics.newmark import Newmark
 
 if TYPE_CHECKING:  # an FMU carries what is imported, and these are never imported by their names
@@ -49,9 +48,7 @@ def make_engine(line: SteppedLine, newmark: Newmark) -> StepEngine:
     numpy.linalg.LinAlgError
         If the line cannot make steps of this length.
     """
-    wanted = os.environ.get(SWITCH, "auto")
-    if wanted not in ("auto", "numpy", "numba"):
-        raise KernelError(f"{SWITCH} is '{wanted}'; use auto, numpy or numba")
+    wanted = wanted_kernels()
     matrices = StepMatrices(line.modes, newmark)
     if wanted == "numpy":
         return PlainStep(line, matrices)

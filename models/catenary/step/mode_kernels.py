@@ -28,7 +28,7 @@ ENDS = 6
 #: and the change of the amplitudes were the attachments held, of this step; for the next one once it is over.
 INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
 #: The modes of a line in units of eight, group by group: those of a group move with the same six ends. ``first``: the
-#: first unit of every group, and one more; ``rates``, shape (groups, 5): a1 / mu, a2 and a2 / mu of the modes, then c
+#: first unit of every group, and one more; ``rates``, five a group: a1 / mu, a2 and a2 / mu of the modes, then c
 #: and d with -2 lambda / K_hat = c + d / K_hat, less to read than these themselves; ``places``, ``shares``, shape
 #: (groups, 12): each end moves with two displacements of attachments, because intervals are turned in plan; ``more``,
 #: shape (k, 2): units that move with further ends, and their group; ``more_coupling``, ``more_places`` and
@@ -44,14 +44,16 @@ _R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
 @part
 def end(places, shares, of, k, change):
     """Return how an end of a group's intervals moves."""
-    return shares[of, _2 * k] * change[places[of, _2 * k]] + shares[of, _2 * k + _1] * change[places[of, _2 * k + _1]]
+    at = _2 * (np.uint64(ENDS) * of + k)
+    return shares[at] * change[places[at]] + shares[at + _1] * change[places[at + _1]]
 
 
 @part
 def draw(places, shares, of, k, force, pull):
     """Add a force on an end of a group's intervals to ``pull``."""
-    pull[places[of, _2 * k]] += shares[of, _2 * k] * force
-    pull[places[of, _2 * k + _1]] += shares[of, _2 * k + _1] * force
+    at = _2 * (np.uint64(ENDS) * of + k)
+    pull[places[at]] += shares[at] * force
+    pull[places[at + _1]] += shares[at + _1] * force
 
 
 @compiled
@@ -65,15 +67,15 @@ def prepare(modes, table, pull):
     """
     for i in range(pull.size):
         pull[i] = 0.0
-    for group in range(np.uint64(modes.rates.shape[0])):
-        rates = modes.rates[group]
+    for group in range(np.uint64(modes.rates.size) // _5):
+        rates = _5 * group
         for begin in range(modes.first[group] * _UNIT, modes.first[group + _1] * _UNIT, _UNIT):
             for k in range(begin, begin + _LANES):
                 inverse = table[k + _INVERSE]
-                held = (rates[3] + rates[4] * inverse) * table[k + _AMPLITUDE]
-                held += rates[1] * inverse * table[k + _MOMENTUM]
+                held = (modes.rates[rates + _3] + modes.rates[rates + _4] * inverse) * table[k + _AMPLITUDE]
+                held += modes.rates[rates + _1] * inverse * table[k + _MOMENTUM]
                 table[k + _HELD] = held
-                value = rates[2] * table[k + _RATE] - held
+                value = modes.rates[rates + _2] * table[k + _RATE] - held
                 for j in range(_0, np.uint64(ENDS)):
                     draw(modes.places, modes.shares, group, j, table[k + j * _LANES] * value, pull)
     draw_more(modes, table, pull)
@@ -99,10 +101,11 @@ def advance(modes, a1, change, table, pull):
         pull[i] = 0.0
     follow_more(modes, change, table)
     fast, places, shares = spread(a1), modes.places, modes.shares
-    for group in range(np.uint64(modes.rates.shape[0])):
-        rates = modes.rates[group]
-        to_momentum, a2, from_rate = spread(rates[_0]), spread(rates[_1]), spread(rates[_2])
-        stiff, less = spread(rates[_3]), spread(rates[_4])
+    for group in range(np.uint64(modes.rates.size) // _5):
+        rates = _5 * group
+        to_momentum, a2 = spread(modes.rates[rates]), spread(modes.rates[rates + _1])
+        from_rate = spread(modes.rates[rates + _2])
+        stiff, less = spread(modes.rates[rates + _3]), spread(modes.rates[rates + _4])
         e0, e1 = spread(end(places, shares, group, _0, change)), spread(end(places, shares, group, _1, change))
         e2, e3 = spread(end(places, shares, group, _2, change)), spread(end(places, shares, group, _3, change))
         e4, e5 = spread(end(places, shares, group, _4, change)), spread(end(places, shares, group, _5, change))
@@ -139,23 +142,23 @@ def advance(modes, a1, change, table, pull):
 @part
 def follow_more(modes, change, table):
     """Put what further ends do to the modes into ``table``, so that `advance` finds it there."""
-    for i in range(np.uint64(modes.more.shape[0])):
-        begin, group = modes.more[i, 0] * _UNIT, modes.more[i, 1]
+    for i in range(np.uint64(modes.more.size) // _2):
+        begin, group = modes.more[_2 * i] * _UNIT, modes.more[_2 * i + _1]
         moved = nothing()
         for j in range(_0, np.uint64(ENDS)):
             coupling = get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES)
             moved = plus_product(moved, coupling, spread(end(modes.more_places, modes.more_shares, i, j, change)))
         held, momentum = get(table, begin + _HELD), get(table, begin + _MOMENTUM)
         put(table, begin + _HELD, minus_product(held, moved, get(table, begin + _INVERSE)))
-        put(table, begin + _MOMENTUM, minus_product(momentum, spread(modes.rates[group, 0]), moved))
+        put(table, begin + _MOMENTUM, minus_product(momentum, spread(modes.rates[_5 * group]), moved))
 
 
 @part
 def draw_more(modes, table, pull):
     """Add what modes do to further ends to ``pull``."""
-    for i in range(np.uint64(modes.more.shape[0])):
-        begin, group = modes.more[i, 0] * _UNIT, modes.more[i, 1]
-        value = product(spread(modes.rates[group, 2]), get(table, begin + _RATE))
+    for i in range(np.uint64(modes.more.size) // _2):
+        begin, group = modes.more[_2 * i] * _UNIT, modes.more[_2 * i + _1]
+        value = product(spread(modes.rates[_5 * group + _2]), get(table, begin + _RATE))
         value = minus_product(value, spread(1.0), get(table, begin + _HELD))
         for j in range(_0, np.uint64(ENDS)):
             force = total(product(value, get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES)))

@@ -60,13 +60,13 @@ class ModeUnits:
         places, shares = _turned(modes.turn, np.concatenate([where[groups], end])[:, None] + np.arange(width))
         self.arrays = kernels.Modes(
             first=np.append(groups, n_units).astype(np.uint64),
-            rates=np.stack([newmark.a1 / mu, a2, newmark.a2 / mu, stiff, -stiff * mu], axis=1),
-            places=places[: len(groups)],
-            shares=shares[: len(groups)],
-            more=np.stack([pairs[:, 0], group[pairs[:, 0]]], axis=1).astype(np.uint64),
+            rates=np.stack([newmark.a1 / mu, a2, newmark.a2 / mu, stiff, -stiff * mu], axis=1).ravel(),
+            places=places[: len(groups)].ravel(),
+            shares=shares[: len(groups)].ravel(),
+            more=np.stack([pairs[:, 0], group[pairs[:, 0]]], axis=1).astype(np.uint64).ravel(),
             more_coupling=aligned(more),
-            more_places=places[len(groups) :],
-            more_shares=shares[len(groups) :],
+            more_places=places[len(groups) :].ravel(),
+            more_shares=shares[len(groups) :].ravel(),
         )
         begin = unit * kernels.ROWS * lanes + lane
         self.slots, self.rate, self.momentum, self.held = (

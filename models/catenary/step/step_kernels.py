@@ -27,7 +27,7 @@ from models.catenary.step.contact_kernels import (
 )
 from models.catenary.step.local_kernels import LACKING, SINGULAR, SOLVED, solve_local
 from models.catenary.step.mode_kernels import Modes, advance
-from models.catenary.step.vector_kernels import compiled, part
+from models.catenary.step.vector_kernels import compiled, floats64, ints64, part, uints32, uints64
 
 #: Answers of `step`.
 DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS, DROPPER_LACKS = range(5)
@@ -42,14 +42,14 @@ _1 = np.uint64(1)
 
 
 @compiled
-def step(line, moving, state, strips, given, records, work, report, out):
+def step(book, moving, state, strips, given, records, work, report, out):
     """Advance a line by one step, or as far as the records of intervals and droppers reach: then call again.
 
     Parameters
     ----------
-    line : (constants, Lanes, Modes, Droppers, Wires), as plain tuples
-        constants : ndarray, shape (5,)
-            a1, then ``contact`` of `law_of`.
+    book : ndarray of int
+        Of the arrays of the line and those to work in, see `models.catenary.step.array_book` and `_opened`. The first:
+        a1, then ``contact`` of `law_of`.
     moving : (attached, table, pull)
         attached : ndarray, shape (2, n_attached)
         table, pull
@@ -61,7 +61,7 @@ def step(line, moving, state, strips, given, records, work, report, out):
     given : (loaded, load)
         Known forces on the wires at the end of the step.
     records : Records
-    work : (lanes, change, pressed, free, local, whole, numbers, row, load, chosen), arrays to work in
+    work : (local, whole, numbers, row, load, chosen), arrays to work in
     report : ndarray of int, shape (5,)
         See above; all zero at first.
     out : (force, point, loaded, load, points, slack, lacks, pull)
@@ -77,29 +77,28 @@ def step(line, moving, state, strips, given, records, work, report, out):
     int
         DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS or DROPPER_LACKS; ``report[LACKS]`` says which.
     """
-    constants, lanes, modes, droppers, wires = line
-    droppers, wires, records = Droppers(*droppers), Wires(*wires), Records(*records)
-    lanes, modes = Lanes(*lanes), Modes(*modes)
+    constants, records = floats64(book, 0), Records(*records)
+    lanes, modes, droppers, wires, lanes_work, arrays = _opened(book)
+    change, pressed, free = arrays
     attached, table, pull = moving
     element, impact = state[0], state[1]
-    whole, numbers = work[5], work[6]
+    whole, numbers, chosen, size = work[1], work[2], work[5], attached.shape[1]
     points = Points(
         whole[0], whole[1], whole[2], whole[3], whole[4],
         numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6],
-        work[7], work[8],
+        work[3], work[4],
     )  # fmt: skip
-    change, free, chosen, size = work[1], work[3], work[9], attached.shape[1]
     motion = constants[0], table, change, attached
     if report[STAGE] < _BEGUN:
         lacking = _unknown(wires, records, state[2], given[0])
         if lacking >= 0:
             report[LACKS] = lacking
             return INTERVAL_LACKS
-        _begin(lanes, droppers, wires, records, moving, state, work)
+        _begin(lanes, droppers, wires, records, moving, state, points, change, pressed, lanes_work)
         _push(wires, records, given, points, motion)
         _put_free(droppers, motion, free)
         report[STAGE] = _BEGUN
-    lacking, count = _meet(wires, records, element, impact, strips[0], constants[4], motion, work[4], points, report)
+    lacking, count = _meet(wires, records, element, impact, strips[0], constants[4], motion, work[0], points, report)
     if lacking >= 0:
         report[LACKS] = lacking
         return INTERVAL_LACKS
@@ -128,6 +127,26 @@ def step(line, moving, state, strips, given, records, work, report, out):
 
 
 @part
+def _opened(book):
+    """Return the arrays of a book: those of the line, and those to work in."""
+    lanes = Lanes(
+        uints32(book, 1), uints32(book, 2), uints32(book, 3), floats64(book, 4), uints64(book, 5),
+        floats64(book, 6), floats64(book, 7), uints64(book, 8), uints64(book, 9), uints64(book, 10), uints64(book, 11),
+    )  # fmt: skip
+    modes = Modes(
+        uints64(book, 12), floats64(book, 13), uints32(book, 14), floats64(book, 15),
+        uints64(book, 16), floats64(book, 17), uints32(book, 18), floats64(book, 19),
+    )  # fmt: skip
+    droppers = Droppers(
+        uints32(book, 20), uints32(book, 21), floats64(book, 22), floats64(book, 23), floats64(book, 24),
+        floats64(book, 25), floats64(book, 26), floats64(book, 27),
+    )  # fmt: skip
+    wires = Wires(ints64(book, 28), floats64(book, 29), floats64(book, 30), ints64(book, 31), ints64(book, 32))
+    work = LanesWork(floats64(book, 33), floats64(book, 34), floats64(book, 35), floats64(book, 36), floats64(book, 37))
+    return lanes, modes, droppers, wires, work, (floats64(book, 38), floats64(book, 39), floats64(book, 40))
+
+
+@part
 def _unknown(wires, records, loaded, given):
     """Return an interval under a known force whose record is lacking, or -1."""
     for places in (loaded, given):
@@ -139,11 +158,10 @@ def _unknown(wires, records, loaded, given):
 
 
 @part
-def _begin(lanes, droppers, wires, records, moving, state, work):
+def _begin(lanes, droppers, wires, records, moving, state, points, change, pressed, lanes_work):
     """Find the change of the attachments under the forces at the beginning of the step, and known ones at its end."""
     attached, table, pull = moving
     loaded, force, slack, compensation = state[2], state[3], state[4], state[5]
-    change, pressed = work[1], work[2]
     for i in range(pressed.size):
         pressed[i] = droppers.known[i]
     for k in range(slack.size):
@@ -152,13 +170,12 @@ def _begin(lanes, droppers, wires, records, moving, state, work):
     for k in range(loaded.shape[0]):
         number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
         record, place = records.intervals[number], loaded[k, 1] - wires.begins[number]
-        row, share = work[7][0], work[8][0]
+        row, share = points.row[0], points.load[0]
         point(records, record, place, force[k, 0], table, row, share)
         press(records, record, row, force[k, 1], table)
         interval = interval_at(records.whole, record)
         for j in range(interval.size):
             pressed[records.whole[interval.ends + j]] += force[k, 1] * share[j]
-    lanes_work = LanesWork(*work[0])
     load(lanes, attached, pressed, pull, lanes_work)
     solve(lanes, lanes_work, change)
 

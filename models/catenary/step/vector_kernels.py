@@ -6,6 +6,7 @@ On a processor that takes fewer at a time the compiler splits them.
 from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
 from numba.extending import intrinsic, models, register_model
+from numba.np.arrayobj import populate_array
 
 #: Numbers taken at once.
 LANES = 8
@@ -132,3 +133,29 @@ def total(typing, value):
         return builder.call(reduce, [ir.Constant(ir.DoubleType(), -0.0), arguments[0]], fastmath=SUMS)
 
     return types.float64(value), generate
+
+
+def _reader(element):
+    """Return a function that gives the array of a book, see `models.catenary.step.array_book`, with such elements."""
+
+    @intrinsic
+    def read(typing, book, k):
+        result = types.Array(element, 1, "C")
+
+        def generate(context, builder, signature, arguments):
+            known = context.make_array(signature.args[0])(context, builder, arguments[0])
+            at = builder.mul(arguments[1], ir.Constant(arguments[1].type, 2))
+            address = builder.load(builder.gep(known.data, [at]))
+            size = builder.load(builder.gep(known.data, [builder.add(at, ir.Constant(at.type, 1))]))
+            array = context.make_array(result)(context, builder)
+            width = ir.Constant(ir.IntType(64), element.bitwidth // 8)
+            data = builder.inttoptr(address, array.data.type)
+            populate_array(array, data=data, shape=[size], strides=[width], itemsize=width, meminfo=None)
+            return array._getvalue()
+
+        return result(book, types.int64), generate
+
+    return read
+
+
+floats64, uints64, uints32, ints64 = (_reader(t) for t in (types.float64, types.uint64, types.uint32, types.int64))

@@ -54,6 +54,7 @@ class LumpedPantographPart:
         self._roof = 0.0
         self._shares = np.array(definition.air_shares)
         self._own = np.zeros(n)
+        self._drive: Drive | None = None  # what these loads are of
         self._balance: LumpedBalance | None = None
         self._compiled: CompiledStep | None = None
         self.observed = _observed(n)
@@ -93,7 +94,8 @@ class LumpedPantographPart:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
         start, x, count = self.time, point.item(0), steps_within(step, self.definition.time_step)
         self.time = start + step
-        self._own[:] = self._drive_loads(drive)
+        if drive != self._drive:
+            self._drive, self._own[:] = drive, self._drive_loads(drive)
         if self._compiled is not None:
             when, contact = (self._start_time, start, step), (force, x)
             hung = (self.state.reference, self._roof, drive.reference_rate)

@@ -66,7 +66,7 @@ def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
     assert said == []
     (own / "Light.toml").write_text((own / "Light.toml").read_text().replace("168", "170"))
     fmu_provision.provide_fmu(path, said.append)
-    assert said == ["building Pantograph_Light.fmu again: its sources have changed"]
+    assert said == ["building Pantograph_Light.fmu again: what it is made of has changed"]
     assert fmu_provision.stored_guid(path) == fingerprint(recipe(str(own / "Light.toml")))
     fmu_provision.provide_fmu(path, said.append)
     assert len(said) == 1
@@ -181,7 +181,7 @@ def test_the_fmu_of_an_own_definition_is_built_from_where_the_scenario_lies(proj
     assert fmu_provision.definition_of(path) == str(file)
     file.write_text(file.read_text().replace("168", "170"))
     fmu_provision.provide_fmu(path, said.append, library=scenario)
-    assert said[1:] == ["building Pantograph_Mine.fmu again: its sources have changed"]
+    assert said[1:] == ["building Pantograph_Mine.fmu again: what it is made of has changed"]
     file.unlink()
     fmu_provision.provide_fmu(path, said.append, library=scenario)
     assert "which it was built from, is missing" in said[-1]

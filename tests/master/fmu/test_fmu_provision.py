@@ -58,7 +58,7 @@ def test_missing_then_fresh_then_stale(builder, tmp_path):
     builder.fingerprint = "CD-34"
     fmu_provision.provide_fmu(path, reported.append)
     assert builder.asked[-2:] == ["fingerprint", "build"]
-    assert reported == ["building X.fmu", "building X.fmu again: its sources have changed"]
+    assert reported == ["building X.fmu", "building X.fmu again: what it is made of has changed"]
     assert fmu_provision.stored_guid(path) == "{cd-34}"
 
 
@@ -119,7 +119,7 @@ def test_the_fmu_of_a_users_definition_follows_its_file(builder, tmp_path):
     assert builder.orders[-1] == ("fingerprint", "--if-known", "--watched", *ports)
     builder.fingerprint = "CD-34"
     fmu_provision.provide_fmu(path, reported.append)
-    assert reported == ["building Mine.fmu again: its sources have changed"]
+    assert reported == ["building Mine.fmu again: what it is made of has changed"]
     assert builder.orders[-1][3:] == ports
     (tmp_path / "lines" / "Mine.toml").unlink()
     fmu_provision.provide_fmu(path, reported.append)
@@ -168,7 +168,7 @@ def test_what_the_scratch_folder_holds_is_used_as_long_as_it_fits(builder, tmp_p
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
     fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, scratch)
-    assert reported == ["building X.fmu", "building X.fmu again: its sources have changed"]
+    assert reported == ["building X.fmu", "building X.fmu again: what it is made of has changed"]
 
 
 def test_the_builder_takes_no_modules_from_the_working_folder(monkeypatch, tmp_path):

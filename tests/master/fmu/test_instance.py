@@ -55,6 +55,18 @@ def test_a_group_reads_in_the_order_of_its_names(make):
     instance.group([]).read()
 
 
+def test_further_variables_are_read_along_with_the_outputs(make):
+    instance, inputs, outputs = started(make, static_force=150.0, damping=0.0, speed=10.0)
+    along = instance.read_along(["static_force", "contact.force"])
+    inputs[0] = 50.0
+    instance.write()
+    instance.step(0.0, 1.0)
+    assert along.tolist() == [0.0, 0.0]
+    instance.read()
+    assert outputs == pytest.approx([5.0 + 1.25 * 0.25 * (1 + 2 + 3 + 4), 5.0, 10.0])
+    assert along.tolist() == [150.0, 50.0]
+
+
 def test_two_runs_from_a_saved_state_are_the_same(make):
     instance, inputs, outputs = started(make)
     instance.step(0.0, 0.1)

@@ -45,6 +45,42 @@ def test_file_and_memory_agree(tmp_path, fake_slave):
     assert again[NAME] == pytest.approx(recorder.read_back()[NAME], rel=1e-9)
 
 
+def test_every_source_has_its_columns(tmp_path, fake_slave):
+    """In a block of rows as in one."""
+    network = Network([fake_slave("s", (), ("y",), np.zeros(1), lambda s, u, t, h: np.zeros(1))], [])
+    first, second, read = np.zeros(2), np.zeros(1), []
+    sources = [RecordedValues(["a", "b"], first), RecordedValues(["c"], second, lambda: read.append(1))]
+    for is_steady in (False, True):
+        path = tmp_path / f"{is_steady}.csv"
+        recorder = Recorder(path, sources, {}, is_steady=is_steady)
+        for n in range(4):
+            first[:], second[:] = (10.0 + n, 20.0 + n), 30.0 + n
+            recorder.observe(n, 1e-3 * n, network)
+        recorder.finish()
+        rows = np.loadtxt(path, delimiter=",", skiprows=1)
+        assert rows.tolist() == [[1e-3 * n, 10.0 + n, 20.0 + n, 30.0 + n] for n in range(4)]
+    assert len(read) == 8
+
+
+def test_a_block_of_rows_reads_as_one_row_after_the_other(tmp_path, fake_slave):
+    """Constant columns, signs of zero, NaN and infinity included."""
+    network = Network([fake_slave("s", (), ("y",), np.zeros(1), lambda s, u, t, h: np.zeros(1))], [])
+    table = np.random.default_rng(4).standard_normal((30, 7)) * 10.0 ** np.arange(-12, 9, 3)
+    table[:, 1], table[:, 3], table[:, 5] = 0.1 + 0.2, np.nan, 0.0
+    table[7, 5], table[9, 2] = -0.0, np.inf
+    values, written = np.zeros(7), []
+    for is_steady in (True, False):
+        recorder = Recorder(tmp_path / f"{is_steady}.csv", [RecordedValues("abcdefg", values)], {}, is_steady=is_steady)
+        for n, row in enumerate(table):
+            values[:] = row
+            recorder.observe(n, 1e-3 * n, network)
+        recorder.finish()
+        written.append(recorder.path.read_text().splitlines()[1:])
+    assert written[0] == written[1]
+    assert written[1] == [",".join(f"{v:.10g}" for v in (1e-3 * n, *row)) for n, row in enumerate(table)]
+    assert "-0" in written[1][7].split(",")
+
+
 def test_rows_reach_the_disk_while_the_run_goes_on(tmp_path, fake_slave):
     path, seen = tmp_path / "a.csv", []
 

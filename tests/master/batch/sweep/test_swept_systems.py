@@ -1,9 +1,11 @@
 """The runs of a plan: stop times and forces that follow the speed, identities, and what no run can have."""
 
+from dataclasses import replace
+
 import pytest
 
 from master.batch.sweep.sweep_plan import SweepRequest, make_plan
-from master.batch.sweep.swept_systems import ForceLaw, make_runs
+from master.batch.sweep.swept_systems import ForceLaw, SweepRun, make_runs
 from master.errors import RequestError
 
 
@@ -17,6 +19,21 @@ def test_the_stop_time_follows_the_speed(toy_system):
     assert [r.stop for r in _runs(toy_system, over={"catenary.stiffness": "1,2"})] == [1.0, 1.0]
     assert [r.stop for r in _runs(toy_system, over={"speed": "50,55"}, stop=0.95)] == [0.95, 0.95]
     assert [r.stop for r in _runs(toy_system, over={"speed": "50", "stop": "1,2"})] == [1.0, 2.0]
+
+
+def test_the_title_of_a_run_names_its_values(toy_system):
+    base = replace(toy_system, title="toy at 36 km/h")
+    runs = _runs(base, over={"speed": "72", "catenary.stiffness": "4000,8000"})
+    assert [run.system(base).title for run in runs] == [
+        "toy at 36 km/h, with speed = 72, catenary.stiffness = 4000",
+        "toy at 36 km/h, with speed = 72, catenary.stiffness = 8000",
+    ]
+    many = SweepRun(1, "key", {}, 1.0, 0.001, inputs={f"p[{k}] [N/m]": float(k) for k in range(6)} | {"absent": None})
+    assert (
+        many.system(base).title
+        == "toy at 36 km/h, with " + ", ".join(f"p[{k}] = {k} N/m" for k in range(4)) + " and 2 more"
+    )
+    assert SweepRun(1, "key", {}, 1.0, 0.001).system(base).title == "toy at 36 km/h"
 
 
 @pytest.mark.parametrize(

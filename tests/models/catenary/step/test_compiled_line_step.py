@@ -43,7 +43,7 @@ def both(compiled_kernels):
     return of
 
 
-def strips(model, places, n, lift=0.03, speed=80.0, beat=0.0):
+def strips(model, places, n, lift=0.03, speed=80.0, beat=0.0, yielding=0.0):
     """Return strips that run along the track at the height of the first wire, which beat the wire by turns."""
     wire = model.static.positions[model.mesh.contact_chains()[0].nodes]
     result = []
@@ -54,7 +54,7 @@ def strips(model, places, n, lift=0.03, speed=80.0, beat=0.0):
         z = np.interp(at, wire[:, 0], wire[:, 2]) + lift + beat * np.sin(2.0 * np.pi * (n / 20.0 + k / 3.0))
         tilt = 0.002 * k
         result.append([[[x, y, z + y * tilt], [speed, 0.0, 0.1 * (k + 1)]] for y in (0.7, -0.7)])
-    return StripMotion(np.array(result), np.linspace(0.0, 2e-5, len(places)))
+    return StripMotion(np.array(result), np.linspace(yielding, 2e-5, len(places)))
 
 
 def run(both, line, places, steps=40, before=(), **how):
@@ -124,6 +124,13 @@ def test_slack_droppers(both, line_maker, law, ratio):
     assert slack.max() >= 2
 
 
+def test_slack_droppers_under_a_law_that_is_not_linear(both, short_line):
+    line = short_line.with_values({"contact.exponent": 1.5, "contact.stiffness": 5e5})
+    forces, slack = run(both, line, (70.0,), steps=60, lift=0.06)
+    assert slack.max() >= 1
+    assert forces[slack > 0].max() > 50.0
+
+
 def _thrown_up(model, state):
     """Give the contact wire a velocity that lets all droppers go slack."""
     velocity = np.zeros(model.mesh.fixed.shape)
@@ -142,7 +149,7 @@ def test_two_wires_in_an_overlap(both, section_maker, sections_maker):
     far = {"length": [75.0, "m", "test"], "rise": [0.2, "m", "test"]}
     left = section_maker(-75.0, 5, [0.2, -0.2, 0.2, -0.2], **far)
     right = section_maker(25.0, 5, [0.2, -0.2, 0.2, -0.2], **far)
-    forces, _ = run(both, sections_maker(left, right), (96.0, 40.0), steps=80)
+    forces, _ = run(both, sections_maker(left, right), (96.0, 40.0), steps=80, yielding=1e-5)
     assert (forces[:, 0] > 1.0).all(axis=1).any()
 
 

@@ -358,6 +358,15 @@ def test_values_of_a_grid_are_written_as_on_the_command_line(values, text):
     assert parameter_sweeps._listed("x", values) == text
 
 
+def test_what_is_given_by_parameter_is_a_mapping(toy_run):
+    for ask in (
+        lambda: master.sweep(toy_run[0], over="speed=40"),
+        lambda: master.optimise(toy_run[0], minimise="sigma", vary="speed=40:50"),
+    ):
+        with pytest.raises(master.MasterError, match=r"'speed=40.*' is not a mapping, such as"):
+            ask()
+
+
 @pytest.mark.parametrize("values", [200, [None], [[1, 2]]])
 def test_values_that_are_no_list_are_one_sentence(values):
     with pytest.raises(master.MasterError, match=r"x: .* is neither a text nor a list of numbers or texts"):

@@ -14,7 +14,7 @@ from master.batch.optimisation.optimisation_session import optimise as run_optim
 from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sweep_table import typed_columns
 from master.interface.data_frames import columns_frame
-from master.interface.scenario_runs import keep_apart
+from master.interface.scenario_runs import by_parameter, keep_apart
 from master.interface.scenario_view import Scenario, open_scenario
 from master.report.terminal_summary import Terminal
 from master.scenario import open_scenario as scenario_files
@@ -123,8 +123,8 @@ def optimise(
     asked: dict[str, object] = {
         "minimise": minimise,
         "maximise": maximise,
-        "vary": dict(vary),
-        "subject_to": list(subject_to),
+        "vary": by_parameter("vary", vary),
+        "subject_to": [subject_to] if isinstance(subject_to, str) else list(subject_to),
     }
     asked |= {} if mean_tolerance is None else {"tolerance": mean_tolerance}
     request = OptimisationRequest.read({**asked, "max_runs": max_runs, "seed": seed, "stop": chosen.overrides.stop})

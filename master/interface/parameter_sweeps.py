@@ -18,7 +18,7 @@ from master.batch.sweep.sweep_table import typed_columns
 from master.errors import RequestError
 from master.interface.data_frames import columns_frame, table_frame
 from master.interface.results_view import Results, read_results
-from master.interface.scenario_runs import keep_apart
+from master.interface.scenario_runs import by_parameter, keep_apart
 from master.interface.scenario_view import Scenario, open_scenario
 from master.report.terminal_summary import Terminal
 from master.scenario import open_scenario as scenario_files
@@ -151,14 +151,14 @@ def sweep(
         If the folder holds something else, or the workers are gone.
     """
     chosen = scenario if isinstance(scenario, Scenario) else open_scenario(scenario)
-    grid = {name: _listed(name, values) for name, values in (over or {}).items()}
-    asked: dict[str, object] = {"over": grid, "vary": dict(vary or {}), "samples": samples, "seed": seed}
+    grid = {name: _listed(name, values) for name, values in by_parameter("over", over).items()}
+    asked: dict[str, object] = {"over": grid, "vary": by_parameter("vary", vary), "samples": samples, "seed": seed}
     asked |= {} if method is None else {"method": method}
     asked |= {} if mean_tolerance is None else {"tolerance": mean_tolerance}
     given = {
         "sensitivity": sensitivity,
         "table": table,
-        "faults": tuple(faults),
+        "faults": (faults,) if isinstance(faults, int) else tuple(faults),
         "static_force": static_force,
         "mean_force": mean_force,
         "keep": keep,

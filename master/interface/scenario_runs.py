@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from master.batch import calibration
 from master.coupling.macro_steps import Observer
@@ -21,6 +23,8 @@ from master.run_session import run as run_system
 from master.scenario import open_scenario as scenario_files
 from master.ssp.archive import Package
 from master.system.components import System
+
+T = TypeVar("T")
 
 
 def run(
@@ -71,6 +75,19 @@ def run(
             if parquet:
                 parquet_export.write_parquet(folder)
     return Results(done)
+
+
+def by_parameter(name: str, given: Mapping[str, T] | None) -> dict[str, T]:
+    """Return what an argument gives by parameter, as a dict of its own.
+
+    Raises
+    ------
+    RequestError
+        If it is no mapping.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise RequestError(f"{name}: {given!r} is not a mapping, such as {{'speed': '200:320:20'}}")
+    return dict(given or {})
 
 
 def keep_apart(folder: Path, package: Package) -> None:

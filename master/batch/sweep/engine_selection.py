@@ -37,10 +37,12 @@ def engine_of(
     Raises
     ------
     UsageError
-        If both are asked for, or one of them with lanes, or a limit of processes that none starts.
+        If both are asked for, one of them with lanes, a limit of processes that none starts, or fewer than one.
     MasterError
         If Dask is not installed.
     """
+    if jobs is not None and not (isinstance(jobs, int) and jobs > 0):
+        raise UsageError(f"jobs: {jobs!r} is not a whole number above 0")
     if jobs is None and memory_limit != "auto":
         raise UsageError("--memory-limit is of the processes that --jobs starts: give that too, or leave it out")
     if request is not None and request.engine == "lanes":

@@ -19,6 +19,7 @@ distributed = pytest.importorskip("distributed")
 
 from master.batch.sweep import dask_engine, local_cluster  # noqa: E402 (it needs distributed)
 from master.batch.sweep.dask_engine import DaskEngine  # noqa: E402
+from master.batch.sweep.engine_selection import engine_of  # noqa: E402
 
 SMALL = {"over": {"catenary.stiffness": "4000:6000:500"}}
 
@@ -195,6 +196,12 @@ def test_processes_that_are_interrupted_as_they_start_do_not_trip_dask_at_its_en
     with pytest.raises(KeyboardInterrupt):
         local_cluster.local_cluster(2, "auto")
     assert HalfMade._instances == {"of another"}
+
+
+@pytest.mark.parametrize("jobs", [0, -3, 1.5, "2"])
+def test_a_number_of_processes_that_is_none_is_one_sentence(jobs):
+    with pytest.raises(MasterError, match=f"jobs: {jobs!r} is not a whole number above 0"):
+        engine_of(jobs, None, lambda _: None)
 
 
 @pytest.mark.parametrize("limit", ["much", "-1GB", "0"])

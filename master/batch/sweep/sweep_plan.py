@@ -214,6 +214,8 @@ def _check_used(request: SweepRequest, parameters: Sequence[SweptParameter]) -> 
         raise RequestError("--seed and --method are of samples: give --vary with --samples, or leave them out")
     if "tolerance" in given and request.mean_force is None:
         raise RequestError("--mean-tolerance is of --mean-force: give that too, or leave it out")
+    if request.check != SweepRequest.model_fields["check"].default and request.engine != "lanes":
+        raise RequestError("--check is of --engine lanes: give that too, or leave it out")
     varied = {name.rpartition(".")[2] for p in parameters for name in (p.targets or (p.name,))}
     if request.stop is not None and "stop" in varied:
         raise RequestError("the stop time is varied, so it cannot be the same for all runs: leave out --stop")

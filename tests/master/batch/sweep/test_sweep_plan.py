@@ -49,6 +49,7 @@ def test_a_table_names_its_rows_and_has_units_in_heads_or_cells(toy_system, tmp_
         ({"over": {"speed": "1,2"}, "method": "sobol"}, "--seed and --method are of samples"),
         ({"over": {"speed": "1,2"}, "seed": 2}, "--seed and --method are of samples"),
         ({"over": {"speed": "1,2"}, "tolerance": 2.0}, "--mean-tolerance is of --mean-force"),
+        ({"over": {"speed": "1,2"}, "check": 2}, "--check is of --engine lanes"),
         ({"over": {"stop": "1,2"}, "stop": 1.0}, "the stop time is varied"),
         ({"over": {"static_force": "1,2"}, "static_force": "70 N"}, "leave out one, or --static-force"),
         ({"over": {"pantograph.static_force": "1,2"}, "mean_force": "70 N"}, "leave out one, or --mean-force"),

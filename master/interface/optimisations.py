@@ -138,5 +138,5 @@ def optimise(
         folder = Path(out) if out is not None else Path("results") / "optimise" / opened.system.name
         keep_apart(folder, opened.package)
         prepared = PreparedOptimisation.of(opened.system, request, str(chosen.path))
-        engine = engine_of(jobs, scheduler, tell)
+        engine = engine_of(jobs, scheduler, tell, is_script=True)
         return Optimisation(folder, run_optimisation(prepared, folder, page, engine, tell, tell))

@@ -177,7 +177,10 @@ def sweep(
         folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name
         keep_apart(folder, opened.package)
         prepared = PreparedSweep.of(opened.system, request)
-        return Sweep(folder, run_sweep(prepared, folder, engine_of(jobs, scheduler, tell, request=request), tell, tell))
+        return Sweep(
+            folder,
+            run_sweep(prepared, folder, engine_of(jobs, scheduler, tell, request=request, is_script=True), tell, tell),
+        )
 
 
 def _listed(name: str, values: Values) -> str:

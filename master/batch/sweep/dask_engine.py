@@ -27,7 +27,7 @@ from typing import Any, Final, NamedTuple
 import dask.config
 from distributed import Client, Future, WorkerPlugin, get_worker, wait
 
-from master.batch.sweep.local_cluster import local_cluster
+from master.batch.sweep.local_cluster import AGAIN, local_cluster
 from master.batch.sweep.sweep_engines import MakeRuns
 from master.batch.sweep.sweep_run import ATTEMPTS, DIED, RunPlace, SweepResult, carry_out
 from master.batch.sweep.swept_systems import SweepRun
@@ -114,6 +114,8 @@ class DaskEngine:
         Runs after which a process is replaced by a new one.
     tell : callable
         Shows the user what workers do.
+    advice : str
+        What to do if processes cannot be started.
     """
 
     jobs: int | None = None
@@ -121,6 +123,7 @@ class DaskEngine:
     memory_limit: str = "auto"
     renew_after: int = 200
     tell: Callable[[str], None] = lambda _: None
+    advice: str = AGAIN
     width: int = field(default=1, init=False)
     is_rehearsed: bool = field(default=True, init=False)
     checks: Sequence[Mapping[str, Any]] = field(default=(), init=False)
@@ -147,7 +150,7 @@ class DaskEngine:
                 yield client, lambda: None
             return
         assert self.jobs is not None  # there is no scheduler
-        with local_cluster(self.jobs, self.memory_limit) as cluster, Client(cluster) as client:
+        with local_cluster(self.jobs, self.memory_limit, self.advice) as cluster, Client(cluster) as client:
             yield client, lambda: cluster.scale(self.jobs)
 
 

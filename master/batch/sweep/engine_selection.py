@@ -10,6 +10,9 @@ from master.batch.sweep.sweep_engines import HereEngine, SweepEngine
 from master.batch.sweep.sweep_plan import SweepRequest
 from master.errors import MasterError, UsageError
 
+#: What a script lacks whose processes end as they begin.
+_GUARD = "a script that gives jobs is a file, and does its work under: if __name__ == '__main__':"
+
 
 def engine_of(
     jobs: int | None,
@@ -18,6 +21,7 @@ def engine_of(
     memory_limit: str = "auto",
     renew_after: int = 200,
     request: SweepRequest | None = None,
+    is_script: bool = False,
 ) -> SweepEngine:
     """Return what makes the runs.
 
@@ -33,6 +37,8 @@ def engine_of(
         See `dask_engine.DaskEngine`.
     request : SweepRequest, optional
         Says whether runs are made side by side, see `lanes_engine.LanesEngine`.
+    is_script : bool
+        Whether Python asks, not a command: processes then import its script.
 
     Raises
     ------
@@ -57,4 +63,5 @@ def engine_of(
         from master.batch.sweep.dask_engine import DaskEngine
     except ImportError as error:
         raise MasterError("--jobs and --scheduler need Dask: pip install 'openpanto[scale]'") from error
-    return DaskEngine(jobs, scheduler, memory_limit, renew_after, tell)
+    advice = {"advice": _GUARD} if is_script else {}
+    return DaskEngine(jobs, scheduler, memory_limit, renew_after, tell, **advice)

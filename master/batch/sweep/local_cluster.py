@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from contextlib import suppress
+from typing import Final
 
 import dask.utils
 from distributed import LocalCluster
 
 from master.errors import MasterError, one_line
 
+#: What helps on a computer that had no room just then.
+AGAIN: Final = "start the sweep again"
 
-def local_cluster(jobs: int, memory_limit: str) -> LocalCluster:
+
+def local_cluster(jobs: int, memory_limit: str, advice: str = AGAIN) -> LocalCluster:
     """Return a cluster of so many processes.
 
     Parameters
@@ -19,6 +24,8 @@ def local_cluster(jobs: int, memory_limit: str) -> LocalCluster:
     jobs : int
     memory_limit : str
         Of every process, such as ``2GB``; ``auto`` for equal shares.
+    advice : str
+        What to do if they cannot be started.
 
     Raises
     ------
@@ -41,12 +48,13 @@ def local_cluster(jobs: int, memory_limit: str) -> LocalCluster:
             memory_limit=memory_limit,
             dashboard_address=None,
             host="127.0.0.1",
+            silence_logs=logging.CRITICAL,  # it is for us to say what they do
             env={**os.environ, "OMP_NUM_THREADS": "1"},
         )
     except (OSError, TimeoutError, RuntimeError) as error:  # one was ended as it began, or there is no room for it
         causes = error, error.__cause__, error.__context__
         why = next((str(c) for c in reversed(causes) if c is not None and str(c)), type(error).__name__)
-        text = f"the {jobs} processes of --jobs cannot be started ({one_line(why)}); start the sweep again"
+        text = f"the {jobs} processes of --jobs cannot be started ({one_line(why)}); {advice}"
         raise MasterError(text) from error
     except BaseException:  # Ctrl-C while they start
         _drop(set(LocalCluster._instances) - before)

@@ -176,6 +176,8 @@ def test_processes_that_cannot_be_started_are_one_sentence(swept, tmp_path, monk
     text = "the 2 processes of --jobs cannot be started (Cannot allocate memory); start the sweep again"
     with pytest.raises(MasterError, match=re.escape(text)):
         swept("out", DaskEngine(jobs=2), **SMALL)
+    with pytest.raises(MasterError, match="does its work under: if __name__ == '__main__':"):
+        swept("out", engine_of(2, None, lambda _: None, is_script=True), **SMALL)
     assert journal(tmp_path / "out") == []
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing.process
 import os
 import shlex
 import shutil
@@ -286,3 +287,13 @@ for line in [[], ["--version"], ["--help"], *([verb, "--help"] for verb in openp
 """
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(("parent", "said"), [(None, [b"error: interrupted\n"]), (object(), [])])
+def test_an_end_during_the_imports_is_told_by_the_command_and_not_by_its_processes(monkeypatch, parent, said):
+    written, codes = [], []
+    monkeypatch.setattr(multiprocessing.process, "parent_process", lambda: parent)
+    monkeypatch.setattr(openpanto.os, "write", lambda _, text: written.append(text))
+    monkeypatch.setattr(openpanto.os, "_exit", codes.append)
+    openpanto._end()
+    assert (written, codes) == (said, [1])

@@ -295,6 +295,8 @@ class _Crew:
     def _problem(self, answer: Any) -> str:
         if isinstance(answer, ImportError):
             return f"cannot import {answer.name or 'openpanto'}: install there what is installed here"
+        if isinstance(answer, OSError) and self._engine.memory_limit != "auto":
+            return f"died before its first run: --memory-limit {self._engine.memory_limit} may be too little"
         if isinstance(answer, BaseException):
             return f"cannot be examined: {answer}"
         theirs, missing = answer

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from master.batch.sweep.sweep_run import RunPlace
 from master.commands.main import main
 from master.errors import MasterError
 from tests import forked_commands
@@ -204,6 +205,16 @@ def test_processes_that_are_interrupted_as_they_start_do_not_trip_dask_at_its_en
 def test_a_number_of_processes_that_is_none_is_one_sentence(jobs):
     with pytest.raises(MasterError, match=f"jobs: {jobs!r} is not a whole number above 0"):
         engine_of(jobs, None, lambda _: None)
+
+
+def test_a_worker_that_ends_for_its_memory_is_told_with_the_limit(toy_system, tmp_path):
+    engine = DaskEngine(jobs=1, memory_limit="60MB")
+    crew = dask_engine._Crew(None, toy_system, RunPlace(tmp_path / "runs", "figures"), engine, lambda: None)
+    assert (
+        crew._problem(OSError("Stream is closed")) == "died before its first run: --memory-limit 60MB may be too little"
+    )
+    engine.memory_limit = "auto"
+    assert crew._problem(OSError("Stream is closed")) == "cannot be examined: Stream is closed"
 
 
 @pytest.mark.parametrize("limit", ["much", "-1GB", "0"])

@@ -33,8 +33,10 @@ from models.numerics.user_cache import cache_folder, check_owner
 
 #: Environment variable that chooses between compiled kernels and NumPy.
 SWITCH: Final = "OPENPANTO_KERNEL"
-#: An import of other kernels of the project, on one line or in brackets.
-_FROM_PROJECT: Final = re.compile(rb"^from models\.[\w.]+_kernels import (?:\([^)]*\)|[^(\n]*)$", re.MULTILINE)
+#: An import of other kernels of the project, on one line or in brackets; inside an FMU ``models`` lies in its package.
+_FROM_PROJECT: Final = re.compile(
+    rb"^from (?:openpanto_\w+\.)?models\.[\w.]+_kernels import (?:\([^)]*\)|[^(\n]*)$", re.MULTILINE
+)
 _LOG: Final = logging.getLogger("openpanto")
 #: Length of the checksum before the content of a file [bytes].
 _DIGEST: Final = hashlib.sha256().digest_size

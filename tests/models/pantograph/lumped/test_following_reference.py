@@ -27,7 +27,7 @@ def following(**values):
 def kernels(request, monkeypatch):
     if request.param == "numba":
         pytest.importorskip("numba")
-    monkeypatch.setenv("OPENPANTO_KERNELS", request.param)
+    monkeypatch.setenv("OPENPANTO_KERNEL", request.param)
 
 
 def pressed(definition, rise, rate=0.0, drive=Drive(), stop=8.0, step=2e-3):  # noqa: B008 - a tuple

@@ -50,10 +50,11 @@ def start(
     crew : str
         Which modules it finds imported, of `PRELOADED`.
     **pipes
-        ``stdout`` and ``stderr`` as for `subprocess.Popen`, text; what is not mentioned is thrown away.
+        ``stdout`` and ``stderr`` as for `subprocess.Popen`, text; what is not mentioned is thrown away. With anything
+        else (``preexec_fn``) the command is a whole new Python.
     """
     words, environment = [str(word) for word in command], dict(os.environ if env is None else env)
-    if not hasattr(os, "pidfd_open"):
+    if not hasattr(os, "pidfd_open") or pipes.keys() - {"stdout", "stderr"}:  # what a fork of the server cannot take
         whole = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **pipes}
         return subprocess.Popen([sys.executable, "-m", *words], cwd=cwd, env=environment, text=True, **whole)
     return _server(crew).start({"words": words, "cwd": str(cwd), "environment": environment}, pipes)

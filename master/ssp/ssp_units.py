@@ -90,6 +90,7 @@ COMMON: Final = {
         _unit("kN/m", 1e3, kg=1, s=-2),
         _unit("N/mm", 1e3, kg=1, s=-2),
         _unit("N.s/m", kg=1, s=-1),
+        _unit("N.s2/m2", kg=1, m=-1),
         _unit("N.m2", kg=1, m=3, s=-2),
         _unit("Pa", kg=1, m=-1, s=-2),
         _unit("MPa", 1e6, kg=1, m=-1, s=-2),

@@ -73,7 +73,7 @@ def kept_arrays(key: str) -> Snapshot | None:
         content = memoryview(data)[len(_MAGIC) + _DIGEST :]
         if data[: -len(content)] != _MAGIC + hashlib.sha256(content).digest():
             return None
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        with np.load(io.BytesIO(content)) as arrays:
             found = dict(arrays)
     except (OSError, EOFError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile):  # RuntimeError: without a home
         return None

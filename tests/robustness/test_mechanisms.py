@@ -31,7 +31,8 @@ def analysed(path, text) -> Answer:
     assert_lines(answer.err.splitlines())
     assert "Traceback" not in answer.err
     if answer.code:
-        assert answer.err.startswith("error: "), answer
+        said = [line for line in answer.err.splitlines() if not line.startswith("warning: ")]
+        assert said[0].startswith("error: "), answer
     assert "nan" not in answer.out, answer
     return answer
 

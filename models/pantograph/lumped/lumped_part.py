@@ -57,6 +57,7 @@ class LumpedPantographPart:
         self._drive: Drive | None = None  # what these loads are of
         self._balance: LumpedBalance | None = None
         self._compiled: CompiledStep | None = None
+        self._steps_as_kernels = False
         self.observed = _observed(n)
 
     def initialise(
@@ -157,6 +158,8 @@ class LumpedPantographPart:
         """Let kernels make the steps, if there are any; they keep no balance."""
         if self._compiled is None and not self.definition.monitor_energy:
             self._compiled = compiled_step(self.model)
+        elif self.definition.monitor_energy:
+            self._steps_as_kernels = compiled_step(self.model) is not None
         if self._compiled is not None:
             self._compiled.take(self._force)
 
@@ -169,13 +172,23 @@ class LumpedPantographPart:
         if self.model.follows:
             self._hang(load, outer, before, h, rate)
         self._load[:] = load
-        after = self.model.transition(h).dot(self._values)
+        after = self._moved(self.model.transition(h))
         if self._balance is not None:
             self._balance.add(h, after[0::3] - self.state.displacement, outer, force)
         if self.model.follows:
             self._follow(before, float(after[0]) - self._base.item(0), h, rate)
         self._roof = self._base.item(0)
         self._motion[:] = after
+
+    def _moved(self, transition: FloatArray) -> FloatArray:
+        """Return the motion after a step; where kernels step while nobody watches, added up in their order."""
+        if not self._steps_as_kernels:
+            moved: FloatArray = transition.dot(self._values)
+            return moved
+        moved = np.zeros(len(transition))
+        for column, value in zip(transition.T, self._values.tolist(), strict=True):
+            moved += column * value
+        return moved
 
     def _hang(self, load: FloatArray, outer: FloatArray, before: float, h: float, rate: float) -> None:
         """Let the lowest spring hang on the reference; its work is not that of an outer load."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import hashlib
 import importlib.util
 import logging
@@ -79,10 +80,15 @@ def load_kernels(name: str, source: bytes) -> ModuleType:
     """
     if importlib.util.find_spec("numba") is None:
         raise ImportError("numba is not installed; pip install numba")
-    key = hashlib.sha256(source + sys.version.encode()).hexdigest()[:16]
+    key = _key(source)
     module_name = f"openpanto_{name}_{key}"
     found = sys.modules.get(module_name)
     return _load(module_name, _kept_source(source, f"{name}-{key}")) if found is None else found
+
+
+@functools.cache
+def _key(source: bytes) -> str:
+    return hashlib.sha256(source + sys.version.encode()).hexdigest()[:16]
 
 
 def wanted_kernels() -> str:

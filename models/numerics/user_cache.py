@@ -119,17 +119,20 @@ def _folder() -> Path:
 
 def _make_room(folder: Path) -> None:
     """Delete what was not used for longest, until the rest is within bounds; unfinished files with it."""
-    files = sorted(((s.st_mtime, s.st_size, path) for path in folder.iterdir() if (s := _status(path))), reverse=True)
+    with os.scandir(folder) as entries:  # not as paths: their names would stay in the process
+        files = sorted(
+            ((s.st_mtime, s.st_size, entry.path) for entry in entries if (s := _status(entry))), reverse=True
+        )
     total = 0
     for _, size, path in files:
         total += size
         if total > _MOST:
-            path.unlink(missing_ok=True)
+            Path(path).unlink(missing_ok=True)
 
 
-def _status(path: Path) -> os.stat_result | None:
+def _status(entry: os.DirEntry[str]) -> os.stat_result | None:
     """Return size and age of a file, None if another process has deleted it meanwhile."""
     try:
-        return path.stat()
+        return entry.stat()
     except FileNotFoundError:
         return None

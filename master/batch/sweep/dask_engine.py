@@ -41,8 +41,12 @@ _LOOK: Final = 0.5
 _FETCH: Final = 30.0
 #: Seconds without a worker before the user is told.
 _ALONE: Final = 10.0
-#: How Dask is to work: a process that is slow to come back must not be given up.
-_SETTINGS: Final = {"distributed.worker.daemon": True, "distributed.deploy.lost-worker-timeout": "120s"}
+#: How Dask is to work: a process that is slow to come back must not be given up; no profile of every second is kept.
+_SETTINGS: Final = {
+    "distributed.worker.daemon": True,
+    "distributed.deploy.lost-worker-timeout": "120s",
+    "distributed.worker.profile.enabled": False,
+}
 #: Packages whose versions workers must share with the master: what computes a figure, and what carries it.
 _PACKAGES: Final = ("openpanto", "numpy", "scipy", "numba", "fmpy", "pythonfmu", "distributed")
 _ADDRESS: Final = re.compile(r"(?:[a-z]+://)?(?:\[[0-9a-f:]+\]|[^\s/:\[\]]+):\d+")

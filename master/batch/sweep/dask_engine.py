@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -52,6 +52,12 @@ _PACKAGES: Final = ("openpanto", "numpy", "scipy", "numba", "fmpy", "pythonfmu",
 _ADDRESS: Final = re.compile(r"(?:[a-z]+://)?(?:\[[0-9a-f:]+\]|[^\s/:\[\]]+):\d+")
 #: What cuts a connection.
 _GONE: Final = (OSError, TimeoutError, RuntimeError, AttributeError, CancelledError)
+
+
+def _anywhere(base: System) -> System:
+    """Return a system whose FMUs are found from every working folder."""
+    fmus = (replace(c.fmu, path=c.fmu.path.absolute()) for c in base.components)
+    return replace(base, components=tuple(replace(c, fmu=f) for c, f in zip(base.components, fmus, strict=True)))
 
 
 class ScenarioOnWorker(WorkerPlugin):  # type: ignore[misc]
@@ -218,7 +224,7 @@ class _Crew:
         self._deaths: Counter[str] = Counter()
         self._looked = 0.0
         self._seen = time.monotonic()
-        self._scenario = ScenarioOnWorker(base, RunPlace(place.folder.resolve(), place.keep))
+        self._scenario = ScenarioOnWorker(_anywhere(base), RunPlace(place.folder.resolve(), place.keep))
 
     @contextmanager
     def ready(self) -> Iterator[MakeRuns]:

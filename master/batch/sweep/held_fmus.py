@@ -31,7 +31,7 @@ def held_fmus(base: System, folder: Path) -> Iterator[System]:
     MasterError
         If there is no room for the copies, or an FMU is no longer the one that was read.
     """
-    own = folder / f"{WORK}{uuid.uuid4().hex}"
+    own = folder.absolute() / f"{WORK}{uuid.uuid4().hex}"  # workers have working folders of their own
     copies: dict[Path, Path] = {}
     try:
         yield replace(base, components=tuple(_held(c, own, copies) for c in base.components))

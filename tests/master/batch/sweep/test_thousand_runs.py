@@ -1,4 +1,4 @@
-"""Long counts: a thousand runs complete, and a worker does not grow over five hundred."""
+"""Long counts: a thousand runs complete, and processes do not grow with them."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ pytest.importorskip("distributed")
 from master.batch.sweep.dask_engine import DaskEngine
 
 pytestmark = pytest.mark.long
-#: Growth that a process may show between its fiftieth run and its last [MB].
+#: How far the memory of processes may lie apart, after their fiftieth run and after their last [MB].
 GROWTH = 5.0
 #: What the scripts of this project's FMUs end with: pythonfmu keeps the class that a script makes for every instance.
 LASTING = """
@@ -33,16 +33,19 @@ def lasting_toy(toy, tmp_path):
         FmuBuilder.build_FMU(script, dest=toy / "resources")
 
 
-def test_a_thousand_runs_complete_and_five_hundred_do_not_grow(lasting_toy, swept, tmp_path):
+def test_a_thousand_runs_complete_and_no_process_grows(lasting_toy, swept, tmp_path):
+    """Renewed as by default: what pythonfmu keeps of an instance, some 6 kB, would add up to 5.5 MB in 450 runs."""
     samples = {"vary": {"catenary.stiffness": "normal(5000, 100)"}, "samples": 1000}
-    done = swept("out", DaskEngine(jobs=2, renew_after=500), **samples)
+    done = swept("out", DaskEngine(jobs=2), **samples)
     assert (len(done.rows), done.failures, done.status) == (1000, {}, "complete")
     runs = journal(tmp_path / "out")
+    settled = []
     for worker in {run["worker"] for run in runs}:
         memory = [run["memory"] for run in runs if run["worker"] == worker]
-        assert len(memory) <= 500
         if len(memory) > 100:
-            assert memory[-1] - memory[49] < GROWTH
+            settled += [memory[49], memory[-1]]
+    assert len(settled) >= 4
+    assert max(settled) - min(settled) < GROWTH
     stiffness = [row["catenary.stiffness"] for row in done.rows]
     mean = sum(stiffness) / 1000
     assert abs(mean - 5000.0) < 2.576 * 100.0 / 1000**0.5

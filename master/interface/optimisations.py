@@ -14,9 +14,8 @@ from master.batch.optimisation.optimisation_session import optimise as run_optim
 from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sweep_table import typed_columns
 from master.interface.data_frames import columns_frame
-from master.interface.scenario_runs import by_parameter, keep_apart
+from master.interface.scenario_runs import by_parameter, keep_apart, teller
 from master.interface.scenario_view import Scenario, open_scenario
-from master.report.terminal_summary import Terminal
 from master.scenario import open_scenario as scenario_files
 
 if TYPE_CHECKING:
@@ -128,12 +127,7 @@ def optimise(
     }
     asked |= {} if mean_tolerance is None else {"tolerance": mean_tolerance}
     request = OptimisationRequest.read({**asked, "max_runs": max_runs, "seed": seed, "stop": chosen.overrides.stop})
-    console = Terminal(stderr=True)
-
-    def tell(text: object) -> None:
-        if progress:
-            console.print(str(text), markup=False, highlight=False)
-
+    tell = teller(progress)
     with scenario_files.open_scenario(chosen.path, replace(chosen.overrides, may_stop_early=False)) as opened:
         folder = Path(out) if out is not None else Path("results") / "optimise" / opened.system.name
         keep_apart(folder, opened.package)

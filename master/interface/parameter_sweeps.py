@@ -18,9 +18,8 @@ from master.batch.sweep.sweep_table import typed_columns
 from master.errors import RequestError
 from master.interface.data_frames import columns_frame, table_frame
 from master.interface.results_view import Results, read_results
-from master.interface.scenario_runs import by_parameter, keep_apart
+from master.interface.scenario_runs import by_parameter, keep_apart, teller
 from master.interface.scenario_view import Scenario, open_scenario
-from master.report.terminal_summary import Terminal
 from master.scenario import open_scenario as scenario_files
 
 if TYPE_CHECKING:
@@ -166,12 +165,7 @@ def sweep(
         "check": check,
     }
     request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
-    console = Terminal(stderr=True)
-
-    def tell(text: object) -> None:
-        if progress:
-            console.print(str(text), markup=False, highlight=False)
-
+    tell = teller(progress)
     overrides = replace(chosen.overrides, faults=request.faults)
     with scenario_files.open_scenario(chosen.path, overrides) as opened:
         folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name

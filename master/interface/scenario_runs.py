@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -75,6 +75,17 @@ def run(
             if parquet:
                 parquet_export.write_parquet(folder)
     return Results(done)
+
+
+def teller(progress: bool) -> Callable[[object], None]:
+    """Return what prints a text to standard error, if what happens is to be printed."""
+    console = Terminal(stderr=True)
+
+    def tell(text: object) -> None:
+        if progress:
+            console.print(str(text), markup=False, highlight=False)
+
+    return tell
 
 
 def by_parameter(name: str, given: Mapping[str, T] | None) -> dict[str, T]:

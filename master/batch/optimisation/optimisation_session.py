@@ -6,16 +6,16 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from master.arrays import FloatArray
-from master.batch.batch_session import BatchState, PacedFiles
+from master.batch.batch_session import PacedFiles
 from master.batch.optimisation.candidate_search import SearchEnd, search
 from master.batch.optimisation.optimisation_goal import (
     BoundedParameter,
@@ -28,7 +28,7 @@ from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest
 from master.batch.sweep.sweep_run import Row, RunPlace, SweepResult
-from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, write_parquet
+from master.batch.sweep.sweep_table import MadeRuns, as_csv, has_parquet, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs
 from master.errors import InterruptedRunError, RequestError
 from master.results import results_folder
@@ -46,7 +46,7 @@ _MOST_CORNERS: Final = 8
 
 
 @dataclass(frozen=True)
-class OptimisationOutcome(BatchState):
+class OptimisationOutcome(MadeRuns):
     """The state of an optimisation.
 
     Attributes
@@ -70,25 +70,8 @@ class OptimisationOutcome(BatchState):
     request: OptimisationRequest
     goal: Goal
     bounds: tuple[BoundedParameter, ...]
-    runs: tuple[SweepRun, ...] = ()
-    found: Mapping[str, SweepResult] = field(default_factory=dict)
     place: str = ""
     ended: str = ""
-
-    @property
-    def finished(self) -> tuple[SweepRun, ...]:
-        """The runs that are finished."""
-        return tuple(r for r in self.runs if r.key in self.found)
-
-    @property
-    def failures(self) -> dict[int, str]:
-        """Reasons why runs failed, by their numbers."""
-        return {r.number: self.found[r.key].reason for r in self.finished if self.found[r.key].failed}
-
-    @property
-    def rows(self) -> list[Row]:
-        """The table so far."""
-        return table_rows(self.runs, self.found)
 
     @property
     def start(self) -> float | None:

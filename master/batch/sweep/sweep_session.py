@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from master.batch.batch_session import BatchState, PacedFiles, run_tasks
+from master.batch.batch_session import PacedFiles, run_tasks
 from master.batch.sweep.held_fmus import held_fmus
 from master.batch.sweep.pages import sweep_page
 from master.batch.sweep.pages.sweep_view import read_view, view_of
@@ -20,8 +20,8 @@ from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, s
 from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
-from master.batch.sweep.sweep_run import Row, RunPlace, SweepResult
-from master.batch.sweep.sweep_table import as_csv, has_parquet, table_rows, unjudged_note, write_parquet
+from master.batch.sweep.sweep_run import RunPlace, SweepResult
+from master.batch.sweep.sweep_table import MadeRuns, as_csv, has_parquet, unjudged_note, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
 from master.errors import InterruptedRunError
 from master.report.report_files import write_charts
@@ -68,7 +68,7 @@ class SweepProgress:
 
 
 @dataclass(frozen=True)
-class SweepOutcome(BatchState):
+class SweepOutcome(MadeRuns):
     """The state of a sweep.
 
     Attributes
@@ -90,25 +90,8 @@ class SweepOutcome(BatchState):
     scenario: str
     request: SweepRequest
     plan: SweepPlan
-    runs: tuple[SweepRun, ...]
-    found: Mapping[str, SweepResult] = field(default_factory=dict)
     setting: Mapping[str, Any] = field(default_factory=dict)
     checks: Sequence[Mapping[str, Any]] = ()
-
-    @property
-    def finished(self) -> tuple[SweepRun, ...]:
-        """The runs of the plan that are finished."""
-        return tuple(r for r in self.runs if r.key in self.found)
-
-    @property
-    def failures(self) -> dict[int, str]:
-        """Reasons why runs failed, by their numbers."""
-        return {r.number: self.found[r.key].reason for r in self.finished if self.found[r.key].failed}
-
-    @property
-    def rows(self) -> list[Row]:
-        """The table so far."""
-        return table_rows(self.runs, self.found)
 
     @cached_property
     def sensitivity(self) -> tuple[SensitivityIndices, ...]:
@@ -181,7 +164,7 @@ class PreparedSweep:
         """
         plan = make_plan(base, request)
         runs = make_runs(base, plan, request)
-        return cls(base, SweepOutcome(base.name, request, plan, runs, setting=scenario_setting(base, plan)))
+        return cls(base, SweepOutcome(base.name, request, plan, runs=runs, setting=scenario_setting(base, plan)))
 
     @property
     def announced(self) -> str:

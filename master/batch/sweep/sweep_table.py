@@ -10,9 +10,11 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from master.batch.batch_session import BatchState
 from master.batch.sweep.sweep_plan import VARIANT
 from master.batch.sweep.sweep_run import TEXTS, Cell, Row, SweepResult
 from master.batch.sweep.swept_systems import SweepRun
@@ -21,6 +23,37 @@ from master.safety.safe_files import atomic_file, safe_cell
 #: A whole number as a parameter's value is written: any other text would not come back the same.
 _WHOLE: Final = re.compile(r"0|-?[1-9]\d{0,9}", re.ASCII)
 _TRUTH: Final = {"true": True, "false": False}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MadeRuns(BatchState):
+    """The state of a batch whose runs become rows of one table.
+
+    Attributes
+    ----------
+    runs : tuple of SweepRun
+        All that there are so far.
+    found : dict
+        What has become of runs, by key.
+    """
+
+    runs: tuple[SweepRun, ...] = ()
+    found: Mapping[str, SweepResult] = field(default_factory=dict)
+
+    @property
+    def finished(self) -> tuple[SweepRun, ...]:
+        """The runs that are finished."""
+        return tuple(r for r in self.runs if r.key in self.found)
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """Reasons why runs failed, by their numbers."""
+        return {r.number: self.found[r.key].reason for r in self.finished if self.found[r.key].failed}
+
+    @property
+    def rows(self) -> list[Row]:
+        """The table so far."""
+        return table_rows(self.runs, self.found)
 
 
 def table_rows(runs: Sequence[SweepRun], found: Mapping[str, SweepResult]) -> list[Row]:

@@ -19,6 +19,8 @@ from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
+from models.pantograph.multibody.reduced.reduced_motion import ReducedModel, ReducedMotion
+from models.pantograph.multibody.reduced.reduction import NotReducibleError, unsuitable_drive
 from models.pantograph.operation import NO_DRIVE, Drive
 
 
@@ -47,6 +49,7 @@ class MultibodyPantographPart:
     def __init__(self, definition: MechanismDefinition) -> None:
         self.definition = definition
         self.observed = _observed(definition)
+        self._lifted, self._holds = definition.lift, float(definition.holds_force)
         self.time = 0.0
         self.strip = np.zeros((2, 2, 3))
         self._start_time = 0.0
@@ -59,6 +62,9 @@ class MultibodyPantographPart:
         self._history: History | None = None
         self._substep = definition.time_step
         self._observation = np.zeros(len(self.observed))
+        self._reduced: ReducedMotion | None = None  # in what form it moves: the general one if there is none
+        self._is_shown = True
+        self._left = ""  # why it went on in the general form
         self._built: _Built | None = None
         self._balance: MechanismBalance | None = None
 
@@ -97,6 +103,12 @@ class MultibodyPantographPart:
         s = built.mechanism.split(self._y)
         s.r[:, 2] += base[0]
         s.v[:, 2] += base[1]
+        self._left = ""
+        self._reduced = None if built.reduced is None else ReducedMotion(built.reduced)
+        if self._reduced is not None:
+            self._reduced.begin(self._given())
+            self._show_reduced()
+            return
         inputs = self._inputs(0.0)
         self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
         watched = self.definition.monitor_energy
@@ -129,10 +141,12 @@ class MultibodyPantographPart:
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
         self._lift_besides(drive)
         operation = self.definition
-        expected = float(self.strip[:, 0, 0].mean())
+        expected = 0.5 * (self.strip.item(0) + self.strip.item(6))
         self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
         self._receive_lateral(force, point, expected, step)
         self._base.receive(base, step)
+        if self._reduced is not None and self._step_reduced(self._reduced, step, drive):
+            return
         elapsed = self.time - self._start_time
         kinks = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
         first, history = self._continuation()
@@ -156,6 +170,8 @@ class MultibodyPantographPart:
 
     def observation_values(self) -> FloatArray:
         """Return the values of ``observed``."""
+        if not self._is_shown:
+            self._observe_reduced()
         return self._observation.copy()
 
     def working_height_warning(self, x: float, z: float) -> str:
@@ -168,6 +184,13 @@ class MultibodyPantographPart:
         built = self._ready()
         return mechanism_warning(built.mechanism, built.reference)
 
+    def form(self) -> str:
+        """Say in which form the equations of motion are solved, and why if it is the general one."""
+        built = self._ready()
+        if self._left or built.reduced is None:
+            return f"general form of the equations: {self._left or built.not_reduced}"
+        return built.reduced.described
+
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
         return {
@@ -175,7 +198,8 @@ class MultibodyPantographPart:
             "state": self._y.copy(),
             "substep": np.array([self._substep]),
             "strip": self.strip.copy(),
-            "observation": self._observation.copy(),
+            "observation": self.observation_values(),
+            **({} if self._reduced is None else self._reduced.snapshot()),
             **(self._last.snapshot() if self._last is not None else {}),
             **(_history_snapshot(self._history) if self._history is not None else {}),
             **self._force.snapshot(),
@@ -193,11 +217,79 @@ class MultibodyPantographPart:
         self._observation[...] = snapshot["observation"]
         self._last = _Last.restored(snapshot)
         self._history = _restored_history(snapshot)
+        self._is_shown = True
+        self._reduced = self._restored_motion(snapshot)
         self._force.restore(snapshot)
         self._lateral.restore(snapshot)
         self._base.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
+
+    def _restored_motion(self, snapshot: Snapshot) -> ReducedMotion | None:
+        """Return the motion that a snapshot holds; None: it went on in the general form."""
+        built = self._ready()
+        if built.reduced is None or "reduced" not in snapshot:
+            return None
+        motion = ReducedMotion(built.reduced)
+        motion.restore(snapshot)
+        return motion
+
+    def _step_reduced(self, motion: ReducedMotion, step: float, drive: Drive) -> bool:
+        """Advance in the reduced form; False if that ends here and the general form has to take over."""
+        reason = unsuitable_drive(drive)
+        if not reason:
+            reason = motion.step(self._given(), step)
+        if reason:
+            self._y = motion.cartesian(self._base.at(0.0)[:2])
+            self._reduced, self._left, self._is_shown = None, f"from {self.time:.6g} s on, {reason}", True
+            self._last, self._history, self._substep = None, None, self.definition.time_step
+            return False
+        self._base.finish(step)
+        self.time += step
+        self._show_reduced()
+        return True
+
+    def _given(self) -> list[float]:
+        """Return the inputs of a step as the reduced form takes them; see `ReducedMotion.step`."""
+        operation, force, lateral = self.definition, self._force, self._lateral
+        return [
+            self.time, self._start_time,
+            force.known, *force.times, *force.values, force.order,
+            lateral.values[0], lateral.rate, lateral.times[0],
+            *self._base.cubic.tolist(),
+            self._ready().balance, self._lifted, operation.raise_start, operation.raise_duration,
+            self._uplift, self._holds,
+        ]  # fmt: skip
+
+    def _show_reduced(self) -> None:
+        """Bring the strip up to the state; what is observed waits until somebody asks."""
+        assert self._reduced is not None
+        built, operation = self._ready(), self.definition
+        track = operation.start_position + operation.speed * (self.time - self._start_time)
+        z, vz = self._base.now.tolist()
+        self._reduced.place_strip((track - built.strip_x, z + built.base_height, operation.speed, vz), self.strip)
+        self._is_shown = False
+
+    def _observe_reduced(self) -> None:
+        assert self._reduced is not None
+        motion, built, base = self._reduced, self._ready(), self._base
+        z, vz = base.now.tolist()
+        bodies = motion.bodies((z + built.base_height, vz, motion.base_acceleration))
+        held = (motion.lift[0],) if self.definition.holds_force else ()
+        self._observation[: bodies.size] = bodies.ravel()
+        self._observation[bodies.size :] = (*self._seen(self.strip), motion.lift_value(), *held, 0.0, 0.0)
+        self._is_shown = True
+
+    def _seen(self, ends: FloatArray) -> tuple[float, float, float]:
+        """Return roll, roll rate, and place of the contact along the strip for its ends, shape (2, 2, 3)."""
+        across = ends[0] - ends[1]
+        length2 = float(across[0] @ across[0])
+        roll = math.atan2(across[0, 2], across[0, 1])
+        roll_rate = float(across[1, 2] * across[0, 1] - across[1, 1] * across[0, 2]) / length2
+        middle = 0.5 * float(ends[0, 0, 1] + ends[1, 0, 1])
+        # Along the strip, which may roll and yaw.
+        offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
+        return roll, roll_rate, offset
 
     def _ready(self) -> _Built:
         if self._built is None:
@@ -276,20 +368,11 @@ class MultibodyPantographPart:
         self.strip[:, 1, 0] += operation.speed
         s, free = mechanism.split(self._y), slice(mechanism.driven, None)
         bodies = np.stack([s.r[free, 2] + built.base_height, s.v[free, 2], evaluation.acceleration[free, 2]], axis=1)
-        across = ends[0] - ends[1]
-        length2 = float(across[0] @ across[0])
-        roll = math.atan2(across[0, 2], across[0, 1])
-        roll_rate = float(across[1, 2] * across[0, 1] - across[1, 1] * across[0, 2]) / length2
-        middle = 0.5 * float(ends[0, 0, 1] + ends[1, 0, 1])
-        # Along the strip, which may roll and yaw.
-        offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
         values = evaluation.constraints
         acting = self._inputs(0.0) if self._last is None else self._last.inputs
         held = (acting.lift,) if operation.holds_force else ()
         own = (
-            roll,
-            roll_rate,
-            offset,
+            *self._seen(ends),
             mechanism.lift_value(self._y, acting),
             *held,
             np.abs(values.violation).max(initial=0.0),
@@ -347,6 +430,12 @@ class _Built:
         self.reference = posture.reference
         self.balance = posture.start.lift
         self.base_height = posture.base_height
+        self.reduced: ReducedModel | None = None
+        self.not_reduced = ""
+        try:
+            self.reduced = ReducedModel(self.mechanism, self.standing)
+        except NotReducibleError as error:
+            self.not_reduced = str(error)
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 
 

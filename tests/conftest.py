@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import compileall
 import gc
 from pathlib import Path
 from typing import Final
@@ -38,9 +39,26 @@ def group(item: pytest.Item) -> str:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let pytest-xdist take the groups in our order; by itself it takes those of most tests first."""
+    """Let pytest-xdist take the groups in our order; by itself it takes those of most tests first.
+
+    The hundred processes that tests start would compile all modules, each for itself, where Python is told to write no
+    bytecode (``PYTHONDONTWRITEBYTECODE``, as in many containers); it reads what is there.
+    """
+    if not hasattr(config, "workerinput"):
+        for package in ("models", "fmus", "master"):
+            compileall.compile_dir(HERE.parent / package, quiet=2)
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
+
+
+def pytest_collection() -> None:
+    """Look for no garbage while modules are imported: nearly all that they make stays."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Look for it again."""
+    gc.enable()
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -240,7 +240,7 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         try:
             places, _, highest = self._variables.find(vrs)
             if highest >= self._variables.stale_from:
-                self._bring_up_to_date()
+                self._bring_up_to_date(highest)
             return self._variables.values[places].tolist()
         except BaseException as error:
             self._refuse(error)
@@ -281,11 +281,11 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         """Refuse: there are no String variables."""
         self._refuse_type(vrs, "String")
 
-    def _bring_up_to_date(self) -> None:
+    def _bring_up_to_date(self, highest: int = sys.maxsize) -> None:
         if self._phase is _Phase.INITIALIZING:
             self._initialise_if_changed()
         elif not self._failures.current:
-            self._variables.read_local(self._part)
+            self._variables.read_asked(self._part, highest)
 
     def _refuse_type(self, references: list[int], kind: str) -> None:
         if references:

@@ -71,6 +71,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         return Ports(
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(_output_port(numbers, part),),
+            asked=(_nominal_port(numbers),),
             local=(*_dropper_ports(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
             calculated=(
                 *_geometry_ports(part),
@@ -133,6 +134,13 @@ def _output_port(numbers: range, part: CatenaryPart) -> Port:
         for i, s in enumerate(part.supports, 1)
     )
     return Port((*force, *point, *of_sections, *uplift), attrgetter("outputs"))
+
+
+def _nominal_port(numbers: range) -> Port:
+    text = "height of the contact wire under the strip's middle, its supports joined by straight lines"
+    height = tuple(Signal(f"pantograph[{p}].nominal.z", "m", f"nominal {text}") for p in numbers)
+    rate = tuple(Signal(f"pantograph[{p}].nominal.vz", "m/s", f"rate of nominal.z as strip {p} runs") for p in numbers)
+    return Port((*height, *rate), attrgetter("nominal"))
 
 
 def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:

@@ -189,16 +189,12 @@ def build_mesh(definition: CatenaryDefinition) -> CatenaryMesh:
     return _numbered(draft)
 
 
-def contact_wire_height(definition: CatenaryDefinition, section: Section, x: float) -> float:
+def contact_wire_height(places: SupportPlaces, x: float) -> float:
     """Return the specified static height of the contact wire at a dropper [m].
 
     Straight between the heights at the supports, minus the pre-sag parabola of the span, or the measured table; plus
     the rise to the anchors.
     """
-    return _contact_wire_height(SupportPlaces(definition, section), x)
-
-
-def _contact_wire_height(places: SupportPlaces, x: float) -> float:
     section = places.section
     if section.measured:
         xs, zs = zip(*section.measured, strict=True)
@@ -269,7 +265,7 @@ class _SectionMesher:
         return wire
 
     def _contact_height(self, x: float) -> float:
-        return _contact_wire_height(self.places, x)
+        return contact_wire_height(self.places, x)
 
     def _base_height(self, x: float) -> float:
         return self.places.height(x) + self.section.ends.rise_at(x)

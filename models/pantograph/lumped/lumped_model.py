@@ -88,8 +88,11 @@ class LumpedModel:
             return 0.0
         return self.definition.stage[0].stiffness * self.following(step).known(reference, above_roof, rate)
 
-    def free_response(self, state: LumpedState, step: float, load: FloatArray) -> FloatArray:
-        """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value."""
+    def free_response(self, state: LumpedState, step: float, load: FloatArray, rate: float = 0.0) -> FloatArray:
+        """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value.
+
+        A reference that follows the height moves at ``rate`` [m/s] besides.
+        """
         n, inverse = self._effective(step)
         # Plain floats where it goes mass by mass: the same bits, and for so few masses faster than arrays.
         displacement, velocity, acceleration = state.displacement, state.velocity, state.acceleration
@@ -98,7 +101,7 @@ class LumpedModel:
         damping = [n.a1 * d + n.a4 * v + n.a5 * a for d, v, a in motion]
         if self.follows:
             load = load.copy()
-            load[0] += self.reference_load(state.reference, float(displacement[0]), 0.0, step)
+            load[0] += self.reference_load(state.reference, float(displacement[0]), rate, step)
         result: FloatArray = inverse.dot(load + inertia + self.C.dot(damping))
         return result
 
@@ -111,12 +114,12 @@ class LumpedModel:
         """Return the velocity that belongs to a new displacement, shape (n,)."""
         return np.array(self._rates(state, step, displacement)[0])
 
-    def advance(self, state: LumpedState, step: float, displacement: FloatArray) -> None:
-        """Replace the state by the one that belongs to a new displacement."""
+    def advance(self, state: LumpedState, step: float, displacement: FloatArray, rate: float = 0.0) -> None:
+        """Replace the state by the one that belongs to a new displacement; ``rate`` as in `free_response`."""
         velocity, acceleration = self._rates(state, step, displacement)
         if self.follows:
             before, after = float(state.displacement[0]), float(displacement[0])
-            state.reference = self.following(step).moved(state.reference, before, after, 0.0)
+            state.reference = self.following(step).moved(state.reference, before, after, rate)
         state.displacement = displacement
         state.velocity, state.acceleration = np.array(velocity), np.array(acceleration)
 

@@ -12,6 +12,7 @@ from models.pantograph.lumped.compiled_step import CompiledStep, compiled_step
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+from models.pantograph.lumped.swaying_strip import SwayingStrip
 from models.pantograph.operation import NO_DRIVE, Drive
 
 
@@ -55,6 +56,7 @@ class LumpedPantographPart:
         self._shares = np.array(definition.air_shares)
         self._own = np.zeros(n)
         self._drive: Drive | None = None  # what these loads are of
+        self._sway = SwayingStrip(definition)
         self._balance: LumpedBalance | None = None
         self._compiled: CompiledStep | None = None
         self._steps_as_kernels = False
@@ -88,8 +90,10 @@ class LumpedPantographPart:
         self.state.acceleration[:] = self.model.initial_state(load).acceleration
         self._balance = LumpedBalance(self.model, load, force) if self.definition.monitor_energy else None
         self._force.start(time, force)
+        self._sway.receive(drive, base, 0.0)
         self._compile()
         self._place()
+        self._sway.place(self.strip)
 
     def step(self, force: float, point: FloatArray, base: FloatArray, step: float, drive: Drive = NO_DRIVE) -> None:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
@@ -97,6 +101,7 @@ class LumpedPantographPart:
         self.time = start + step
         if drive != self._drive:
             self._drive, self._own[:] = drive, self._drive_loads(drive)
+        self._sway.receive(drive, base, step)
         if self._compiled is not None:
             when, contact = (self._start_time, start, step), (force, x)
             hung = (self.state.reference, self._roof, drive.reference_rate)
@@ -104,6 +109,7 @@ class LumpedPantographPart:
                 self._values, when, count, contact, base, hung, self._own, self.outputs
             )
             self._roof = float(base[0]) + step * float(base[1])
+            self._sway.place(self.strip)
             return
         self._force.receive_at(start, force, x, self._x(start), self.definition.speed, step)
         h = step / count
@@ -113,6 +119,7 @@ class LumpedPantographPart:
             self._base[...] = height + k * h * velocity, velocity
             self._substep(start + k * h, h, drive.reference_rate)
         self._place()
+        self._sway.place(self.strip)
 
     @property
     def energy(self) -> FloatArray:
@@ -139,6 +146,7 @@ class LumpedPantographPart:
             "acceleration": self.state.acceleration.copy(),
             "reference": np.array([self.state.reference, self._roof]),
             **self._force.snapshot(),
+            **self._sway.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
 
@@ -151,8 +159,10 @@ class LumpedPantographPart:
         self._force.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
+        self._sway.restore(snapshot)
         self._compile()
         self._place()
+        self._sway.place(self.strip)
 
     def _compile(self) -> None:
         """Let kernels make the steps, if there are any; they keep no balance."""

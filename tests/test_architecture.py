@@ -49,7 +49,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"mechanism"},
         {"mechanism_assembly", "mechanism_energy"},
         {"analysis", "mechanism_integrator"},
-        {"mechanism_advice"},
+        {"mechanism_advice", "step_memory"},
         {"multibody_part"},
     ],
     "fmus": [{"slave", "loader"}, {"builder"}, {"__main__"}],

@@ -57,6 +57,10 @@ class LumpedDefinition(Operation):
     reference_time: float = quantity(
         "s", "time constant of the reference that follows the height", default=0.5, minimum=0.05, maximum=100.0
     )
+    base_height: float | None = quantity(
+        "m", "height of the base above the rails, about which the roof's roll turns the strip", default=None,
+        minimum=0.5, maximum=9.0,
+    )  # fmt: skip
     aerodynamic_share: tuple[float, ...] = series(
         "1", "share of the aerodynamic uplift that acts on each stage", default=(), minimum=0.0, maximum=1.0
     )

@@ -16,6 +16,7 @@ from models.pantograph.lumped.held_forces import HeldForces, held_forces
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+from models.pantograph.lumped.swaying_strip import SwayingStrip
 from models.pantograph.operation import NO_DRIVE, Drive
 
 
@@ -69,6 +70,7 @@ class LumpedPantographPart:
         self.told = [] if self._excursions is None else self._excursions.told
         self._has_met = False
         self._drive: Drive | None = None  # what these loads are of
+        self._sway = SwayingStrip(definition)
         self._balance: LumpedBalance | None = None
         self._compiled: CompiledStep | None = None
         self._steps_as_kernels = False
@@ -105,8 +107,10 @@ class LumpedPantographPart:
             self._held.start(self._motion, self._roof)
         self._balance = LumpedBalance(self.model, load, force) if self.definition.monitor_energy else None
         self._force.start(time, force)
+        self._sway.receive(drive, base, 0.0)
         self._compile()
         self._place()
+        self._sway.place(self.strip)
 
     def step(self, force: float, point: FloatArray, base: FloatArray, step: float, drive: Drive = NO_DRIVE) -> None:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
@@ -114,6 +118,7 @@ class LumpedPantographPart:
         self.time = start + step
         if drive != self._drive:
             self._drive, self._own[: self.model.size] = drive, self._drive_loads(drive)
+        self._sway.receive(drive, base, step)
         if self._compiled is not None:
             when, contact = (self._start_time, start, step), (force, x)
             hung = (self.state.reference, self._roof, drive.reference_rate)
@@ -121,6 +126,7 @@ class LumpedPantographPart:
                 self._values, when, count, contact, base, hung, self._own, self.outputs
             )
             self._roof = float(base[0]) + step * float(base[1])
+            self._sway.place(self.strip)
             self._watch(force, point)
             return
         self._force.receive_at(start, force, x, self._x(start), self.definition.speed, step)
@@ -131,6 +137,7 @@ class LumpedPantographPart:
             self._base[...] = height + k * h * velocity, velocity
             self._substep(start + k * h, h, drive.reference_rate)
         self._place()
+        self._sway.place(self.strip)
         self._watch(force, point)
 
     @property
@@ -159,6 +166,7 @@ class LumpedPantographPart:
             "reference": np.array([self.state.reference, self._roof]),
             **self._force.snapshot(),
             **({} if self._held is None else self._held.snapshot()),
+            **self._sway.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
 
@@ -174,8 +182,10 @@ class LumpedPantographPart:
         if self._balance is not None:
             self._balance.restore(snapshot)
             self._balance.held = 0.0 if self._held is None else self._held.stored
+        self._sway.restore(snapshot)
         self._compile()
         self._place()
+        self._sway.place(self.strip)
 
     def _compile(self) -> None:
         """Let kernels make the steps, if there are any; they keep no balance."""

@@ -45,8 +45,9 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Vertical motion only: the strip does not roll, and the lateral point of application has no effect.",
-        "Linear springs and dampers, identified at one working height; no friction, no stops. With follow_height = 1 "
-        "the reference of the lowest spring follows the height with the time constant reference_time, which makes it "
+        "Linear springs and dampers, identified at one working height; friction and stops only where the definition "
+        "has them. With follow_height = 1 the reference "
+        "of the lowest spring follows the height with the time constant reference_time, which makes it "
         "another model below 1 / (2 pi reference_time).",
         "Aerodynamic uplift is a coefficient times the square of the speed, as on open track.",
         "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; base.y, base.roll and their "
@@ -66,6 +67,9 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
 
     def _start_warnings(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
+
+    def _told(self, part: LumpedPantographPart) -> list[str]:
+        return part.told
 
     def _initialise(self, part: LumpedPantographPart, time: float, inputs: FloatArray) -> None:
         part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], _drive(inputs))

@@ -20,8 +20,8 @@ from models.catenary.step.vector_kernels import (
     put,
 )
 
-#: Attachments in lanes. ``order``, ``slot``: displacements in the order of their slots, and these, see above; so both
-#: sides are read and written one after the other. ``rows``, ``targets``, ``values``: -2 K and a2 M, of each row of vectors
+#: Attachments in lanes. ``order``, ``slot``: displacements in the order of their slots, and these, so that arrays in
+#: lanes are read and written from end to end. ``rows``, ``targets``, ``values``: -2 K and a2 M, of each row of vectors
 #: the upper triangle, both values one after the other, its diagonal first; a target beyond the segment is a row of the
 #: next. ``factor``: of each row that is not of a separator 1 / L_jj, L_j+k,j for k = 1 ... ``widths[j]``, and the row
 #: of L^-1 C, with C its coupling with the separator before the segment. ``middle``, ``shifts``: inverse of what is

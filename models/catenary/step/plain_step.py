@@ -91,8 +91,9 @@ class PlainStep:
         applied: list[AppliedForce] = []
         droppers = self._line.droppers
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
-            point = self._points.get((s, element, xi))
-            applied.append((point or self._responses.of(self._line.wires[s].interval(element)).point(element, xi), force))
+            known = self._points.get((s, element, xi))
+            point = known or self._responses.of(self._line.wires[s].interval(element)).point(element, xi)
+            applied.append((point, force))
         self._points.clear()
         self.linear.begin(state.motion, droppers.known_load(state.slack, state.compensation), applied)
         pull = droppers.pull(state.motion.attached)

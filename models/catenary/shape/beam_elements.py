@@ -148,6 +148,38 @@ def to_global(local: FloatArray, axes: FloatArray) -> FloatArray:
     return np.einsum("nki,nkl,nlj->nij", T, local, T, optimize=True)
 
 
+def point_loads(points: FloatArray, axes: FloatArray, xi: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the consistent nodal loads of forces on elements, shape (n, 12) [N, N m].
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2, 3)
+        Both ends of every element [m].
+    axes : ndarray, shape (n, 3, 3)
+        Their local axes.
+    xi : ndarray, shape (n,)
+        Where the force acts, as a share of the element.
+    force : ndarray, shape (n, 3)
+        In global axes [N].
+    """
+    length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+    along, lateral, upward = np.einsum("nij,nj->in", axes, force)
+    shape = np.stack(
+        [
+            1.0 - 3.0 * xi**2 + 2.0 * xi**3,
+            length * (xi - 2.0 * xi**2 + xi**3),
+            3.0 * xi**2 - 2.0 * xi**3,
+            length * (xi**3 - xi**2),
+        ],
+        axis=1,
+    )
+    local = np.zeros((len(points), 12))
+    local[:, _AXIAL] = along[:, None] * np.stack([1.0 - xi, xi], axis=1)
+    local[:, _XY] = lateral[:, None] * shape
+    local[:, _XZ] = upward[:, None] * shape * _XZ_SIGN
+    return np.asarray(np.einsum("nij,nbi->nbj", axes, local.reshape(-1, 4, 3)).reshape(-1, 12))
+
+
 def hermite_rows(axes: FloatArray, length: FloatArray) -> FloatArray:
     """Return the heights of elements' axes as polynomials of xi = 0 ... 1.
 

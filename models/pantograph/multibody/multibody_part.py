@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,14 +11,20 @@ from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
 from models.pantograph.multibody.analysis.cam_design import fit_force
 from models.pantograph.multibody.analysis.posture import take_posture
-from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
+from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation, SwayMotion
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_advice import mechanism_warning, working_height_warning
 from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
-from models.pantograph.operation import NO_DRIVE, Drive
+from models.pantograph.multibody.step_memory import (
+    LastEvaluation,
+    beyond_response,
+    history_snapshot,
+    restored_history,
+)
+from models.pantograph.operation import NO_DRIVE, Drive, OperationError
 
 
 class MultibodyPantographPart:
@@ -53,9 +58,10 @@ class MultibodyPantographPart:
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._lateral = LateralExtrapolation()
         self._base = BaseMotion()
-        self._uplift = 0.0
+        self._sway = SwayMotion()
+        self._drive = NO_DRIVE
         self._y = np.zeros(0)
-        self._last: _Last | None = None
+        self._last: LastEvaluation | None = None
         self._history: History | None = None
         self._substep = definition.time_step
         self._observation = np.zeros(len(self.observed))
@@ -86,18 +92,16 @@ class MultibodyPantographPart:
             If the mechanism cannot be assembled or balanced.
         """
         built = self._ready()
-        self._lift_besides(drive)
+        self._take(drive)
         self.time = self._start_time = time
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
         self._base.start(base)
+        self._sway.start(drive.sway)
         self._substep = self.definition.time_step
         self._history = None
-        self._y = built.standing.copy()
-        s = built.mechanism.split(self._y)
-        s.r[:, 2] += base[0]
-        s.v[:, 2] += base[1]
         inputs = self._inputs(0.0)
+        self._y = built.mechanism.standing_on(built.standing, inputs)
         self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
         watched = self.definition.monitor_energy
         self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
@@ -124,15 +128,16 @@ class MultibodyPantographPart:
             If the motion becomes singular.
         """
         built = self._ready()
-        values = (force, *point.tolist(), *base.tolist())
+        values = (force, *point.tolist(), *base.tolist(), *drive.sway, drive.air, drive.uplift, drive.lift)
         if not all(map(math.isfinite, values)):
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
-        self._lift_besides(drive)
+        self._take(drive)
         operation = self.definition
         expected = float(self.strip[:, 0, 0].mean())
         self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
         self._receive_lateral(force, point, expected, step)
         self._base.receive(base, step)
+        self._sway.receive(drive.sway, step)
         elapsed = self.time - self._start_time
         kinks = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
         first, history = self._continuation()
@@ -141,6 +146,7 @@ class MultibodyPantographPart:
         self._y, self._substep, self._history = done.y, done.step, done.history
         inputs = self._inputs(step)
         self._base.finish(step)
+        self._sway.finish(step)
         self.time += step
         self._remember(done.evaluation, inputs)
 
@@ -177,10 +183,11 @@ class MultibodyPantographPart:
             "strip": self.strip.copy(),
             "observation": self._observation.copy(),
             **(self._last.snapshot() if self._last is not None else {}),
-            **(_history_snapshot(self._history) if self._history is not None else {}),
+            **(history_snapshot(self._history) if self._history is not None else {}),
             **self._force.snapshot(),
             **self._lateral.snapshot(),
             **self._base.snapshot(),
+            **self._sway.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
 
@@ -191,11 +198,12 @@ class MultibodyPantographPart:
         self._substep = float(snapshot["substep"][0])
         self.strip[...] = snapshot["strip"]
         self._observation[...] = snapshot["observation"]
-        self._last = _Last.restored(snapshot)
-        self._history = _restored_history(snapshot)
+        self._last = LastEvaluation.restored(snapshot)
+        self._history = restored_history(snapshot)
         self._force.restore(snapshot)
         self._lateral.restore(snapshot)
         self._base.restore(snapshot)
+        self._sway.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
 
@@ -206,7 +214,7 @@ class MultibodyPantographPart:
 
     def _remember(self, evaluation: Evaluation, inputs: Inputs) -> None:
         """Keep the equations of motion at the end of a step: they begin the next one."""
-        self._last = _Last(evaluation.acceleration, evaluation.response, inputs)
+        self._last = LastEvaluation(evaluation.acceleration, evaluation.response, inputs)
         self._show(evaluation)
 
     def _account(self, step: float, first: FloatArray | None, done: Advance) -> None:
@@ -222,12 +230,7 @@ class MultibodyPantographPart:
         acted, as far as they follow from the last inputs.
         """
         last, inputs, history = self._last, self._inputs(0.0), self._history
-        if (
-            last is None
-            or last.inputs.lift != inputs.lift
-            or last.inputs.uplift != inputs.uplift
-            or last.inputs.base[:2] != inputs.base[:2]
-        ):
+        if last is None or beyond_response(last.inputs) != beyond_response(inputs):
             return None, None
         mechanism = self._ready().mechanism
         first, change = mechanism.with_inputs(self._y, last.acceleration, last.response, last.inputs, inputs)
@@ -245,17 +248,33 @@ class MultibodyPantographPart:
 
     def _inputs(self, tau: float) -> Inputs:
         """Return what acts ``tau`` [s] after the beginning of the step."""
-        time = self.time + tau
+        built, drive, time = self._ready(), self._drive, self.time + tau
         force = self._force.at(time)
-        lift, uplift = self._lift(time), self._uplift
+        lift, uplift = self._lift(time), self.definition.aerodynamic_force(drive.air) + drive.uplift
         if self.definition.holds_force:
             lift, uplift = lift + uplift, 0.0
-        return Inputs(self._base.at(tau), lift, force, self._lateral.at(time), uplift)
+        driven = drive.lift if self.definition.lift_input else None
+        against = self.definition.speed - drive.air if built.mechanism.forces.air.count else 0.0
+        return Inputs(
+            self._base.at(tau), lift, force, self._lateral.at(time), uplift, self._sway.at(tau), 0.0, against, driven
+        )
 
-    def _lift_besides(self, drive: Drive) -> None:
-        """Take the uplift of the air and of a controller."""
-        self._uplift = self.definition.aerodynamic_force(drive.air) + drive.uplift
-        if self._uplift != 0.0:
+    def _take(self, drive: Drive) -> None:
+        """Take what acts besides contact and roof.
+
+        Raises
+        ------
+        OperationError
+            If a force is added to a lift that is set directly.
+        """
+        self._drive, definition = drive, self.definition
+        if definition.lift_input:
+            if drive.uplift != 0.0:
+                raise OperationError(
+                    f"{definition.name}: uplift_force is {drive.uplift:g} N, but with lift_input = 1 the input "
+                    "lift.value replaces all that lifts: add it there, or set lift_input to 0"
+                )
+        elif drive.uplift != 0.0 or definition.air_coefficient != 0.0:
             built = self._ready()
             fit_force(built.mechanism, built.reference)
 
@@ -285,7 +304,7 @@ class MultibodyPantographPart:
         offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
         values = evaluation.constraints
         acting = self._inputs(0.0) if self._last is None else self._last.inputs
-        held = (acting.lift,) if operation.holds_force else ()
+        held = (mechanism.held_force(self._y, acting),) if operation.holds_force else ()
         own = (
             roll,
             roll_rate,
@@ -297,41 +316,6 @@ class MultibodyPantographPart:
         )
         self._observation[: bodies.size] = bodies.ravel()
         self._observation[bodies.size :] = own
-
-
-class _Last(NamedTuple):
-    """The accelerations at the end of a step, their response to other inputs, and the inputs that acted."""
-
-    acceleration: FloatArray
-    response: FloatArray
-    inputs: Inputs
-
-    def snapshot(self) -> Snapshot:
-        """Return all of it."""
-        inputs = np.array([*self.inputs.base, *self.inputs[1:]])
-        return {"last.acceleration": self.acceleration, "last.response": self.response, "last.inputs": inputs}
-
-    @classmethod
-    def restored(cls, snapshot: Snapshot) -> _Last | None:
-        """Return what a snapshot holds."""
-        if "last.inputs" not in snapshot:
-            return None
-        z, vz, az, *others = snapshot["last.inputs"].tolist()
-        inputs = Inputs((z, vz, az), *others)
-        acceleration, response = (snapshot[f"last.{name}"].astype(np.float64) for name in ("acceleration", "response"))
-        return cls(acceleration, response, inputs)
-
-
-def _history_snapshot(history: History) -> Snapshot:
-    step = np.array([history.step])
-    return {"history.step": step, "history.middle": history.middle, "history.begin": history.begin}
-
-
-def _restored_history(snapshot: Snapshot) -> History | None:
-    if "history.step" not in snapshot:
-        return None
-    middle, begin = (snapshot[f"history.{name}"].astype(np.float64) for name in ("middle", "begin"))
-    return History(float(snapshot["history.step"][0]), middle, begin)
 
 
 class _Built:

@@ -38,6 +38,7 @@ from models.definition_files.parameter import Definition, Parameter
 
 #: A step may begin this share of its length away from where the model is: hosts sum up time.
 _TIME_TOLERANCE = 1e-3
+_NOTHING_TOLD: list[str] = []
 
 
 class Part(Protocol):
@@ -143,9 +144,17 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         """Return what deserves a second look in a part that has just been initialised."""
         return ()
 
+    def _start_remark(self, part: PartT) -> str:
+        """Return what the log may say about a part that has just been initialised, as no warning."""
+        return ""
+
     def _step_warning(self, part: PartT, step: float) -> str:
         """Return what is wrong with steps of a length that the part can make nevertheless."""
         return ""
+
+    def _told(self, part: PartT) -> list[str]:
+        """Return what a part has to say of its steps; whoever reads it empties the list."""
+        return _NOTHING_TOLD
 
     # Phases, called by pythonfmu.
 
@@ -209,6 +218,8 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
             self._advance(self._part, self._variables.checked_inputs(current_time), step_size)
             self._time = current_time + step_size
             self._variables.read_outputs(self._part, self._time)
+            if told := self._told(self._part):
+                self._pass_on(told)
         except BaseException as error:
             self._break_down(error)
             return False
@@ -240,7 +251,7 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         try:
             places, _, highest = self._variables.find(vrs)
             if highest >= self._variables.stale_from:
-                self._bring_up_to_date()
+                self._bring_up_to_date(highest)
             return self._variables.values[places].tolist()
         except BaseException as error:
             self._refuse(error)
@@ -281,11 +292,11 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         """Refuse: there are no String variables."""
         self._refuse_type(vrs, "String")
 
-    def _bring_up_to_date(self) -> None:
+    def _bring_up_to_date(self, highest: int = sys.maxsize) -> None:
         if self._phase is _Phase.INITIALIZING:
             self._initialise_if_changed()
         elif not self._failures.current:
-            self._variables.read_local(self._part)
+            self._variables.read_asked(self._part, highest)
 
     def _refuse_type(self, references: list[int], kind: str) -> None:
         if references:
@@ -363,6 +374,8 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         try:
             for text in self._start_warnings(self._part, self._variables.inputs.copy()):
                 self._warn(text)
+            if remark := self._start_remark(self._part):
+                self.log(clean(remark), Fmi2Status.ok)
         except BaseException as error:
             self._break_down(error)
 
@@ -371,6 +384,11 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         text = self._step_warning(self._part, step)
         self._longest_step = math.inf if text else step
         self._warn(text)
+
+    def _pass_on(self, told: list[str]) -> None:
+        for text in told:
+            self._warn(text)
+        told.clear()
 
     def _warn(self, text: str) -> None:
         if text:

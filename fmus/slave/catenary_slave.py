@@ -12,7 +12,13 @@ from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import load
-from models.catenary.line_advice import slack_law_warning, slack_warning, speed_warning, step_warning
+from models.catenary.line_advice import (
+    slack_law_warning,
+    slack_warning,
+    speed_warning,
+    step_warning,
+    track_warning,
+)
 from models.catenary.line_part import CatenaryPart
 
 #: An unconnected port is a strip far below the wire, which touches nothing.
@@ -65,6 +71,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         return Ports(
             inputs=tuple(s for p in numbers for end in "AB" for s in _end(p, end)),
             outputs=(_output_port(numbers, part),),
+            asked=(_nominal_port(numbers),),
             local=(*_dropper_ports(part), *energy_ports([f"pantograph[{p}].contact" for p in numbers])),
             calculated=(
                 *_geometry_ports(part),
@@ -88,6 +95,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         yield part.start_warning(strips)
         yield slack_warning(part.droppers, part.model.static.is_slack)
         yield slack_law_warning(part.definition)
+        yield track_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 
     def _step_warning(self, part: CatenaryPart, step: float) -> str:
@@ -126,6 +134,13 @@ def _output_port(numbers: range, part: CatenaryPart) -> Port:
         for i, s in enumerate(part.supports, 1)
     )
     return Port((*force, *point, *of_sections, *uplift), attrgetter("outputs"))
+
+
+def _nominal_port(numbers: range) -> Port:
+    text = "height of the contact wire under the strip's middle, its supports joined by straight lines"
+    height = tuple(Signal(f"pantograph[{p}].nominal.z", "m", f"nominal {text}") for p in numbers)
+    rate = tuple(Signal(f"pantograph[{p}].nominal.vz", "m/s", f"rate of nominal.z as strip {p} runs") for p in numbers)
+    return Port((*height, *rate), attrgetter("nominal"))
 
 
 def _dropper_ports(part: CatenaryPart) -> tuple[Port, ...]:

@@ -22,6 +22,15 @@ DRIVE_SIGNALS = (
     Signal("air.u", "m/s", "speed of the air along the track, for the aerodynamic uplift", 0.0),
     Signal("uplift_force", "N", "force added to the static force, of a controller say", 0.0),
 )
+#: Inputs of `operation.Drive.sway`, in its order; a lumped pantograph has no yaw.
+SWAY_SIGNALS = (
+    Signal("base.y", "m", "displacement of the vehicle's roof, to the left", 0.0),
+    Signal("base.vy", "m/s", "velocity of the vehicle's roof, to the left", 0.0),
+    Signal("base.roll", "rad", "roll of the vehicle's roof about the base, left side up", 0.0),
+    Signal("base.roll_rate", "rad/s", "rate of the roll of the vehicle's roof", 0.0),
+    Signal("base.yaw", "rad", "yaw of the vehicle's roof about the base, nose to the left", 0.0),
+    Signal("base.yaw_rate", "rad/s", "rate of the yaw of the vehicle's roof", 0.0),
+)
 
 
 class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
@@ -36,11 +45,13 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Vertical motion only: the strip does not roll, and the lateral point of application has no effect.",
-        "Linear springs and dampers, identified at one working height; no friction, no stops. With follow_height = 1 "
-        "the reference of the lowest spring follows the height with the time constant reference_time, which makes it "
+        "Linear springs and dampers, identified at one working height; friction and stops only where the definition "
+        "has them. With follow_height = 1 the reference "
+        "of the lowest spring follows the height with the time constant reference_time, which makes it "
         "another model below 1 / (2 pi reference_time).",
         "Aerodynamic uplift is a coefficient times the square of the speed, as on open track.",
-        "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
+        "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; base.y, base.roll and their "
+        "rates, which shift and turn the strip but do not excite the masses; 0 if not connected).",
     )
 
     def _read_definition(self, path: Path) -> LumpedDefinition:
@@ -50,18 +61,26 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
         return LumpedPantographPart(definition)
 
     def _make_ports(self, part: LumpedPantographPart) -> Ports:
-        ports = pantograph_ports(part, DRIVE_SIGNALS)
+        ports = pantograph_ports(part, (*DRIVE_SIGNALS, *SWAY_SIGNALS[:4]))
         signals = tuple(signal for port in ports.outputs for signal in port.signals)
         return replace(ports, outputs=(Port(signals, attrgetter("outputs")),))  # read in one piece
 
     def _start_warnings(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
 
+    def _told(self, part: LumpedPantographPart) -> list[str]:
+        return part.told
+
     def _initialise(self, part: LumpedPantographPart, time: float, inputs: FloatArray) -> None:
-        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], Drive(*inputs[6:9].tolist()))
+        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], _drive(inputs))
 
     def _advance(self, part: LumpedPantographPart, inputs: FloatArray, step: float) -> None:
-        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step, Drive(*inputs[6:9].tolist()))
+        part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step, _drive(inputs))
+
+
+def _drive(inputs: FloatArray) -> Drive:
+    rate, air, uplift, *sway = inputs[6:13].tolist()
+    return Drive(rate, air, uplift, sway=(*sway, 0.0, 0.0))
 
 
 def pantograph_ports(part: Any, more: Iterable[Signal] = ()) -> Ports:

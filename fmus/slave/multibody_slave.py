@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from fmus.slave.adapter import Adapter
-from fmus.slave.lumped_slave import DRIVE_SIGNALS, pantograph_ports
-from fmus.slave.ports import Ports
+from fmus.slave.lumped_slave import DRIVE_SIGNALS, SWAY_SIGNALS, pantograph_ports
+from fmus.slave.ports import Ports, Signal
 from models.arrays import FloatArray
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import load_mechanism
@@ -23,13 +23,16 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         "A pantograph as rigid bodies with joints, springs, dampers and an actuator, on a roof that moves along the "
         "track at constant speed. It starts at rest with the strip at reference_height, the actuator just carrying "
         "the weights; from raise_start the actuator grows to its value over raise_duration. The contact force acts "
-        "on the head where the line says, so that a staggered wire makes the head roll, and the strip's ends follow."
+        "on the head where the line says, so that a staggered wire makes the head roll, and the strip's ends follow. "
+        "Where the mechanism allows it, the equations of motion are solved in as few coordinates as it has, otherwise "
+        "(and with formulation = \"general\" in the definition) for all bodies; the log says which when a run starts."
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops).",
         "Aerodynamic uplift is a coefficient times the square of the speed, as on open track, brought to the strip by "
         "the lifting element; an element that has a cam holds its force ideally, real cams deviate by their tolerance.",
-        "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; 0 if not connected).",
+        "Constant speed on straight track; the roof's motion is an input (base.z, base.y, base.roll, base.yaw and "
+        "their rates; 0 if not connected).",
     )
 
     def _read_definition(self, path: Path) -> MechanismDefinition:
@@ -39,7 +42,13 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         return MultibodyPantographPart(definition)
 
     def _make_ports(self, part: MultibodyPantographPart) -> Ports:
-        return pantograph_ports(part, DRIVE_SIGNALS[1:])
+        unit = "N.m" if part.definition.lifts_by_moment else "N"
+        text = "what the lifting element gives, in place of all else, if lift_input is 1"
+        lift = Signal("lift.value", unit, text, 0.0)
+        return pantograph_ports(part, (*DRIVE_SIGNALS[1:], lift, *SWAY_SIGNALS))
+
+    def _start_remark(self, part: MultibodyPantographPart) -> str:
+        return part.form()
 
     def _start_warnings(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
@@ -53,5 +62,5 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
 
 
 def _drive(inputs: FloatArray) -> Drive:
-    air, uplift = inputs[6:8].tolist()
-    return Drive(air=air, uplift=uplift)
+    air, uplift, lift, y, vy, roll, roll_rate, yaw, yaw_rate = inputs[6:15].tolist()
+    return Drive(0.0, air, uplift, lift, (y, vy, roll, roll_rate, yaw, yaw_rate))

@@ -63,12 +63,13 @@ class Ports:
     ----------
     inputs : tuple of Signal
         In the order of the array that the part is given.
-    outputs, local, calculated : tuple of Port
-        Read after every step; read when asked for; read once the part is built.
+    outputs, asked, local, calculated : tuple of Port
+        Outputs read after every step; outputs and local variables read when asked for; read once the part is built.
     """
 
     inputs: tuple[Signal, ...]
     outputs: tuple[Port, ...] = ()
+    asked: tuple[Port, ...] = ()
     local: tuple[Port, ...] = ()
     calculated: tuple[Port, ...] = ()
 
@@ -90,8 +91,8 @@ class Table:
     ----------
     variables : tuple of Variable
         Indexed by value reference.
-    parameters, inputs, outputs, local, calculated : slice
-        Value references by causality.
+    parameters, inputs, outputs, asked, local, calculated : slice
+        Value references by causality, ``asked`` those of outputs that are computed only for whoever asks.
     """
 
     def __init__(self, parameters: Sequence[Parameter], ports: Ports) -> None:
@@ -100,6 +101,7 @@ class Table:
         self.parameters = self._add("parameter", map(_parameter_signal, parameters))
         self.inputs = self._add("input", ports.inputs)
         self.outputs = self._add("output", _signals(ports.outputs))
+        self.asked = self._add("output", _signals(ports.asked))
         self.local = self._add("local", _signals(ports.local))
         self.calculated = self._add("calculatedParameter", _signals(ports.calculated))
         self.variables = tuple(self._variables)

@@ -39,9 +39,10 @@ class VariableValues:
         self._starts = self.parameters.copy()
         self._outputs = self.values[table.outputs]
         self._first_input, self._first_output = table.inputs.start, table.outputs.start
-        self._first_local = table.local.start
+        self._first_asked, self._first_local = table.asked.start, table.local.start
         self._references = list(range(len(table)))
         self._output_places = self._places(table.outputs, table.ports.outputs)
+        self._asked_places = self._places(table.asked, table.ports.asked)
         self._local_places = self._places(table.local, table.ports.local)
         self._calculated_places = self._places(table.calculated, table.ports.calculated)
 
@@ -127,17 +128,17 @@ class VariableValues:
         AdapterError
             If the part has more values, or fewer, than the FMU has variables for.
         """
-        for places in (self._output_places, self._local_places, self._calculated_places):
+        for places in (self._output_places, self._asked_places, self._local_places, self._calculated_places):
             for i, (place, port) in enumerate(places):
                 places[i] = _reshaped(place, port, np.shape(port.read(part))), port
 
     def read_all(self, part: Any) -> None:
         """Read everything that the part computes, what it computed as it was built too."""
-        for places in (self._output_places, self._local_places, self._calculated_places):
+        for places in (self._output_places, self._asked_places, self._local_places, self._calculated_places):
             _read(places, part)
 
     def read_outputs(self, part: Any, time: float) -> None:
-        """Read the outputs after a step; local variables are read once they are asked for.
+        """Read the outputs after a step; other variables are read once they are asked for.
 
         Raises
         ------
@@ -146,14 +147,18 @@ class VariableValues:
         """
         for place, port in self._output_places:
             place[...] = port.read(part)
-        self.stale_from = self._first_local
+        self.stale_from = self._first_asked
         if not _surely_finite(self._outputs):
             self.check_outputs(time)
 
-    def read_local(self, part: Any) -> None:
-        """Read the local variables; then nothing is out of date."""
-        _read(self._local_places, part)
-        self.stale_from = _NOTHING
+    def read_asked(self, part: Any, highest: int = _NOTHING) -> None:
+        """Read what is out of date up to a value reference: outputs that are computed when asked for, then the rest."""
+        if self.stale_from < self._first_local:
+            _read(self._asked_places, part)
+            self.stale_from = self._first_local
+        if highest >= self._first_local:
+            _read(self._local_places, part)
+            self.stale_from = _NOTHING
 
     def expect_initialisation(self, is_expected: bool = True) -> None:
         """Mark everything computed as out of date until the part is initialised, or nothing at all."""

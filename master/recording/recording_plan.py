@@ -13,6 +13,7 @@ from master.recording.recorder import RecordedValues, Recorder
 from master.recording.recording import TIMESERIES
 from master.system.components import Component, System, Variable
 from master.system.step_rounding import is_recordable, record_of, steps_in
+from master.system.variable_names import ON_REQUEST, matcher
 
 
 class Readable(Protocol):
@@ -63,7 +64,8 @@ def recording_plans(system: System) -> tuple[RecordingPlan, ...]:
     """Return what is recorded, and how often, besides the exchanged outputs; the plan for every step comes first.
 
     Exchanged outputs are always recorded at every step, all other outputs too unless an entry of the settings says
-    otherwise, and local variables only if an entry names them; texts are not recorded.
+    otherwise, and local variables, and the outputs that are computed on request, only if an entry names them; texts
+    are not recorded.
     """
     by_rate: dict[int, dict[str, list[str]]] = {1: {}}
     for component in system.components:
@@ -80,8 +82,12 @@ def _steps_between_rows(component: Component, variable: Variable, system: System
         return 0
     record = record_of(f"{component.name}.{variable.name}", system.settings.records)
     if record is None:
-        return 1 if variable.causality == "output" else 0
+        return 1 if variable.causality == "output" and not _is_on_request(variable.name) else 0
     return steps_in(record.every, system.step)
+
+
+def _is_on_request(name: str) -> bool:
+    return any(matcher(pattern)(name) for pattern in ON_REQUEST)
 
 
 def recording_name(plan: RecordingPlan, step: float) -> str:

@@ -11,6 +11,8 @@ from typing import Final
 ENERGY_MONITOR: Final = "monitor_energy"
 ENERGY_VARIABLES: Final = ("*.energy.*", "*contact.work")
 ENERGY_INTERVAL: Final = 0.05
+#: Outputs that an FMU computes for whoever takes them: recorded if they are connected, or if a setting says so.
+ON_REQUEST: Final = ("*.nominal.z", "*.nominal.vz")
 
 
 def matcher(pattern: str) -> Callable[[str], bool]:

@@ -14,6 +14,7 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.statics.elasticity import elasticity
+from models.catenary.statics.nominal_height import NominalHeight
 from models.catenary.statics.wire_waves import contact_wire_wave_speed
 from models.catenary.strip_checks import WireAtRest, check_strips, start_warning
 from models.numerics.energy_ledger import NO_BALANCE
@@ -106,6 +107,7 @@ class CatenaryPart:
         self._model: CatenaryModel | None = None
         self._state: CatenaryState | None = None
         self._balance: LineBalance | None = None
+        self._nominal: NominalHeight | None = None
 
     @property
     def model(self) -> CatenaryModel:
@@ -153,6 +155,13 @@ class CatenaryPart:
     def contact_work(self) -> FloatArray:
         """Return the work of the strips against the contacts [J], shape (P,); 0 if the balance is not kept."""
         return np.zeros(len(self.contact_force)) if self._balance is None else self._balance.contact_work
+
+    @property
+    def nominal(self) -> FloatArray:
+        """Return the wire's nominal height under the strips [m], then its rate for them [m/s], shape (2 P,)."""
+        if self._nominal is None:
+            self._nominal = NominalHeight(self.definition)
+        return self._nominal.under(self._motion.strip)
 
     @property
     def geometry(self) -> LineGeometry:
@@ -226,6 +235,7 @@ class CatenaryPart:
         self.model.rehearse(self.definition.time_step, strips)
         self.exchange.start(time, strips)
         contacts = self.model.contact_at_rest(self._state, strips)
+        self._motion.strip[...] = strips
         self._balance = LineBalance(self.model, strips, contacts) if self.definition.monitor_energy else None
         self._publish(strips, contacts)
 

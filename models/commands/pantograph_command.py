@@ -21,6 +21,7 @@ from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
 from models.pantograph.multibody.mechanism_advice import inertia_warning
 from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
+from models.pantograph.multibody.reduced.reduced_motion import reduced_if_possible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,6 +41,8 @@ class Characteristics:
         Names with units, strip height first.
     statics : ndarray, shape (h, len(static_columns))
     modes : tuple of (frequency [Hz], damping ratio, motion, remark)
+    form : str
+        In which form the equations of motion are solved; empty of a lumped model.
     freedom : int
         Independent motions that the joints allow; 0 of a lumped model, whose masses say it.
     frequency : ndarray, shape (f,)
@@ -54,6 +57,7 @@ class Characteristics:
     frequency: FloatArray
     apparent_mass: npt.NDArray[np.complex128]
     freedom: int = 0
+    form: str = ""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -72,6 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
         result.static_columns,
         ([f"{v:.3f}" if i == 0 else f"{round(v, 2) + 0.0:.2f}" for i, v in enumerate(row)] for row in result.statics),
     )
+    if result.form:
+        print(f"\n{result.form}")
     freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
     print_table(
         f"Modes, strip free{freedom}", ("frequency [Hz]", "damping [%]", "motion", "remark"), _mode_rows(result)
@@ -142,6 +148,7 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         dynamics.frequency,
         dynamics.apparent_mass,
         rig.freedom,
+        reduced_if_possible(rig.mechanism, rig.reference)[1],
     )
 
 

@@ -14,7 +14,10 @@ import numpy as np
 from models.arrays import BoolArray, FloatArray
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import ContactResult, StripMotion
+from models.catenary.statics.nominal_height import NominalHeight
 from models.contact_law import application_point
+from models.definition_files.parameter import ParameterError
+from models.pantograph.lumped.held_forces import held_forces
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 
@@ -63,13 +66,23 @@ class CoupledModel:
     line : CatenaryModel
     pantographs : sequence of LumpedDefinition
         Each with its own ``start_position``.
+
+    Raises
+    ------
+    ParameterError
+        If one has stops or friction, which one linear system cannot hold.
     """
 
     def __init__(self, line: CatenaryModel, pantographs: Sequence[LumpedDefinition]) -> None:
         self.line = line
+        for definition in pantographs:
+            _check(definition)
         self.pantographs = [LumpedModel(p) for p in pantographs]
         self.line_state = line.initial_state(len(self.pantographs))
-        self.states: list[LumpedState] = [p.initial_state(p.load(0.0, np.zeros(2))) for p in self.pantographs]
+        self.states: list[LumpedState] = [
+            p.initial_state(p.load(0.0, np.zeros(2)) + _air(p.definition)) for p in self.pantographs
+        ]
+        self._nominal = NominalHeight(line.definition)
         self.time = 0.0
 
     def step(self, step: float, end: float) -> tuple[FloatArray, FloatArray]:
@@ -82,8 +95,10 @@ class CoupledModel:
         point : ndarray, shape (P, 3)
             Where their resultants act [m].
         """
-        loads = [p.load(end, np.zeros(2)) for p in self.pantographs]
-        free = [p.free_response(s, step, load) for p, s, load in zip(self.pantographs, self.states, loads, strict=True)]
+        loads = [p.load(end, np.zeros(2)) + _air(p.definition) for p in self.pantographs]
+        rates = [self._reference_rate(i) for i in range(len(self.states))]
+        each = zip(self.pantographs, self.states, loads, rates, strict=True)
+        free = [p.free_response(s, step, load, rate) for p, s, load, rate in each]
         motion = StripMotion(
             np.array([self._strip(i, end, d[-1], self._speed(i, step, d)) for i, d in enumerate(free)]),
             np.array([p.compliance(step)[-1] for p in self.pantographs]),
@@ -91,7 +106,7 @@ class CoupledModel:
         result = self.line.step(self.line_state, step, motion)
         force = result.force.sum(axis=1)
         for i, (model, state) in enumerate(zip(self.pantographs, self.states, strict=True)):
-            model.advance(state, step, free[i] - force[i] * model.compliance(step))
+            model.advance(state, step, free[i] - force[i] * model.compliance(step), rates[i])
         self.time = end
         return result.force, _points(result, motion.strip)
 
@@ -124,6 +139,14 @@ class CoupledModel:
                 progress(n * step)
         return record
 
+    def _reference_rate(self, i: int) -> float:
+        """Return the rate of the line's nominal height under a strip whose reference follows, as a step begins."""
+        model = self.pantographs[i]
+        if not model.follows:
+            return 0.0
+        x = model.definition.start_position + model.definition.speed * self.time
+        return self._nominal.at(x)[1] * model.definition.speed
+
     def _speed(self, i: int, step: float, displacement: FloatArray) -> float:
         return float(self.pantographs[i].velocity_of(self.states[i], step, displacement)[-1])
 
@@ -154,6 +177,18 @@ class CoupledModel:
             dropper_force=np.zeros((rows, len(line.dropper_law.stiffness))),
             dropper_slack=np.zeros((rows, len(line.dropper_law.stiffness)), dtype=np.bool_),
         )
+
+
+def _check(definition: LumpedDefinition) -> None:
+    if len(held_forces(definition)):
+        raise ParameterError(
+            f"{definition.name}: line and pantograph as one system have no stops and no friction (lowest_height, "
+            "highest_height, stage friction); leave these out, or run a scenario"
+        )
+
+
+def _air(definition: LumpedDefinition) -> FloatArray:
+    return np.array(definition.air_shares) * definition.aerodynamic_force(0.0)
 
 
 def _points(result: ContactResult, strips: FloatArray) -> FloatArray:

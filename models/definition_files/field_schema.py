@@ -97,8 +97,8 @@ class _Direction:
     """A direction in space, kept as a unit vector."""
 
     def read(self, table: Table, name: str, default: Any) -> Any:
-        if default is None and not table.has(name):
-            return None
+        if default is not dataclasses.MISSING and not table.has(name):
+            return default
         x, y, z = table.quantities(name, "1", length=3)
         length = math.sqrt(x * x + y * y + z * z)
         if length == 0.0:

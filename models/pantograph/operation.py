@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from models.definition_files.field_schema import count, monitoring, quantity, text, vector
+
+#: A roof that does not sway; see `Drive.sway`.
+NO_SWAY: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class OperationError(ValueError):
+    """An input that a pantograph cannot be driven by; says which, and what to do."""
 
 
 class Drive(NamedTuple):
@@ -20,11 +27,17 @@ class Drive(NamedTuple):
         Speed of the air along x [m/s].
     uplift : float
         Force added to the static force [N].
+    lift : float
+        Value of the lifting element [N or N.m], for a pantograph whose ``lift_input`` is 1.
+    sway : tuple of float
+        Of the roof: lateral position and velocity [m, m/s], roll and its rate, yaw and its rate [rad, rad/s].
     """
 
     reference_rate: float = 0.0
     air: float = 0.0
     uplift: float = 0.0
+    lift: float = 0.0
+    sway: tuple[float, float, float, float, float, float] = NO_SWAY
 
 
 #: Nothing connected.

@@ -39,8 +39,9 @@ from master.system.components import Fmu
 LINE: Final = "catenary"
 #: Most pantographs of a train: as many as a line FMU of ours has ports at most.
 MOST: Final = 16
-#: How far a line gives way to a pantograph, for the first guess of its lifting force [m/N] (choice).
-_COMPLIANCE: Final = 0.35e-3
+#: Of a line whose height changes, and of a pantograph whose reference follows: what may be connected besides.
+_RATES: Final = ("nominal.vz", "reference.vz")
+_FOLLOWS: Final = "the force is the same at every height, as real pantographs hold it; 0: the spring is on the roof"
 #: How far below the lowest contact wire a strip starts [m] (choice).
 _BELOW: Final = 0.01
 #: Parameters of a pantograph that `--map` may name.
@@ -66,14 +67,14 @@ class Lift(NamedTuple):
     parameter, unit : str
     value : float
         As the definition has it.
-    softening : float or None
-        How much less of it is left for every metre above the reference height [N/m]; None if that is not known.
+    can_follow : bool
+        Whether ``follow_height`` makes it the force at every height.
     """
 
     parameter: str
     unit: str
     value: float
-    softening: float | None
+    can_follow: bool
 
 
 @dataclass(frozen=True)
@@ -311,17 +312,22 @@ def _ports(part: _Part, side: Side, count: int) -> list[Port]:
 def _scenario(name: str, request: Request, way: Stretch, line: _Part, train: Sequence[_Part]) -> dict[str, bytes]:
     ports = _ports(line, "line", len(train))
     used: list[WrittenConnector] = []
-    components, connections, files = [], [], {}
+    components: list[WrittenComponent] = []
+    connections, files = [], {}
     for pantograph, port, start in zip(train, ports, way.starts, strict=True):
         (strip,) = _ports(pantograph, "pantograph", 1)
         joined = _joined(line, pantograph, port, strip)
+        extra = _rate(request, line, pantograph, len(components) + 1)
+        joined += extra
         connections += joined
         outputs = {c.output for c in joined if c.start == pantograph.name}
         inputs = {c.input for c in joined if c.end == pantograph.name}
         own = [WrittenConnector(v.name, "output", v.unit) for v in strip.values() if v.name in outputs]
         own += [WrittenConnector(v.name, "input", v.unit) for v in strip.values() if v.name in inputs]
+        own += [WrittenConnector(c.input, "input", "m/s") for c in extra]
         used += [WrittenConnector(port[n].name, "input", port[n].unit) for n in ENDS if n in port]
         used += [WrittenConnector(port[n].name, "output", port[n].unit) for n in REPLY if n in port and n in strip]
+        used += [WrittenConnector(c.output, "output", "m/s") for c in extra]
         parameters = _parameters(pantograph, request, start)
         file = f"{pantograph.name}.ssv" if parameters else ""
         if file:
@@ -357,6 +363,18 @@ def _joined(line: _Part, pantograph: _Part, port: Port, strip: Port) -> list[Wri
     return found + [WrittenConnection(line.name, port[n].name, pantograph.name, strip[n].name) for n in back]
 
 
+def _rate(request: Request, line: _Part, pantograph: _Part, number: int) -> list[WrittenConnection]:
+    """Return the connection of the rate of the line's height with a reference that follows, where that changes."""
+    if request.wire is None or not request.wire.changes_height or not _follows(pantograph, request):
+        return []
+    output, rate = f"pantograph[{number}].{_RATES[0]}", _RATES[1]
+    return [WrittenConnection(line.name, output, pantograph.name, rate)]
+
+
+def _follows(part: _Part, request: Request) -> bool:
+    return isinstance(part.source, Definition) and request.lifts[part.source.name].can_follow
+
+
 def _parameters(part: _Part, request: Request, start: float) -> list[WrittenParameter]:
     """Return the values that a pantograph gets: those of ours all, of one from elsewhere what it can be set to."""
     wire = request.wire
@@ -365,11 +383,11 @@ def _parameters(part: _Part, request: Request, start: float) -> list[WrittenPara
         WrittenParameter("start_position", start, "m"),
     ]
     if wire is None:
-        values += _first_guess(part, request, 0.0)
+        values += _first_guess(part, request)
     else:
         height = math.floor(1e3 * (wire.lowest - _BELOW)) / 1e3
         values.append(WrittenParameter("reference_height", height, "m", "10 mm below the lowest contact wire"))
-        values += _first_guess(part, request, wire.height - height)
+        values += _first_guess(part, request)
     if part.foreign is None:
         return values
     variables = part.foreign.variables
@@ -380,17 +398,16 @@ def _parameters(part: _Part, request: Request, start: float) -> list[WrittenPara
     return [v._replace(name=own, unit=v.unit if variables[own].unit else "") for own, v in known if own is not None]
 
 
-def _first_guess(part: _Part, request: Request, rise: float) -> list[WrittenParameter]:
-    """Return the lifting force that gives about the wanted mean force; a moment is left as the definition has it."""
+def _first_guess(part: _Part, request: Request) -> list[WrittenParameter]:
+    """Return what gives about the wanted mean force at every height; a moment is left as the definition has it."""
     if not isinstance(part.source, Definition):
         return []
     lift = request.lifts[part.source.name]
     remark = f"'openpanto calibrate' finds the value for a mean force of {request.mean_force:.1f} N"
     if lift.unit != "N":
         return [WrittenParameter(lift.parameter, lift.value, lift.unit, f"as in the definition; {remark}")]
-    above = rise + _COMPLIANCE * request.mean_force
-    value = round(request.mean_force + (lift.softening or 0.0) * above, 1)
-    return [WrittenParameter(lift.parameter, value, lift.unit, f"a first guess; {remark}")]
+    force = WrittenParameter(lift.parameter, round(request.mean_force, 1), lift.unit, f"a first guess; {remark}")
+    return [force, WrittenParameter("follow_height", 1, "1", _FOLLOWS)] if lift.can_follow else [force]
 
 
 def _calibrated(train: Sequence[_Part], lifts: Mapping[str, Lift]) -> str:

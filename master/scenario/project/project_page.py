@@ -17,8 +17,9 @@ _MARK: Final = """\
 name = "{name}"
 """
 _LIFT: Final = (
-    "The lifting force is constant: it depends neither on the speed nor on the direction of travel, and what of it is "
-    "left at the wire falls with the height of the strip as the pantograph's springs have it."
+    "The lifting force is constant: it depends neither on the speed nor on the direction of travel. Lumped pantographs "
+    "hold it at every height (`follow_height` is 1; 0 leaves their lowest spring on the roof, as they were "
+    "identified, and the force falls with the height); what a mechanism holds, its definition says (`cam`)."
 )
 
 

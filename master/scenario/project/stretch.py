@@ -44,6 +44,8 @@ class Wire:
         Whether the line goes on at its beginning.
     overlaps : tuple of (float, float)
         Where a section and the next one both have wires.
+    changes_height : bool
+        Whether the supports hold it at different heights.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Wire:
     height: float
     is_ring: bool = False
     overlaps: tuple[tuple[float, float], ...] = ()
+    changes_height: bool = False
 
 
 @dataclass(frozen=True)

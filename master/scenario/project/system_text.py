@@ -47,10 +47,10 @@ class WrittenConnection(NamedTuple):
 
 
 class WrittenParameter(NamedTuple):
-    """A parameter: name, value, unit, and what is said of it."""
+    """A parameter: name, value (a whole number is one in the file too), unit, and what is said of it."""
 
     name: str
-    value: float
+    value: float | int
     unit: str
     remark: str = ""
 
@@ -188,7 +188,8 @@ def _parameter(parameter: WrittenParameter) -> Iterator[str]:
     unit = f" unit={quoteattr(parameter.unit)}" if parameter.unit else ""
     if parameter.remark:
         yield f"    <!-- {escape(parameter.remark).replace('--', '- -')} -->"
-    value = f'<ssv:Real value="{parameter.value:.15g}"{unit}/>'
+    kind = "Integer" if isinstance(parameter.value, int) else "Real"
+    value = f'<ssv:{kind} value="{parameter.value:.15g}"{unit if kind == "Real" else ""}/>'
     yield f"    <ssv:Parameter name={quoteattr(parameter.name)}>{value}</ssv:Parameter>"
 
 

@@ -47,14 +47,20 @@ class LumpedModel:
         self.K = _chain([s.stiffness for s in definition.stage])
         self.size = n
         self.follows = bool(definition.follow_height)
+        # What holds a strip that starts elsewhere, until it is raised: the spring on the roof would move it.
+        self.balance = 0.0 if self.follows else definition.stage[0].stiffness * definition.rise
         self._following: dict[float, FollowingReference] = {}
         self._inverse: dict[float, tuple[Newmark, FloatArray]] = {}
         self._transition: dict[float, FloatArray] = {}
 
     def initial_state(self, load: FloatArray | None = None) -> LumpedState:
-        """Return the pantograph at rest at its reference height, its acceleration that of ``load``, shape (n,) [N]."""
-        acceleration = np.zeros(self.size) if load is None else load / np.diag(self.M)
-        return LumpedState(np.zeros(self.size), np.zeros(self.size), acceleration)
+        """Return the pantograph at rest at its start height, its acceleration that of ``load``, shape (n,) [N]."""
+        displacement = np.full(self.size, self.definition.rise)
+        pull = self.K @ displacement
+        reference = self.definition.rise if self.follows else 0.0
+        pull[0] -= self.definition.stage[0].stiffness * reference
+        load = np.zeros(self.size) if load is None else load - pull
+        return LumpedState(displacement, np.zeros(self.size), load / np.diag(self.M), reference)
 
     def following(self, step: float) -> FollowingReference:
         """Return how the reference moves in a step [s], if it follows."""
@@ -88,8 +94,11 @@ class LumpedModel:
             return 0.0
         return self.definition.stage[0].stiffness * self.following(step).known(reference, above_roof, rate)
 
-    def free_response(self, state: LumpedState, step: float, load: FloatArray) -> FloatArray:
-        """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value."""
+    def free_response(self, state: LumpedState, step: float, load: FloatArray, rate: float = 0.0) -> FloatArray:
+        """Return the displacement at the end of a step under ``load``, shape (n,) [N], held at its end value.
+
+        A reference that follows the height moves at ``rate`` [m/s] besides.
+        """
         n, inverse = self._effective(step)
         # Plain floats where it goes mass by mass: the same bits, and for so few masses faster than arrays.
         displacement, velocity, acceleration = state.displacement, state.velocity, state.acceleration
@@ -98,7 +107,7 @@ class LumpedModel:
         damping = [n.a1 * d + n.a4 * v + n.a5 * a for d, v, a in motion]
         if self.follows:
             load = load.copy()
-            load[0] += self.reference_load(state.reference, float(displacement[0]), 0.0, step)
+            load[0] += self.reference_load(state.reference, float(displacement[0]), rate, step)
         result: FloatArray = inverse.dot(load + inertia + self.C.dot(damping))
         return result
 
@@ -111,12 +120,12 @@ class LumpedModel:
         """Return the velocity that belongs to a new displacement, shape (n,)."""
         return np.array(self._rates(state, step, displacement)[0])
 
-    def advance(self, state: LumpedState, step: float, displacement: FloatArray) -> None:
-        """Replace the state by the one that belongs to a new displacement."""
+    def advance(self, state: LumpedState, step: float, displacement: FloatArray, rate: float = 0.0) -> None:
+        """Replace the state by the one that belongs to a new displacement; ``rate`` as in `free_response`."""
         velocity, acceleration = self._rates(state, step, displacement)
         if self.follows:
             before, after = float(state.displacement[0]), float(displacement[0])
-            state.reference = self.following(step).moved(state.reference, before, after, 0.0)
+            state.reference = self.following(step).moved(state.reference, before, after, rate)
         state.displacement = displacement
         state.velocity, state.acceleration = np.array(velocity), np.array(acceleration)
 
@@ -161,7 +170,7 @@ class LumpedModel:
         """
         result = np.zeros(self.size)
         lowest, (height, velocity) = self.definition.stage[0], base.tolist()
-        uplift = self.definition.static_force * self.definition.raised(time)
+        uplift = self.balance + (self.definition.static_force - self.balance) * self.definition.raised(time)
         result[0] = uplift + (lowest.stiffness * height + lowest.damping * velocity)
         return result
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -63,13 +64,15 @@ class LateralExtrapolation:
 
 @dataclass
 class BaseMotion:
-    """The roof's vertical motion over a step: smooth, and at its end where the inputs lead.
+    """One coordinate of the roof over a step, its height say: smooth, and at its end where the inputs lead.
 
     A cubic joins where the base is to where its received height and velocity, and the trend of the velocity, will have
     taken it by the end of the step; so the base never jumps, whatever the inputs do.
 
     Attributes
     ----------
+    name : str
+        Begins the names of its arrays in a snapshot.
     now : ndarray, shape (2,)
         Height and velocity of the base [m, m/s].
     received : ndarray, shape (2,)
@@ -78,6 +81,7 @@ class BaseMotion:
         Coefficients of the present step, constant one first.
     """
 
+    name: str = "base"
     now: FloatArray = field(default_factory=lambda: np.zeros(2))
     received: FloatArray = field(default_factory=lambda: np.zeros(2))
     cubic: FloatArray = field(default_factory=lambda: np.zeros(4))
@@ -115,9 +119,79 @@ class BaseMotion:
     def snapshot(self) -> Snapshot:
         """Return the whole state."""
         names = ("now", "received", "cubic")
-        return {f"base.{name}": getattr(self, name).copy() for name in names}
+        return {f"{self.name}.{name}": getattr(self, name).copy() for name in names}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
         for name in ("now", "received", "cubic"):
-            getattr(self, name)[...] = snapshot[f"base.{name}"]
+            getattr(self, name)[...] = snapshot[f"{self.name}.{name}"]
+
+
+class Sway(NamedTuple):
+    """How the roof sways at one instant; each a value, its rate and its acceleration.
+
+    Attributes
+    ----------
+    y : tuple of float
+        Lateral position [m, m/s, m/s2].
+    roll, yaw : tuple of float
+        Angles about x and z through the base's origin [rad, rad/s, rad/s2]; the roof yaws first, then rolls about its
+        own x axis.
+    """
+
+    y: tuple[float, float, float]
+    roll: tuple[float, float, float]
+    yaw: tuple[float, float, float]
+
+
+class SwayMotion:
+    """The roof's lateral motion, roll and yaw over a step, each as `BaseMotion` has it.
+
+    Attributes
+    ----------
+    is_still : bool
+        Whether nothing has ever moved: the roof then needs no angles.
+    """
+
+    def __init__(self) -> None:
+        self._coordinates = tuple(BaseMotion(f"base.{name}") for name in Sway._fields)
+        self.is_still = True
+
+    def start(self, sway: tuple[float, ...]) -> None:
+        """Begin at values and rates, as in `operation.Drive.sway`."""
+        for coordinate, (value, rate) in self._paired(sway):
+            coordinate.start(np.array([value, rate]))
+        self.is_still = not any(sway)
+
+    def receive(self, sway: tuple[float, ...], step: float) -> None:
+        """Plan the motion over a step [s] from the values and rates at its beginning."""
+        self.is_still = self.is_still and not any(sway)
+        if not self.is_still:
+            for coordinate, pair in self._paired(sway):
+                coordinate.receive(np.array(pair), step)
+
+    def at(self, tau: float) -> Sway | None:
+        """Return the motion at ``tau`` [s] after the step's beginning, None while nothing has ever moved."""
+        return None if self.is_still else Sway(*(coordinate.at(tau) for coordinate in self._coordinates))
+
+    def finish(self, step: float) -> None:
+        """Move to the end of the step."""
+        if not self.is_still:
+            for coordinate in self._coordinates:
+                coordinate.finish(step)
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state."""
+        found: Snapshot = {"base.is_still": np.array([float(self.is_still)])}
+        for coordinate in self._coordinates:
+            found |= coordinate.snapshot()
+        return found
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot."""
+        self.is_still = bool(snapshot["base.is_still"][0])
+        for coordinate in self._coordinates:
+            coordinate.restore(snapshot)
+
+    def _paired(self, sway: tuple[float, ...]) -> Iterator[tuple[BaseMotion, tuple[float, float]]]:
+        return zip(self._coordinates, zip(sway[0::2], sway[1::2], strict=True), strict=True)

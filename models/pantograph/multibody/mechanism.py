@@ -15,6 +15,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from models.arrays import FloatArray
+from models.pantograph.multibody.base_motion import Sway
+from models.pantograph.multibody.elements.base_frame import BaseFrame, Carried
 from models.pantograph.multibody.elements.force_elements import ForceElements, gravity_loads
 from models.pantograph.multibody.elements.joints import JOINT_ROWS, Constraints, ConstraintValues, GapRow, Pair, Row
 from models.pantograph.multibody.elements.moving_vectors import Kinematics, MovingVectors, VectorPool
@@ -53,6 +55,14 @@ class Inputs(NamedTuple):
         y of its point of application [m].
     uplift : float
         Force that the lifting element brings to the strip besides [N].
+    sway : Sway or None
+        How the base moves besides; None: not at all.
+    pull : float
+        Acceleration of the base along the track [m/s2].
+    against : float
+        Speed against the air [m/s].
+    driven_lift : float or None
+        What the lifting element gives [N or N.m], if it is set directly: `lift` and `uplift` then do nothing.
     """
 
     base: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -60,6 +70,14 @@ class Inputs(NamedTuple):
     force: float = 0.0
     lateral: float = 0.0
     uplift: float = 0.0
+    sway: Sway | None = None
+    pull: float = 0.0
+    against: float = 0.0
+    driven_lift: float | None = None
+
+
+#: Nothing acts.
+NO_INPUTS: Final = Inputs()
 
 
 class State(NamedTuple):
@@ -193,16 +211,38 @@ class Mechanism:
             y[10 * n :].reshape(n, 3),
         )
 
-    def place_base(self, y: FloatArray, base: tuple[float, float, float]) -> None:
+    def place_base(self, y: FloatArray, inputs: Inputs) -> None:
         """Put the bodies of prescribed motion where they belong, in place."""
+        base, carried = inputs.base, self._carried(inputs)
+        if carried is not None:
+            y[self._base_places] = np.concatenate([part.ravel() for part in carried[:4]])
+            return
         values = self._base_rest.copy()
         values[self._base_z] += base[0]
         values[self._base_vz] = base[1]
         y[self._base_places] = values
 
-    def kinematics(self, y: FloatArray, base_acceleration: float = 0.0) -> Kinematics:
-        """Return frames and origins of all bodies."""
-        n = self.count
+    def _carried(self, inputs: Inputs) -> Carried | None:
+        """Return the bodies of prescribed motion on a base that sways, None if it does not."""
+        if inputs.sway is None:
+            return None
+        d = self.driven
+        return BaseFrame.of(inputs.base, inputs.sway).carry(self._written[:d], self._written_p[:d])
+
+    def standing_on(self, y: FloatArray, inputs: Inputs) -> FloatArray:
+        """Return a state at rest on a base at rest as it is at rest on a base that moves, shape (13 n,)."""
+        s = self.split(y)
+        if inputs.sway is not None:
+            return self.join(*BaseFrame.of(inputs.base, inputs.sway).carry(s.r, s.p)[:4])
+        moved = y.copy()
+        s = self.split(moved)
+        s.r[:, 2] += inputs.base[0]
+        s.v[:, 2] += inputs.base[1]
+        return moved
+
+    def kinematics(self, y: FloatArray, inputs: Inputs = NO_INPUTS) -> Kinematics:
+        """Return frames and origins of all bodies, with the acceleration of the base that the inputs say."""
+        n, d = self.count, self.driven
         spin = skew(y[10 * n :].reshape(n, 3))
         frames = np.empty((n, 9, 3))
         A, first = frames[:, :3], frames[:, 3:6]
@@ -212,7 +252,11 @@ class Mechanism:
         origins = np.zeros((n, 9))
         origins[:, :3] = y[: 3 * n].reshape(n, 3)
         origins[:, 3:6] = y[7 * n : 10 * n].reshape(n, 3)
-        origins[: self.driven, 8] = base_acceleration
+        origins[:d, 8] = inputs.base[2]
+        carried = self._carried(inputs)
+        if carried is not None:
+            origins[:d, 6:] = carried.acceleration
+            frames[:d, 6:] += A[:d] @ skew(carried.turning)
         return Kinematics(frames, origins, spin)
 
     def roots(self, frames: FloatArray) -> FloatArray:
@@ -260,19 +304,38 @@ class Mechanism:
         if vectors is None:
             vectors = self.pool.evaluate(kinematics)
         w = y[10 * self.count :].reshape(-1, 3)
-        lift = self.forces.lift_value(kinematics, inputs.lift, inputs.uplift) if lifted else 0.0
+        lift = self._lift_value(kinematics, inputs) if lifted else 0.0
         loads = self.forces.loads(kinematics, vectors, w, lift)
         loads += self._weights
+        self.add_travel_loads(loads, kinematics, inputs)
         if inputs.force != 0.0:
             frame = kinematics.frames[self.strip_body, :3]
             loads[self.strip_body] += self.contact_load(y, inputs, frame)
         return loads
 
+    def add_travel_loads(self, loads: FloatArray, kinematics: Kinematics, inputs: Inputs) -> None:
+        """Add to loads, shape (n, 6), what the train's speed makes: forces of the air, and of its acceleration."""
+        if inputs.against != 0.0 and self.forces.air.count:
+            self.forces.air.add_loads(loads, kinematics.frames, inputs.against)
+        if inputs.pull != 0.0:
+            loads[self.driven :, 0] -= inputs.pull * self.mass[self.driven :]
+
     def lift_value(self, y: FloatArray, inputs: Inputs) -> float:
         """Return the force or moment of the lifting element [N or N.m] for what is set of it."""
-        if self.forces.cam is None and inputs.uplift == 0.0:
+        if inputs.driven_lift is None and self.forces.cam is None and inputs.uplift == 0.0:
             return inputs.lift
-        return self.forces.lift_value(self.kinematics(y), inputs.lift, inputs.uplift)
+        return self._lift_value(self.kinematics(y), inputs)
+
+    def _lift_value(self, kinematics: Kinematics, inputs: Inputs) -> float:
+        if inputs.driven_lift is not None:
+            return inputs.driven_lift
+        return self.forces.lift_value(kinematics, inputs.lift, inputs.uplift)
+
+    def held_force(self, y: FloatArray, inputs: Inputs) -> float:
+        """Return the force on the strip that the cam holds, or would for a lift that is set directly [N]."""
+        if inputs.driven_lift is None or self.forces.cam is None or self.forces.lift_place is None:
+            return inputs.lift
+        return self.forces.cam.lift_of(self.forces.lift_place.at(self.kinematics(y)), inputs.driven_lift)
 
     def constraint_values(self, kinematics: Kinematics) -> ConstraintValues:
         """Return all constraints."""
@@ -294,8 +357,8 @@ class Mechanism:
         numpy.linalg.LinAlgError
             If the constraints depend on each other.
         """
-        self.place_base(y, inputs.base)
-        kinematics = self.kinematics(y, inputs.base[2])
+        self.place_base(y, inputs)
+        kinematics = self.kinematics(y, inputs)
         vectors = self.pool.evaluate(kinematics)
         values = self.constraints.evaluate(vectors)
         W = self.roots(kinematics.frames)
@@ -315,6 +378,9 @@ class Mechanism:
             multipliers, response = np.linalg.solve(schur, right).view(np.float64), _NO_RESPONSE
         acceleration = (loads - multipliers @ jacobian).reshape(self.count, 6) * self._root_both
         acceleration[: self.driven, 2] = inputs.base[2]
+        carried = self._carried(inputs)
+        if carried is not None:
+            acceleration[: self.driven] = np.concatenate([carried.acceleration, carried.turning], axis=1)
         return Evaluation(self._rates(y, acceleration), acceleration, multipliers, values, response)
 
     def _scaled_loads(
@@ -425,10 +491,16 @@ class Mechanism:
 
     def power_of_base(self, y: FloatArray, inputs: Inputs) -> float:
         """Return the power that the base puts in through its joints [W]."""
-        if inputs.base[1] == 0.0:
+        if inputs.base[1] == 0.0 and inputs.sway is None:
             return 0.0
-        found = self.evaluate(y.copy(), inputs)
-        return float(found.multipliers @ found.constraints.jacobian[:, : self.driven, 2].sum(axis=1)) * inputs.base[1]
+        found, d = self.evaluate(y.copy(), inputs), self.driven
+        jacobian = found.constraints.jacobian[:, :d]
+        if inputs.sway is None:
+            return float(found.multipliers @ jacobian[:, :, 2].sum(axis=1)) * inputs.base[1]
+        frame = BaseFrame.of(inputs.base, inputs.sway)
+        velocity = frame.carry(self._written[:d], self._written_p[:d]).v
+        motion = np.concatenate([velocity, np.tile(frame.angular_velocity, (d, 1))], axis=1)
+        return float(found.multipliers @ (jacobian * motion).sum(axis=(1, 2)))
 
     def strip_ends(self, y: FloatArray) -> FloatArray:
         """Return the strip's ends, shape (2, 2, 3): left A and right B; position, velocity [m, m/s]."""

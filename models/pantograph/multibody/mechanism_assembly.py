@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray, IntArray
-from models.pantograph.multibody.mechanism import Mechanism, MechanismError
+from models.pantograph.multibody.mechanism import NO_INPUTS, Mechanism, MechanismError
 
 #: Largest violation of an assembled mechanism [m or 1].
 CLOSED: Final = 1e-12
@@ -39,7 +39,7 @@ def assemble(mechanism: Mechanism) -> FloatArray:
     """
     _check_written_gaps(mechanism)
     y = mechanism.written_state()
-    mechanism.place_base(y, (0.0, 0.0, 0.0))
+    mechanism.place_base(y, NO_INPUTS)
     rows = np.arange(mechanism.constraints.count)
     closed, violation = _close(mechanism, y, rows)
     if violation > CLOSED * 10.0:

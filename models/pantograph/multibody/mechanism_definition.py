@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Final
 
 from models.definition_files import field_schema
 from models.definition_files.field_schema import (
+    count,
     direction,
     named,
     part,
@@ -46,6 +47,7 @@ _FRICTION: Final[_Range] = {"minimum": 0.0, "maximum": 1e4}
 _ANGLE: Final[_Range] = {"minimum": -3.2, "maximum": 3.2}
 _TRANSITION: Final[_Range] = {"minimum": 1e-9, "maximum": 100.0}
 _NONE: Final = (0.0, 0.0, 0.0)
+_UP: Final = (0.0, 0.0, 1.0)
 #: Points that make a spline.
 _FEWEST: Final = 3
 #: Share by which the largest moment of inertia may exceed the other two together before it is refused [choice]. No
@@ -385,6 +387,21 @@ class Bushing(PointForce):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Aerodynamic(Force):
+    """A force of the air on a body: the coefficient times the square of the speed against the air.
+
+    Its direction is one of the track (x along it, z up), not of the body: the air does not turn with the arm.
+    """
+
+    body: str = text(filled=True)
+    point: Triple = vector("m", "{name}: point of attack", default=_NONE, **_PLACE)
+    direction: Triple = direction(default=_UP)
+    coefficient: float = quantity(
+        "N.s2/m2", "{name}: force per square of the speed against the air", minimum=-1.0, maximum=1.0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class SlidingFriction(Force):
     """Dry friction in a joint, given as a force; 76 % of it acts at the speed of transition."""
 
@@ -447,6 +464,7 @@ FORCES: Final[Mapping[str, type[Force] | Callable[[Table], type[Force]]]] = {
     "angle_stop": AngleStop,
     "joint_friction": _friction,
     "bushing": Bushing,
+    "aerodynamic": Aerodynamic,
 }
 
 
@@ -523,6 +541,10 @@ class MechanismDefinition(Operation):
         "m", "height of the strip at time 0, if it is not the reference height: folded, say", default=None,
         minimum=0.5, maximum=10.0,
     )  # fmt: skip
+    lift_input: int = count(
+        "what lifts: 0 the definition's value, raised; 1 the input lift.value, in place of all that the element gives",
+        default=0, maximum=1,
+    )  # fmt: skip
     tolerance: float = quantity("m", "local error of an internal step", default=1e-8, minimum=1e-15, maximum=0.1)
     formulation: str = text(default="auto", choices=FORMULATIONS)
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
@@ -540,6 +562,11 @@ class MechanismDefinition(Operation):
         yield from super().problems()
         if any(self.aerodynamic_uplift) and self.lifting is None:
             yield "aerodynamic_uplift", "does nothing: no force element has lift = true"
+        if self.lift_input and self.lifting is None:
+            yield "lift_input", "does nothing: no force element has lift = true"
+        elif self.lift_input and any(self.aerodynamic_uplift):
+            text = "the input lift.value replaces it; write a [force.NAME] with kind = 'aerodynamic' instead"
+            yield "aerodynamic_uplift", f"does nothing with lift_input = 1: {text}"
         wanted = self.lift_parameter
         cam = getattr(self.lifting, "cam", None)
         for key in ("static_force", "static_moment"):

@@ -65,7 +65,7 @@ class MechanismBalance:
         """
         (y, rate), (new, new_rate) = begin, end
         middle = 0.5 * (y + new) + (step / 8.0) * (rate - new_rate)
-        self._mechanism.place_base(middle, inputs_at(0.5 * step).base)
+        self._mechanism.place_base(middle, inputs_at(0.5 * step))
         powers = [self._power(state, inputs_at(t)) for t, state in ((0.0, y), (0.5 * step, middle), (step, new))]
         total, outer, contact = (np.array([1.0, 4.0, 1.0]) @ np.array(powers) * (step / 6.0)).tolist()
         self._total += total
@@ -90,7 +90,7 @@ class MechanismBalance:
 
     def _power(self, y: FloatArray, inputs: Inputs) -> _Power:
         mechanism = self._mechanism
-        kinematics = mechanism.kinematics(y, inputs.base[2])
+        kinematics = mechanism.kinematics(y, inputs)
         vectors, state = mechanism.pool.evaluate(kinematics), mechanism.split(y)
         turning = (kinematics.frames[:, :3] @ state.w[:, :, None])[:, :, 0]
         motion = np.concatenate([state.v, turning], axis=1)
@@ -104,4 +104,8 @@ class MechanismBalance:
         lift = float(((loads - unlifted) * motion).sum())
         free, joints = float(by_body[mechanism.driven :].sum()), mechanism.power_of_base(y, inputs)
         outer = lift - contact + joints - float(by_body[: mechanism.driven].sum())
+        if inputs.pull != 0.0 or inputs.against != 0.0:
+            travel = np.zeros_like(loads)
+            mechanism.add_travel_loads(travel, kinematics, inputs)
+            outer += float((travel * motion)[mechanism.driven :].sum())
         return _Power(free + joints, outer, contact)

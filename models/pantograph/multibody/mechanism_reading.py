@@ -47,7 +47,7 @@ def _check_references(table: Table, d: MechanismDefinition) -> None:
         (f"{section}.{element.name}.{key}", getattr(element, key, ""))
         for section, elements in sections
         for element in elements
-        for key in ("body_i", "body_j")
+        for key in ("body_i", "body_j", "body")
     ]
     uses += [("strip.body", d.strip.body)] if d.strip is not None else []
     uses += [("assembly.body", d.assembly.body)]

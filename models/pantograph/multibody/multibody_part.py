@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,16 +11,22 @@ from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
 from models.pantograph.multibody.analysis.cam_design import fit_force
 from models.pantograph.multibody.analysis.posture import take_posture
-from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation
+from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation, SwayMotion
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_advice import mechanism_warning, working_height_warning
 from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
-from models.pantograph.multibody.reduced.reduced_motion import ReducedModel, ReducedMotion
-from models.pantograph.multibody.reduced.reduction import NotReducibleError, unsuitable_drive
-from models.pantograph.operation import NO_DRIVE, Drive
+from models.pantograph.multibody.reduced.reduced_motion import ReducedMotion, reduced_if_possible
+from models.pantograph.multibody.reduced.reduction import unsuitable_drive
+from models.pantograph.multibody.step_memory import (
+    LastEvaluation,
+    beyond_response,
+    history_snapshot,
+    restored_history,
+)
+from models.pantograph.operation import NO_DRIVE, Drive, OperationError
 
 
 class MultibodyPantographPart:
@@ -50,15 +55,17 @@ class MultibodyPantographPart:
         self.definition = definition
         self.observed = _observed(definition)
         self._lifted, self._holds = definition.lift, float(definition.holds_force)
+        self._is_blown = definition.air_coefficient != 0.0
         self.time = 0.0
         self.strip = np.zeros((2, 2, 3))
         self._start_time = 0.0
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._lateral = LateralExtrapolation()
         self._base = BaseMotion()
-        self._uplift = 0.0
+        self._sway = SwayMotion()
+        self._drive = NO_DRIVE
         self._y = np.zeros(0)
-        self._last: _Last | None = None
+        self._last: LastEvaluation | None = None
         self._history: History | None = None
         self._substep = definition.time_step
         self._observation = np.zeros(len(self.observed))
@@ -92,24 +99,22 @@ class MultibodyPantographPart:
             If the mechanism cannot be assembled or balanced.
         """
         built = self._ready()
-        self._lift_besides(drive)
+        self._take(drive)
         self.time = self._start_time = time
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
         self._base.start(base)
+        self._sway.start(drive.sway)
         self._substep = self.definition.time_step
         self._history = None
-        self._y = built.standing.copy()
-        s = built.mechanism.split(self._y)
-        s.r[:, 2] += base[0]
-        s.v[:, 2] += base[1]
-        self._left = ""
-        self._reduced = None if built.reduced is None else ReducedMotion(built.reduced)
+        self._left = unsuitable_drive(drive)
+        self._reduced = None if self._left or built.reduced is None else ReducedMotion(built.reduced)
         if self._reduced is not None:
             self._reduced.begin(self._given())
             self._show_reduced()
             return
         inputs = self._inputs(0.0)
+        self._y = built.mechanism.standing_on(built.standing, inputs)
         self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
         watched = self.definition.monitor_energy
         self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
@@ -136,15 +141,16 @@ class MultibodyPantographPart:
             If the motion becomes singular.
         """
         built = self._ready()
-        values = (force, *point.tolist(), *base.tolist())
+        values = (force, *point.tolist(), *base.tolist(), *drive.sway, drive.air, drive.uplift, drive.lift)
         if not all(map(math.isfinite, values)):
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
-        self._lift_besides(drive)
+        self._take(drive)
         operation = self.definition
         expected = 0.5 * (self.strip.item(0) + self.strip.item(6))
         self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
         self._receive_lateral(force, point, expected, step)
         self._base.receive(base, step)
+        self._sway.receive(drive.sway, step)
         if self._reduced is not None and self._step_reduced(self._reduced, step, drive):
             return
         elapsed = self.time - self._start_time
@@ -155,6 +161,7 @@ class MultibodyPantographPart:
         self._y, self._substep, self._history = done.y, done.step, done.history
         inputs = self._inputs(step)
         self._base.finish(step)
+        self._sway.finish(step)
         self.time += step
         self._remember(done.evaluation, inputs)
 
@@ -184,12 +191,14 @@ class MultibodyPantographPart:
         built = self._ready()
         return mechanism_warning(built.mechanism, built.reference)
 
+    @property
+    def state(self) -> FloatArray:
+        """State of the bodies, shape (13 n,); see `Mechanism`."""
+        return self._y if self._reduced is None else self._reduced.cartesian(self._base.now)
+
     def form(self) -> str:
         """Say in which form the equations of motion are solved, and why if it is the general one."""
-        built = self._ready()
-        if self._left or built.reduced is None:
-            return f"general form of the equations: {self._left or built.not_reduced}"
-        return built.reduced.described
+        return f"general form of the equations of motion: {self._left}" if self._left else self._ready().form
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
@@ -201,10 +210,11 @@ class MultibodyPantographPart:
             "observation": self.observation_values(),
             **({} if self._reduced is None else self._reduced.snapshot()),
             **(self._last.snapshot() if self._last is not None else {}),
-            **(_history_snapshot(self._history) if self._history is not None else {}),
+            **(history_snapshot(self._history) if self._history is not None else {}),
             **self._force.snapshot(),
             **self._lateral.snapshot(),
             **self._base.snapshot(),
+            **self._sway.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
 
@@ -215,13 +225,14 @@ class MultibodyPantographPart:
         self._substep = float(snapshot["substep"][0])
         self.strip[...] = snapshot["strip"]
         self._observation[...] = snapshot["observation"]
-        self._last = _Last.restored(snapshot)
-        self._history = _restored_history(snapshot)
+        self._last = LastEvaluation.restored(snapshot)
+        self._history = restored_history(snapshot)
         self._is_shown = True
         self._reduced = self._restored_motion(snapshot)
         self._force.restore(snapshot)
         self._lateral.restore(snapshot)
         self._base.restore(snapshot)
+        self._sway.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
 
@@ -240,7 +251,7 @@ class MultibodyPantographPart:
         if not reason:
             reason = motion.step(self._given(), step)
         if reason:
-            self._y = motion.cartesian(self._base.at(0.0)[:2])
+            self._y = motion.cartesian(self._base.now)
             self._reduced, self._left, self._is_shown = None, f"from {self.time:.6g} s on, {reason}", True
             self._last, self._history, self._substep = None, None, self.definition.time_step
             return False
@@ -251,14 +262,17 @@ class MultibodyPantographPart:
 
     def _given(self) -> list[float]:
         """Return the inputs of a step as the reduced form takes them; see `ReducedMotion.step`."""
-        operation, force, lateral = self.definition, self._force, self._lateral
+        operation, force, lateral, drive = self.definition, self._force, self._lateral, self._drive
+        uplift = drive.uplift
+        if self._is_blown:
+            uplift += operation.aerodynamic_force(drive.air)
         return [
             self.time, self._start_time,
             force.known, *force.times, *force.values, force.order,
             lateral.values[0], lateral.rate, lateral.times[0],
             *self._base.cubic.tolist(),
             self._ready().balance, self._lifted, operation.raise_start, operation.raise_duration,
-            self._uplift, self._holds,
+            uplift, self._holds,
         ]  # fmt: skip
 
     def _show_reduced(self) -> None:
@@ -298,7 +312,7 @@ class MultibodyPantographPart:
 
     def _remember(self, evaluation: Evaluation, inputs: Inputs) -> None:
         """Keep the equations of motion at the end of a step: they begin the next one."""
-        self._last = _Last(evaluation.acceleration, evaluation.response, inputs)
+        self._last = LastEvaluation(evaluation.acceleration, evaluation.response, inputs)
         self._show(evaluation)
 
     def _account(self, step: float, first: FloatArray | None, done: Advance) -> None:
@@ -314,12 +328,7 @@ class MultibodyPantographPart:
         acted, as far as they follow from the last inputs.
         """
         last, inputs, history = self._last, self._inputs(0.0), self._history
-        if (
-            last is None
-            or last.inputs.lift != inputs.lift
-            or last.inputs.uplift != inputs.uplift
-            or last.inputs.base[:2] != inputs.base[:2]
-        ):
+        if last is None or beyond_response(last.inputs) != beyond_response(inputs):
             return None, None
         mechanism = self._ready().mechanism
         first, change = mechanism.with_inputs(self._y, last.acceleration, last.response, last.inputs, inputs)
@@ -337,17 +346,33 @@ class MultibodyPantographPart:
 
     def _inputs(self, tau: float) -> Inputs:
         """Return what acts ``tau`` [s] after the beginning of the step."""
-        time = self.time + tau
+        built, drive, time = self._ready(), self._drive, self.time + tau
         force = self._force.at(time)
-        lift, uplift = self._lift(time), self._uplift
+        lift, uplift = self._lift(time), self.definition.aerodynamic_force(drive.air) + drive.uplift
         if self.definition.holds_force:
             lift, uplift = lift + uplift, 0.0
-        return Inputs(self._base.at(tau), lift, force, self._lateral.at(time), uplift)
+        driven = drive.lift if self.definition.lift_input else None
+        against = self.definition.speed - drive.air if built.mechanism.forces.air.count else 0.0
+        return Inputs(
+            self._base.at(tau), lift, force, self._lateral.at(time), uplift, self._sway.at(tau), 0.0, against, driven
+        )
 
-    def _lift_besides(self, drive: Drive) -> None:
-        """Take the uplift of the air and of a controller."""
-        self._uplift = self.definition.aerodynamic_force(drive.air) + drive.uplift
-        if self._uplift != 0.0:
+    def _take(self, drive: Drive) -> None:
+        """Take what acts besides contact and roof.
+
+        Raises
+        ------
+        OperationError
+            If a force is added to a lift that is set directly.
+        """
+        self._drive, definition = drive, self.definition
+        if definition.lift_input:
+            if drive.uplift != 0.0:
+                raise OperationError(
+                    f"{definition.name}: uplift_force is {drive.uplift:g} N, but with lift_input = 1 the input "
+                    "lift.value replaces all that lifts: add it there, or set lift_input to 0"
+                )
+        elif drive.uplift != 0.0 or definition.air_coefficient != 0.0:
             built = self._ready()
             fit_force(built.mechanism, built.reference)
 
@@ -370,7 +395,7 @@ class MultibodyPantographPart:
         bodies = np.stack([s.r[free, 2] + built.base_height, s.v[free, 2], evaluation.acceleration[free, 2]], axis=1)
         values = evaluation.constraints
         acting = self._inputs(0.0) if self._last is None else self._last.inputs
-        held = (acting.lift,) if operation.holds_force else ()
+        held = (mechanism.held_force(self._y, acting),) if operation.holds_force else ()
         own = (
             *self._seen(ends),
             mechanism.lift_value(self._y, acting),
@@ -380,41 +405,6 @@ class MultibodyPantographPart:
         )
         self._observation[: bodies.size] = bodies.ravel()
         self._observation[bodies.size :] = own
-
-
-class _Last(NamedTuple):
-    """The accelerations at the end of a step, their response to other inputs, and the inputs that acted."""
-
-    acceleration: FloatArray
-    response: FloatArray
-    inputs: Inputs
-
-    def snapshot(self) -> Snapshot:
-        """Return all of it."""
-        inputs = np.array([*self.inputs.base, *self.inputs[1:]])
-        return {"last.acceleration": self.acceleration, "last.response": self.response, "last.inputs": inputs}
-
-    @classmethod
-    def restored(cls, snapshot: Snapshot) -> _Last | None:
-        """Return what a snapshot holds."""
-        if "last.inputs" not in snapshot:
-            return None
-        z, vz, az, *others = snapshot["last.inputs"].tolist()
-        inputs = Inputs((z, vz, az), *others)
-        acceleration, response = (snapshot[f"last.{name}"].astype(np.float64) for name in ("acceleration", "response"))
-        return cls(acceleration, response, inputs)
-
-
-def _history_snapshot(history: History) -> Snapshot:
-    step = np.array([history.step])
-    return {"history.step": step, "history.middle": history.middle, "history.begin": history.begin}
-
-
-def _restored_history(snapshot: Snapshot) -> History | None:
-    if "history.step" not in snapshot:
-        return None
-    middle, begin = (snapshot[f"history.{name}"].astype(np.float64) for name in ("middle", "begin"))
-    return History(float(snapshot["history.step"][0]), middle, begin)
 
 
 class _Built:
@@ -430,12 +420,7 @@ class _Built:
         self.reference = posture.reference
         self.balance = posture.start.lift
         self.base_height = posture.base_height
-        self.reduced: ReducedModel | None = None
-        self.not_reduced = ""
-        try:
-            self.reduced = ReducedModel(self.mechanism, self.standing)
-        except NotReducibleError as error:
-            self.not_reduced = str(error)
+        self.reduced, self.form = reduced_if_possible(self.mechanism, self.standing)
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 
 

@@ -42,7 +42,21 @@ def test_has_the_ports_of_two_pantographs(fmu, instance):
     assert not any("section" in name for name in outputs)
     uplifts = [n for n in outputs if n.startswith("support")]
     assert uplifts[0] == "support[1].uplift"
-    assert len(outputs) == 8 + len(uplifts)
+    assert len(outputs) == 12 + len(uplifts)
+
+
+def test_the_nominal_height_is_computed_for_whoever_asks(instance):
+    names = [f"pantograph[1].nominal.{axis}" for axis in ("z", "vz")]
+    instance.initialise(**{f"pantograph[1].{end}.x": 300.0 for end in "AB"})
+    assert instance.get(names) == [5.08, 0.0]
+    for end in "AB":
+        instance[f"pantograph[1].{end}.x"] = 86.9 + 960.0 + 30.0  # the span in which the wire rises to its anchor
+        instance[f"pantograph[1].{end}.vx"] = 50.0
+    instance.step(0.0)
+    z, rate = instance.get(names)
+    assert z > 5.08
+    assert rate == pytest.approx(50.0 * (z - 5.08) / 30.0, rel=0.01)
+    assert instance["dropper[9].force"] > 0.0  # what is asked for later is up to date, too
 
 
 def test_a_strip_that_is_not_connected_touches_nothing(instance):

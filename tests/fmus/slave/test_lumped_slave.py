@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from fmus.builder.fmu_build import build
 from fmus.builder.recipe import recipe
@@ -27,6 +28,7 @@ def instance(fmu: Path) -> Iterator[Instance]:
 def test_has_the_ports_of_a_pantograph(instance):
     inputs = ["contact.force", "contact.x", "contact.y", "contact.z", "base.z", "base.vz"]
     inputs += ["reference.vz", "air.u", "uplift_force"]
+    inputs += ["base.y", "base.vy", "base.roll", "base.roll_rate"]
     assert names_of(instance, "input") == inputs
     strip = [f"{end}.{axis}" for end in "AB" for axis in ("x", "y", "z", "vx", "vy", "vz")]
     outputs = names_of(instance, "output")
@@ -77,3 +79,20 @@ def test_the_contact_force_of_the_start_pushes_the_strip_down(instance):
     instance.initialise(static_force=0.0, **{"contact.force": 77.5})
     assert instance["mass[3].az"] == pytest.approx(-77.5 / instance["stage[3].mass"])
     assert instance["mass[1].az"] == 0.0
+
+
+@pytest.mark.parametrize("name", ["base.y", "base.roll"])
+def test_an_input_that_is_no_number_is_refused_by_its_name(instance, name):
+    instance.initialise()
+    instance[name] = float("nan")
+    with pytest.raises(FMICallException):
+        instance.step(0.0)
+    assert f"input {name} is nan" in instance.errors[-1]
+
+
+def test_roll_without_the_height_of_the_base_is_refused_in_words(instance):
+    instance.initialise()
+    instance["base.roll"] = 0.01
+    with pytest.raises(FMICallException):
+        instance.step(0.0)
+    assert "write base_height [m above rail] into the definition" in instance.errors[-1]

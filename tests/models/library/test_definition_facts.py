@@ -25,10 +25,17 @@ def test_figures_of_ln2_are_those_of_its_definition():
 @pytest.mark.parametrize(
     ("name", "facts"),
     [
-        ("CX", LiftFacts("static_force", "N", 168.0, 178.45)),
-        ("CX_multibody", LiftFacts("static_force", "N", 168.0, None)),
-        ("generic_multibody", LiftFacts("static_moment", "N.m", 1313.7, None)),
+        ("CX", LiftFacts("static_force", "N", 168.0, True)),
+        ("CX_multibody", LiftFacts("static_force", "N", 168.0, False)),
+        ("generic_multibody", LiftFacts("static_moment", "N.m", 1313.7, False)),
     ],
 )
 def test_what_lifts_a_pantograph_is_a_force_or_a_moment(name, facts):
     assert lift_facts(load_pantograph(name)) == facts
+
+
+@pytest.mark.parametrize(("rise", "changes"), [(0.01, False), (0.2, True)])
+def test_a_line_changes_height_if_its_supports_do(line_maker, rise, changes):
+    heights = {"positions": [[-50.0, 20.0, 350.0], "m", "test"], "heights": [[5.0, 5.0, 5.0 + rise], "m", "test"]}
+    assert line_facts(line_maker(measured=heights)).changes_height is changes
+    assert not line_facts(line_maker()).changes_height

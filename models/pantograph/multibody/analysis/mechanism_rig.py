@@ -103,6 +103,11 @@ class Rig:
         self.base_height = posture.base_height
 
     @property
+    def reference(self) -> FloatArray:
+        """State with the strip at the reference height, shape (13 n,)."""
+        return self._start
+
+    @property
     def freedom(self) -> int:
         """Number of independent motions that the joints allow."""
         return degrees_of_freedom(self.mechanism, self._start)

@@ -89,6 +89,11 @@ class Cam(NamedTuple):
         own = 0.0 if self.for_weights is None else self.for_weights.at(place)
         return own + lift * self.per_lift.at(place)
 
+    def lift_of(self, place: float, value: float) -> float:
+        """Return the lift set that would give a moment [N.m] or force [N] at a place; 0 where none does."""
+        per_lift = self.per_lift.at(place)
+        return (value - self.value(place, 0.0)) / per_lift if per_lift != 0.0 else 0.0
+
 
 class AngleStops:
     """Stops of angles: springs and dampers beyond a lowest and a highest angle; they push back, never pull."""

@@ -13,12 +13,14 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.numerics.cubic_curve import CubicCurve
+from models.pantograph.multibody.elements.air_forces import AirForces
 from models.pantograph.multibody.elements.angle_elements import AngleStops, BodyAngle, Cam, PointDistance
 from models.pantograph.multibody.elements.moving_vectors import Handle, Kinematics, MovingVectors, Vector, VectorPool
 from models.pantograph.multibody.elements.rotations import cross
 from models.pantograph.multibody.mechanism_definition import (
     ActuatorForce,
     ActuatorMoment,
+    Aerodynamic,
     AngleStop,
     BumpStop,
     Bushing,
@@ -48,6 +50,7 @@ KNOWN: Final = (
     LiftingMoment,
     AngleStop,
     Bushing,
+    Aerodynamic,
     *get_args(JointFriction),
 )
 
@@ -93,6 +96,7 @@ class ForceElements:
         self._friction = np.array([f.level for f, _ in slides])
         self._transition = np.array([f.transition for f, _ in slides])
         self.stops = AngleStops([f for f in forces if isinstance(f, AngleStop)], numbers, orientations)
+        self.air = AirForces([f for f in forces if isinstance(f, Aerodynamic)], numbers)
         self.cam: Cam | None = None
         self.per_force: CubicCurve | None = None
         self.lift_place = self._place_of_lift(forces, numbers, orientations)

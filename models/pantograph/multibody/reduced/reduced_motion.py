@@ -16,7 +16,7 @@ from models.pantograph.multibody.reduced import reduced_equations
 from models.pantograph.multibody.reduced.closed_arm import ArmFinder, ArmTables, tabulate, turn_between
 from models.pantograph.multibody.reduced.head_chain import HeadChain, HeadRows
 from models.pantograph.multibody.reduced.quintic_table import QuinticTable
-from models.pantograph.multibody.reduced.reduction import reduction_of
+from models.pantograph.multibody.reduced.reduction import NotReducibleError, reduction_of
 
 #: Why a step could not be made.
 _REASONS: Final = {
@@ -77,7 +77,7 @@ class ReducedModel:
         names += [] if not slides else ["one displacement" if slides == 1 else f"{slides} displacements"]
         last = names.pop()
         listed = f"{', '.join(names)} and {last}" if names else last
-        return f"reduced form of the equations: {listed}"
+        return f"reduced form of the equations of motion, in coordinates of {listed}"
 
     def numbers(self, table: Any, rows: Any, curve: Any) -> tuple[Any, Any]:
         """Return ``model`` and ``outline`` of `reduced_equations`.
@@ -110,12 +110,12 @@ class ReducedModel:
         adds = forces.cam is None and forces.per_force is None and forces.lift_place is not None
         return curve(own), curve(per_lift), curve(_rows_of(forces.per_force)), float(adds)
 
-    def cartesian(self, y: FloatArray, base: tuple[float, float]) -> FloatArray:
+    def cartesian(self, y: FloatArray, base: FloatArray) -> FloatArray:
         """Return the state of all bodies, shape (13 n,), for coordinates and rates, shape (2 size,).
 
         Parameters
         ----------
-        base : (float, float)
+        base : ndarray, shape (2,)
             Height and velocity of the base [m, m/s].
         """
         n, mechanism, arm = self.size, self.mechanism, self._finder.arm
@@ -149,6 +149,23 @@ class ReducedModel:
         s.r[:, 2] += base[0]
         s.v[:, 2] += base[1]
         return project(mechanism, state)
+
+
+def reduced_if_possible(mechanism: Mechanism, standing: FloatArray) -> tuple[ReducedModel | None, str]:
+    """Return the reduced model of a mechanism, None if it stays in the general form; and which it is, in words.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Its springs settled, its cam fitted.
+    standing : ndarray, shape (13 n,)
+        A closed state at rest.
+    """
+    try:
+        model = ReducedModel(mechanism, standing)
+    except NotReducibleError as error:
+        return None, f"general form of the equations of motion: {error}"
+    return model, model.described
 
 
 class ReducedMotion:
@@ -239,7 +256,7 @@ class ReducedMotion:
         self._equations.place_bodies(self.memory, self._numbers, self._outline, base, found)
         return np.array(found).reshape(-1, 3)[order]
 
-    def cartesian(self, base: tuple[float, float]) -> FloatArray:
+    def cartesian(self, base: FloatArray) -> FloatArray:
         """Return the state of all bodies, shape (13 n,), for height and velocity of the base."""
         return self.model.cartesian(np.array(self.memory[0]), base)
 

@@ -101,6 +101,8 @@ def unsuitable(definition: MechanismDefinition) -> str:
         return "the definition says so (formulation)"
     if definition.monitor_energy:
         return "the balance of energy is kept of the bodies (monitor_energy)"
+    if definition.lift_input:
+        return "its lift is an input (lift_input)"
     if definition.strip is None:
         return "there is no strip"
     for force in definition.forces:

@@ -1,5 +1,7 @@
 """A project as it is written: a scenario that reads as it is meant, and files that say what they are."""
 
+from dataclasses import replace
+
 import pytest
 
 from master.errors import RequestError
@@ -21,7 +23,7 @@ WIRE = Wire("LN2", 100.0, 1300.0, tuple(range(100, 1301, 50)), 5.03, 5.08)
 LINE = Definition("demo_LN2", 'name = "demo_LN2"\n', "copy of LN2 in the library")
 CX = Definition("demo_CX", 'name = "demo_CX"\n', "copy of CX in the library")
 MULTIBODY = Definition("demo_M", 'name = "demo_M"\n', "copy of M in the library")
-LIFTS = {"demo_CX": Lift("static_force", "N", 168.0, 100.0), "demo_M": Lift("static_moment", "N.m", 1313.7, None)}
+LIFTS = {"demo_CX": Lift("static_force", "N", 168.0, True), "demo_M": Lift("static_moment", "N.m", 1313.7, False)}
 ENDS = [f"{end}.{axis}" for end in "AB" for axis in ("x", "y", "z", "vx", "vy", "vz")]
 
 
@@ -70,8 +72,20 @@ def test_the_scenario_says_what_was_asked_for(tmp_path):
     assert found["speed"] == (50.0, "m/s")
     assert found["start_position"] == (110.0, "m")
     assert found["reference_height"] == (5.02, "m")  # below the lowest wire
-    # What the spring to the roof takes at the height of the supports, and 0.35 mm/N above.
-    assert found["static_force"] == (pytest.approx(120.0 + 100.0 * (0.06 + 0.35e-3 * 120.0), abs=0.05), "N")
+    # The spring follows the height, so that the strip presses with it wherever the wire is.
+    assert found["static_force"] == (120.0, "N")
+    assert found["follow_height"][0] == 1
+
+
+def test_where_the_height_changes_the_reference_is_told_its_rate(tmp_path):
+    wire = replace(WIRE, changes_height=True)
+    train = {"pantographs": [CX, MULTIBODY, CX], "separations": [50.0]}
+    structure = read(new_project(request(tmp_path / "demo", wire=wire, **train)))
+    rates = [c for c in structure.connections if c.start_connector.endswith("nominal.vz")]
+    assert [(c.start_connector, c.end_element, c.end_connector) for c in rates] == [
+        ("pantograph[1].nominal.vz", "pantograph_1", "reference.vz"),
+        ("pantograph[3].nominal.vz", "pantograph_3", "reference.vz"),
+    ]
 
 
 def test_a_moment_that_lifts_is_left_as_the_definition_has_it(tmp_path):

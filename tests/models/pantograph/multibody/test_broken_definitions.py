@@ -112,3 +112,24 @@ def test_modes_that_dry_friction_takes_are_told(rubbing):
 def test_without_friction_there_is_nothing_to_tell(rubbing):
     frictionless = replace(rubbing, forces=tuple(f for f in rubbing.forces if not isinstance(f, JointFriction)))
     assert friction_warning(frictionless, None, analysed) == ""
+
+
+def test_a_lift_that_is_an_input_needs_an_element_to_lift():
+    data = library_data("generic_multibody")
+    del data["force"][mechanism_from(data).lifting.name]["lift"], data["static_moment"]
+    data["force"][mechanism_from(library_data("generic_multibody")).lifting.name]["moment"] = q(900.0, "N.m")
+    with pytest.raises(DefinitionError, match="lift_input: does nothing: no force element has lift = true"):
+        mechanism_from(data | {"lift_input": q(1, "1")})
+
+
+def test_the_uplift_that_a_given_lift_replaces_is_told():
+    data = library_data("generic_multibody") | {"aerodynamic_uplift": q([0.01, 0.02], "N.s2/m2")}
+    with pytest.raises(DefinitionError, match=r"aerodynamic_uplift: does nothing with lift_input = 1"):
+        mechanism_from(data | {"lift_input": q(1, "1")})
+
+
+def test_the_air_pushes_a_body_that_there_is():
+    data = library_data("generic_multibody")
+    data["force"]["wind"] = {"kind": "aerodynamic", "body": "hed", "coefficient": q(0.01, "N.s2/m2")}
+    with pytest.raises(DefinitionError, match=r"force\.wind\.body: there is no body 'hed'"):
+        mechanism_from(data)

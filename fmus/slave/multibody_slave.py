@@ -25,7 +25,7 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         "the weights; from raise_start the actuator grows to its value over raise_duration. The contact force acts "
         "on the head where the line says, so that a staggered wire makes the head roll, and the strip's ends follow. "
         "Where the mechanism allows it, the equations of motion are solved in as few coordinates as it has, otherwise "
-        "(and with formulation = \"general\" in the definition) for all bodies; the log says which when a run starts."
+        '(and with formulation = "general" in the definition) for all bodies; the log says which when a run starts.'
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops).",

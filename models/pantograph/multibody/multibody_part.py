@@ -229,6 +229,8 @@ class MultibodyPantographPart:
         self._history = restored_history(snapshot)
         self._is_shown = True
         self._reduced = self._restored_motion(snapshot)
+        went_on = self._reduced is None and self._ready().reduced is not None
+        self._left = self._left or "the state that was restored is in it" if went_on else ""
         self._force.restore(snapshot)
         self._lateral.restore(snapshot)
         self._base.restore(snapshot)
@@ -279,9 +281,10 @@ class MultibodyPantographPart:
         """Bring the strip up to the state; what is observed waits until somebody asks."""
         assert self._reduced is not None
         built, operation = self._ready(), self.definition
-        track = operation.start_position + operation.speed * (self.time - self._start_time)
         z, vz = self._base.now.tolist()
-        self._reduced.place_strip((track - built.strip_x, z + built.base_height, operation.speed, vz), self.strip)
+        self._reduced.place_strip(
+            (self._track() - built.strip_x, z + built.base_height, operation.speed, vz), self.strip
+        )
         self._is_shown = False
 
     def _observe_reduced(self) -> None:
@@ -293,6 +296,10 @@ class MultibodyPantographPart:
         self._observation[: bodies.size] = bodies.ravel()
         self._observation[bodies.size :] = (*self._seen(self.strip), motion.lift_value(), *held, 0.0, 0.0)
         self._is_shown = True
+
+    def _track(self) -> float:
+        """Return where the train has taken the pantograph [m]."""
+        return self.definition.start_position + self.definition.speed * (self.time - self._start_time)
 
     def _seen(self, ends: FloatArray) -> tuple[float, float, float]:
         """Return roll, roll rate, and place of the contact along the strip for its ends, shape (2, 2, 3)."""
@@ -386,9 +393,8 @@ class MultibodyPantographPart:
         built = self._ready()
         mechanism, operation = built.mechanism, self.definition
         ends = mechanism.strip_ends(self._y)
-        track = operation.start_position + operation.speed * (self.time - self._start_time)
         self.strip[...] = ends
-        self.strip[:, 0, 0] += track - built.strip_x
+        self.strip[:, 0, 0] += self._track() - built.strip_x
         self.strip[:, 0, 2] += built.base_height
         self.strip[:, 1, 0] += operation.speed
         s, free = mechanism.split(self._y), slice(mechanism.driven, None)

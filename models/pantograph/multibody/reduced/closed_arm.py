@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -11,7 +12,6 @@ from models.arrays import FloatArray
 from models.pantograph.multibody.elements.angle_elements import BodyAngle
 from models.pantograph.multibody.elements.moving_vectors import Kinematics, MovingVectors
 from models.pantograph.multibody.elements.rotations import cross, rotation_matrices
-from models.pantograph.multibody.mechanism import Mechanism
 from models.pantograph.multibody.mechanism_definition import (
     ActuatorForce,
     ActuatorMoment,
@@ -99,7 +99,7 @@ class ArmFinder:
                 raise NotReducibleError(f"the arm does not close at {theta:.3g}")
         unit = np.zeros(len(system))
         unit[-1] = 1.0
-        y = arm.with_velocity(y, self._whole(np.linalg.solve(system, unit)))
+        y = arm.with_velocity(y, self._whole(np.linalg.solve(system, unit).view(np.float64)))
         gamma = arm.constraint_values(arm.kinematics(y)).gamma
         bend = self._whole(np.linalg.solve(system, np.append(gamma, 0.0)))
         return ArmPlace(y, np.concatenate(arm.unscaled(bend), axis=1))
@@ -184,7 +184,7 @@ def tabulate(reduction: Reduction, finder: ArmFinder) -> ArmTables:
     values, first = np.array([p.values for p in panels]), -len(below)
     length = _PANEL[finder.turns]
     while len(panels):
-        edges = length * (first + np.arange(len(panels) + 1))
+        edges = length * np.arange(first, first + len(panels) + 1, dtype=np.float64)
         table, doubt = tabulated(edges, values)
         if doubt.max() <= 1.0:
             break
@@ -197,7 +197,7 @@ def tabulate(reduction: Reduction, finder: ArmFinder) -> ArmTables:
     functions = QuinticTable(table.start, table.end, np.ascontiguousarray(table.cells[:, :split]))
     outline = QuinticTable(table.start, table.end, np.ascontiguousarray(table.cells[:, split:]))
     states = np.concatenate([p.states for p in panels])
-    places = np.concatenate([points_of(a, b) for a, b in zip(edges, edges[1:], strict=False)])
+    places = np.concatenate([points_of(a, b) for a, b in itertools.pairwise(edges.tolist())])
     return ArmTables(functions, outline, sampler.rows, max(p.reach for p in panels), places, states)
 
 

@@ -304,5 +304,3 @@ def _stop(f: Force) -> list[float]:
 
 def _limits(low: float | None, high: float | None) -> list[float]:
     return [-np.inf if low is None else low, np.inf if high is None else high]
-
-

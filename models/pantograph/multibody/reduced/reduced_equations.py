@@ -13,10 +13,10 @@ the coordinates, v = sum of columns times rates, and b the rest of its accelerat
 
 Displacements do not feel each other's inertia: they are eliminated one by one, which leaves theta and phi.
 
-Numbers come as lists or arrays, rows of tables as lists or rows of arrays, so that the same lines run as Python on lists
-and compiled on arrays. ``model`` is what `reduced_motion.ReducedModel.numbers` makes. ``memory`` is what a step leaves
-for the next one: the coordinates with their rates (2 n), their accelerations (n) and response (3 n), the rates of all
-these in the middle and at the beginning of the step before (2 n each), single numbers.
+Numbers come as lists or arrays, rows of tables as lists or rows of arrays: the same lines run as Python on lists, and
+compiled on arrays. ``model`` is what `reduced_motion.ReducedModel.numbers` makes. ``memory`` is what a step leaves for
+the next one: the coordinates with their rates (2 n), their accelerations (n) and response (3 n), the rates of all these
+in the middle and at the beginning of the step before (2 n each), single numbers.
 
 The file is longer than others because kernels are compiled from one source, and its functions take everything as
 numbers.
@@ -274,7 +274,7 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
         f_p += joint_forces(slides, turns, y, n, f_s)
     on = strip[0]
     # Of the strip's body: place and columns.
-    k_py = k_tx = k_ty = k_tz = k_ex = k_ez = 0.0
+    k_py = k_tx = k_tz = k_ex = k_ez = 0.0
     k_cx, k_cz, k_slide = vx, vz, -1
     number = 0.0
     for body in bodies:
@@ -313,7 +313,7 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
             f_t -= pitch * turning * body[21]
         if number == on:
             k_py, k_cx, k_cz, k_slide = py, cx, cz, slide
-            k_tx, k_ty, k_tz, k_ex, k_ez = tx, ty, tz, ex, ez
+            k_tx, k_tz, k_ex, k_ez = tx, tz, ex, ez
         number += 1.0
     # The contact's columns, at y = 0 and per y.
     dx, dy, dz = vector_at(strip, 10, sin_p, cos_p)
@@ -366,7 +366,7 @@ def solved(m_tt: Any, m_tp: Any, m_pp: Any, m_ts: Any, m_ps: Any, m_ss: Any, f_t
     a_t, a_p = one * (m_pp * f_t - m_tp * f_p), one * (m_tt * f_p - m_tp * f_t)
     result = [a_t, a_p]
     for j in range(count):
-        result.append((f_s[j] - m_ts[j] * a_t - m_ps[j] * a_p) / m_ss[j])
+        result.append((f_s[j] - m_ts[j] * a_t - m_ps[j] * a_p) / m_ss[j])  # noqa: PERF401 - compiled, a loop is as fast
     return result
 
 
@@ -456,12 +456,11 @@ def step(memory: Any, given: Any, duration: Any, model: Any, settings: Any) -> A
         before = 0.0
     now, trial, latest = 0.0, single[NEXT], duration - _SMALLEST_STEP
     for end in (rise, raised, duration):  # inputs have kinks there: internal steps end there
-        if not (_SMALLEST_STEP < end < latest):
-            if end != duration:
-                continue
+        if end != duration and not _SMALLEST_STEP < end < latest:
+            continue
         while now < end:
             longest = min(trial, settings[1], duration)
-            pieces = max(1, int(ceil((end - now) / longest - 1e-6)))
+            pieces = max(1, int(ceil((end - now) / longest - 1e-6)))  # noqa: RUF046 - compiled, ceil is no integer
             h = (end - now) / pieces
             if before > 0.0 and abs(before - h) <= 1e-9 * h:
                 new, new_rates, response, between, acting, error = continued(
@@ -500,18 +499,18 @@ def continued(
     """Predict by the parabola through the last three rates, correct by Simpson's rule; see `Integrator`."""
     n = len(y) // 2
     a, b, c = h / 24.0, h / 48.0, h / 6.0
-    half = [x + a * (23.0 * f - 16.0 * m + 5.0 * k) for x, f, m, k in zip(y, first, before, begun)]
+    half = [x + a * (23.0 * f - 16.0 * m + 5.0 * k) for x, f, m, k in zip(y, first, before, begun)]  # noqa: B905 - numba
     for i in range(n):
         half[i] = y[i] + b * (begun[i] - 5.0 * before[i] + 19.0 * first[i] + 9.0 * half[n + i])
     acceleration, _ = evaluate(half, inputs_at(given, now + 0.5 * h), model, False)
     middle = half[n:] + acceleration
-    guess = [x + c * (m - 2.0 * f + 7.0 * k) for x, f, m, k in zip(y, first, before, middle)]
+    guess = [x + c * (m - 2.0 * f + 7.0 * k) for x, f, m, k in zip(y, first, before, middle)]  # noqa: B905
     for i in range(n):
         guess[i] = y[i] + c * (first[i] + 4.0 * middle[i] + guess[n + i])
     acting = inputs_at(given, now + h)
     acceleration, response = evaluate(guess, acting, model, True)
     last = guess[n:] + acceleration
-    new = [x + c * (f + 4.0 * k + e) for x, f, k, e in zip(y, first, middle, last)]
+    new = [x + c * (f + 4.0 * k + e) for x, f, k, e in zip(y, first, middle, last)]  # noqa: B905
     error = error_of(new, guess, settings)
     for i in range(n):
         speed = y[n + i] + a * (5.0 * first[n + i] + 8.0 * middle[n + i] - last[n + i])
@@ -543,7 +542,7 @@ def started(y: Any, first: Any, given: Any, now: Any, h: Any, model: Any, settin
 def error_of(a: Any, b: Any, settings: Any) -> Any:
     """Return the largest difference in units of the tolerance."""
     largest = 0.0
-    for x, y, weight in zip(a, b, settings[2]):
+    for x, y, weight in zip(a, b, settings[2]):  # noqa: B905
         difference = abs(x - y) * weight
         if not difference <= largest:
             largest = difference

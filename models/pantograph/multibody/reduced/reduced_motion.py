@@ -65,6 +65,11 @@ class ReducedModel:
         self.order = [order.index(name) for name in mechanism.names[mechanism.driven :]]
 
     @property
+    def rolls(self) -> bool:
+        """Whether the head has a hinge."""
+        return self._rows.rolls
+
+    @property
     def range(self) -> tuple[float, float]:
         """Lowest and highest theta of the tables [rad or m]."""
         return self._arm.functions.start, self._arm.functions.end
@@ -210,6 +215,13 @@ class ReducedMotion:
         lift, uplift = self.lift
         place = self._equations.look_up(self._numbers[0], self.memory[0][0])[reduced_equations.PLACE]
         return float(self._equations.lift_value(self._numbers[8], place, lift, uplift))
+
+    def evaluate(
+        self, y: FloatArray, acting: tuple[float, float, float, float, float]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return accelerations (n,) and their response (3 n,); see `reduced_equations.evaluate`."""
+        acceleration, response = self._equations.evaluate(y.tolist(), acting, self._numbers, True)
+        return np.array(acceleration), np.array(response)
 
     def begin(self, given: list[float]) -> None:
         """Begin at rest where all coordinates are 0; ``given`` as in ``step``."""

@@ -28,7 +28,7 @@ def test_a_table_gives_the_functions_back():
 
 
 def test_a_cell_holds_fifth_degree_and_errs_by_the_sixth_power_of_its_length():
-    """x^6 less its Hermite polynomial of fifth degree is (x (x - h))^3 over a cell of length h, h^6/64 in its middle."""
+    """x^6 less its Hermite polynomial of fifth degree is (x (x - h))^3 over a cell of length h: h^6/64 halfway."""
     for length in (1.0, 2.0):
         powers = points_of(0.0, length)[:, None] ** np.arange(7)
         table, _ = tabulated(np.array([0.0, length]), powers[None])

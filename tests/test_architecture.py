@@ -49,7 +49,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"mechanism"},
         {"mechanism_assembly", "mechanism_energy"},
         {"analysis", "mechanism_integrator"},
-        {"mechanism_advice", "step_memory"},
+        {"mechanism_advice", "step_memory", "range_watch"},
         {"multibody_part"},
     ],
     "fmus": [{"slave", "loader"}, {"builder"}, {"__main__"}],

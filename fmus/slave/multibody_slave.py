@@ -49,6 +49,9 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         yield part.working_height_warning(float(inputs[1]), float(inputs[3]))
         yield part.mechanism_warning()
 
+    def _told(self, part: MultibodyPantographPart) -> list[str]:
+        return part.told
+
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:
         part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], _drive(inputs))
 

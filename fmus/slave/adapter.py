@@ -38,6 +38,7 @@ from models.definition_files.parameter import Definition, Parameter
 
 #: A step may begin this share of its length away from where the model is: hosts sum up time.
 _TIME_TOLERANCE = 1e-3
+_NOTHING_TOLD: list[str] = []
 
 
 class Part(Protocol):
@@ -147,6 +148,10 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         """Return what is wrong with steps of a length that the part can make nevertheless."""
         return ""
 
+    def _told(self, part: PartT) -> list[str]:
+        """Return what a part has to say of its steps; whoever reads it empties the list."""
+        return _NOTHING_TOLD
+
     # Phases, called by pythonfmu.
 
     def setup_experiment(
@@ -209,6 +214,8 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
             self._advance(self._part, self._variables.checked_inputs(current_time), step_size)
             self._time = current_time + step_size
             self._variables.read_outputs(self._part, self._time)
+            if told := self._told(self._part):
+                self._pass_on(told)
         except BaseException as error:
             self._break_down(error)
             return False
@@ -371,6 +378,11 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         text = self._step_warning(self._part, step)
         self._longest_step = math.inf if text else step
         self._warn(text)
+
+    def _pass_on(self, told: list[str]) -> None:
+        for text in told:
+            self._warn(text)
+        told.clear()
 
     def _warn(self, text: str) -> None:
         if text:

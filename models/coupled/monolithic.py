@@ -64,9 +64,16 @@ class CoupledModel:
     line : CatenaryModel
     pantographs : sequence of LumpedDefinition
         Each with its own ``start_position``.
+
+    Raises
+    ------
+    ParameterError
+        If a pantograph's speed is not constant.
     """
 
     def __init__(self, line: CatenaryModel, pantographs: Sequence[LumpedDefinition]) -> None:
+        for pantograph in pantographs:
+            pantograph.refuse_varying_speed("this run")
         self.line = line
         self.pantographs = [LumpedModel(p) for p in pantographs]
         self.line_state = line.initial_state(len(self.pantographs))

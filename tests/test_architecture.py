@@ -43,7 +43,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"line_part", "line_advice"},
     ],
     "models.pantograph": [
-        {"train_motion", "working_height"},
+        {"train_motion", "working_height", "excursions"},
         {"operation"},
         {"lumped", "multibody"},
         {"identification"},

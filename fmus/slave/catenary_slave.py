@@ -12,7 +12,13 @@ from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import load
-from models.catenary.line_advice import slack_law_warning, slack_warning, speed_warning, step_warning
+from models.catenary.line_advice import (
+    slack_law_warning,
+    slack_warning,
+    speed_warning,
+    step_warning,
+    track_warning,
+)
 from models.catenary.line_part import CatenaryPart
 
 #: An unconnected port is a strip far below the wire, which touches nothing.
@@ -89,6 +95,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         yield part.start_warning(strips)
         yield slack_warning(part.droppers, part.model.static.is_slack)
         yield slack_law_warning(part.definition)
+        yield track_warning(part.definition)
         yield speed_warning(part.definition, float(abs(along_track).max()))
 
     def _step_warning(self, part: CatenaryPart, step: float) -> str:

@@ -52,8 +52,9 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
     )
     limits: ClassVar[tuple[str, ...]] = (
         "Vertical motion only: the strip does not roll, and the lateral point of application has no effect.",
-        "Linear springs and dampers, identified at one working height; no friction, no stops. With follow_height = 1 "
-        "the reference of the lowest spring follows the height with the time constant reference_time, which makes it "
+        "Linear springs and dampers, identified at one working height; friction and stops only where the definition "
+        "has them. With follow_height = 1 the reference "
+        "of the lowest spring follows the height with the time constant reference_time, which makes it "
         "another model below 1 / (2 pi reference_time).",
         "Aerodynamic uplift is a coefficient times the square of the speed, as on open track.",
         "Straight track; the roof's motion is an input (base.z, base.vz; base.y, base.roll and their "

@@ -23,6 +23,9 @@ _NAMED: Final = 8
 #: Longest delay of slack [s], and the rate of elongation of a dropper at which the warning quotes its effect [m/s].
 _LONGEST_DELAY: Final = 1e-3
 _STRETCHING: Final = 0.5
+#: Curvature up to which the equations of curves are meant [1/m], and cant beyond which a track deserves a look [m].
+_TIGHTEST: Final = 1.0 / 150.0
+_HIGHEST_CANT: Final = 0.18
 
 
 class Named(Protocol):
@@ -123,6 +126,25 @@ def slack_warning(droppers: Sequence[Named], is_slack: BoolArray) -> str:
     more = f" and {len(slack) - _NAMED} more" if len(slack) > _NAMED else ""
     is_one = len(slack) == 1
     return f"{'dropper' if is_one else 'droppers'} {listed}{more} {'is' if is_one else 'are'} slack at rest"
+
+
+def track_warning(definition: CatenaryDefinition) -> str:
+    """Return a warning of a track that deserves a second look: cant against its curve, very tight, very high."""
+    track = definition.track
+    if track is None:
+        return ""
+    knots = list(zip(track.positions, track.curvatures, track.cants, strict=True))
+    found = []
+    if against := [x for x, kappa, D in knots if kappa * D < 0.0]:
+        found.append(f"at {against[0]:g} m the cant is that of a curve to the other side")
+    if tight := [(x, kappa) for x, kappa, _ in knots if abs(kappa) > _TIGHTEST]:
+        x, kappa = max(tight, key=lambda knot: abs(knot[1]))
+        text = f"at {x:g} m the radius is {1.0 / abs(kappa):.0f} m"
+        found.append(f"{text}, below the {1.0 / _TIGHTEST:.0f} m for which the equations of curves are meant")
+    if high := [(x, D) for x, _, D in knots if abs(D) > _HIGHEST_CANT]:
+        x, D = max(high, key=lambda knot: abs(knot[1]))
+        found.append(f"at {x:g} m the cant is {1e3 * abs(D):.0f} mm: tracks have {1e3 * _HIGHEST_CANT:.0f} mm at most")
+    return f"track: {'; '.join(found)}" if found else ""
 
 
 def slack_law_warning(definition: CatenaryDefinition) -> str:

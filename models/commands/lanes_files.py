@@ -21,6 +21,7 @@ from models.catenary.definition.line_reading import load as load_line
 from models.commands.physics_files import write_atomically
 from models.coupled.lanes import Lane, LanePlan
 from models.definition_files.parameter import ParameterError
+from models.pantograph.lumped.held_forces import held_forces
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, load_lumped
 
 #: Version of the job and of what is written.
@@ -88,6 +89,10 @@ def _job(path: Path, data: Mapping[str, Any]) -> LaneJob:
         pantograph.refuse_varying_speed("a run in lanes")
     if followed:
         raise ParameterError(f"{followed[0]}: in lanes no pantograph follows the height; set follow_height to 0")
+    held = [p.name for lane in lanes for p in lane.pantographs if len(held_forces(p)) or p.start_height is not None]
+    if held:
+        text = "in lanes pantographs have no stops, no friction and no start_height; leave these out"
+        raise ParameterError(f"{held[0]}: {text}")
     if monitored:
         raise ParameterError(f"{monitored[0]}: lanes keep no balance of energy; set monitor_energy to 0")
     return LaneJob(line, lanes, plan)

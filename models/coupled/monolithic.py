@@ -16,6 +16,8 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import ContactResult, StripMotion
 from models.catenary.statics.nominal_height import NominalHeight
 from models.contact_law import application_point
+from models.definition_files.parameter import ParameterError
+from models.pantograph.lumped.held_forces import held_forces
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 
@@ -68,16 +70,20 @@ class CoupledModel:
     Raises
     ------
     ParameterError
-        If a pantograph's speed is not constant.
+        If the speed of one is not constant, or it has stops or friction, which one linear system cannot hold.
     """
 
     def __init__(self, line: CatenaryModel, pantographs: Sequence[LumpedDefinition]) -> None:
         for pantograph in pantographs:
             pantograph.refuse_varying_speed("this run")
         self.line = line
+        for definition in pantographs:
+            _check(definition)
         self.pantographs = [LumpedModel(p) for p in pantographs]
         self.line_state = line.initial_state(len(self.pantographs))
-        self.states: list[LumpedState] = [p.initial_state(p.load(0.0, np.zeros(2))) for p in self.pantographs]
+        self.states: list[LumpedState] = [
+            p.initial_state(p.load(0.0, np.zeros(2)) + _air(p.definition)) for p in self.pantographs
+        ]
         self._nominal = NominalHeight(line.definition)
         self.time = 0.0
 
@@ -91,7 +97,7 @@ class CoupledModel:
         point : ndarray, shape (P, 3)
             Where their resultants act [m].
         """
-        loads = [p.load(end, np.zeros(2)) for p in self.pantographs]
+        loads = [p.load(end, np.zeros(2)) + _air(p.definition) for p in self.pantographs]
         rates = [self._reference_rate(i) for i in range(len(self.states))]
         each = zip(self.pantographs, self.states, loads, rates, strict=True)
         free = [p.free_response(s, step, load, rate) for p, s, load, rate in each]
@@ -173,6 +179,18 @@ class CoupledModel:
             dropper_force=np.zeros((rows, len(line.dropper_law.stiffness))),
             dropper_slack=np.zeros((rows, len(line.dropper_law.stiffness)), dtype=np.bool_),
         )
+
+
+def _check(definition: LumpedDefinition) -> None:
+    if len(held_forces(definition)):
+        raise ParameterError(
+            f"{definition.name}: line and pantograph as one system have no stops and no friction (lowest_height, "
+            "highest_height, stage friction); leave these out, or run a scenario"
+        )
+
+
+def _air(definition: LumpedDefinition) -> FloatArray:
+    return np.array(definition.air_shares) * definition.aerodynamic_force(0.0)
 
 
 def _points(result: ContactResult, strips: FloatArray) -> FloatArray:

@@ -209,6 +209,7 @@ def advice(line: CatenaryModel, pantograph: LumpedDefinition, step: float) -> tu
         limits.step_warning(line.definition, step, pantograph.stage[-1].mass),
         limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.is_slack),
         limits.slack_law_warning(line.definition),
+        limits.track_warning(line.definition),
     )
 
 

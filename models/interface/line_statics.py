@@ -192,6 +192,7 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         line_advice.speed_warning(definition, speed),
         line_advice.slack_warning(part.droppers, model.static.is_slack),
         line_advice.slack_law_warning(definition),
+        line_advice.track_warning(definition),
     )
     return LineStatics(
         model=model,

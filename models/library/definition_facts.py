@@ -25,7 +25,7 @@ class LineFacts(NamedTuple):
     supports : tuple of float
         Within that.
     lowest, height : float
-        Height of the contact wire: the lowest, and at the supports.
+        Height of the contact wire: the lowest, and at the supports, if these differ at the first.
     is_ring : bool
         Whether the line closes on itself at ``end``.
     overlaps : tuple of (begin, end)
@@ -67,8 +67,9 @@ def line_facts(line: CatenaryDefinition) -> LineFacts:
     end = max(_working(section)[1] for section in line.sections)
     supports = sorted({x for section in line.sections for span in section.spans for x in (span.start, span.end)})
     inside = tuple(x for x in supports if begin <= x <= end)
-    is_ring, height = line.sections[0].periodic, line.profile.contact_wire_height
-    changes = any(_changes_height(section) for section in line.sections)
+    height = next(h for section in line.sections for h in _heights(line, section))
+    changes = any(_changes_height(line, section) for section in line.sections)
+    is_ring = line.sections[0].periodic
     return LineFacts(begin, end, inside, _lowest(line), height, is_ring, _overlaps(line), changes)
 
 
@@ -98,10 +99,10 @@ def _working(section: Section) -> tuple[float, float]:
     return section.ends.working
 
 
-def _changes_height(section: Section) -> bool:
+def _changes_height(line: CatenaryDefinition, section: Section) -> bool:
     """Return whether the specified heights at the supports differ by more than these are set to."""
     if not section.measured:
-        return False
+        return float(np.ptp(_heights(line, section))) > _LEVEL
     supports = sorted({x for span in section.spans for x in (span.start, span.end)})
     x, z = zip(*section.measured, strict=True)
     return float(np.ptp(np.interp(supports, x, z))) > _LEVEL
@@ -109,7 +110,13 @@ def _changes_height(section: Section) -> bool:
 
 def _lowest(line: CatenaryDefinition) -> float:
     """Return the lowest height that is prescribed for the contact wire [m]."""
-    profile = line.profile
     longest = max(span.length for section in line.sections for span in section.spans)
     measured = [z for section in line.sections for _, z in section.measured]
-    return min(measured, default=profile.contact_wire_height - max(0.0, profile.pre_sag) * longest)
+    supports = min(h for section in line.sections for h in _heights(line, section))
+    return min(measured, default=supports - max(0.0, line.profile.pre_sag) * longest)
+
+
+def _heights(line: CatenaryDefinition, section: Section) -> list[float]:
+    """Return the heights of the contact wire at a section's supports [m]."""
+    nominal = line.profile.contact_wire_height
+    return [nominal if s.contact_wire_height is None else s.contact_wire_height for s in section.supports]

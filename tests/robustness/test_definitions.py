@@ -22,8 +22,11 @@ from tests.robustness.support import ANSWER_SECONDS, PROFILE, TRIED, ask, assert
 
 LINES = ("LN2", "Re330", "Shinkansen", "LN2_overlap", "LN2_ring")
 PANTOGRAPHS = ("CX", "CX_multibody", "generic_multibody")
+#: A line with the tables that no line of the library has.
+ROUTE = Path(__file__).parents[2] / "docs" / "build_site" / "probes" / "line_route.toml"
 FILES = {
     **{f"line {n}": line_path(n) for n in LINES},
+    "line route": ROUTE,
     **{f"pantograph {n}": pantograph_path(n) for n in PANTOGRAPHS},
 }
 #: One value with unit and source on a line of its own.
@@ -130,7 +133,7 @@ def test_every_value_and_key(tmp_path, kind, maker):
 SIGNED = {"start", "end", "angle", "listed", "anchor", "strip_offset", "position", "pre_sag", "amplitude", "heights",
           "positions", "point_i", "point_j", "axis_i", "axis_j", "euler", "height", "start_position", "force", "moment",
           "static_force", "static_moment", "free_length", "shortest", "longest", "direction", "gravity", "rise",
-          "minimum", "maximum", "spans", "beta"}  # fmt: skip
+          "minimum", "maximum", "spans", "beta", "messenger_stagger", "arm_angle"}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", FILES)

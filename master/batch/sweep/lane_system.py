@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -22,6 +23,9 @@ from master.system.pantograph_motion import USE_TRAIN
 _FORMAT: Final = 1
 _DEFINITION: Final = "resources/definition.toml"
 _DROPPER: Final = "dropper["
+#: Parameters of pantographs that runs side by side do not know, if they are there at all or are not 0.
+_NOT_IN_LANES: Final = ("lowest_height", "highest_height", "start_height")
+_FRICTION: Final = re.compile(r"stage\[\d+\]\.friction")
 _INSTEAD: Final = "use --engine fmu"
 
 
@@ -153,6 +157,10 @@ def _check_component(component: Component, *, is_pantograph: bool) -> None:
         if variable.causality != "parameter":
             text = f"{component.name}.{name}: it sets no start value of an {variable.causality}"
             raise RequestError(f"--engine lanes, {text}; {_INSTEAD}")
+    for name in component.fmu.variables:
+        if name in _NOT_IN_LANES or (_FRICTION.fullmatch(name) and _chosen(component, name)):
+            text = f"has pantographs without stops, friction and start_height ({component.name}.{name})"
+            raise RequestError(f"--engine lanes {text}; {_INSTEAD}")
     if _chosen(component, "follow_height"):
         text = f"has no pantograph that follows the height ({component.name}.follow_height)"
         raise RequestError(f"--engine lanes {text}; {_INSTEAD}")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from models.arrays import BoolArray, FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, Fault
+from models.catenary.definition.condition_definition import Fault
+from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.line_mesh import CatenaryMesh
 
 

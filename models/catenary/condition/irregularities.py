@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray, IntArray
-from models.catenary.definition.line_definition import Irregularity
+from models.catenary.definition.condition_definition import Irregularity
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.numerics.random_numbers import normal_numbers
 

@@ -11,10 +11,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from models.catenary.definition.condition_definition import Fault, Irregularity
+from models.catenary.definition.track_definition import Track
 from models.contact_law import CONTACT_LAWS
 from models.definition_files import field_schema
 from models.definition_files.field_schema import count, monitoring, part, quantity, text
-from models.definition_files.parameter import Parameter
+from models.definition_files.parameter import Parameter, ParameterError
 from models.definition_files.toml_reader import Quantity
 
 LineType = Literal["simple", "stitched", "compound"]
@@ -26,8 +28,13 @@ GRAVITY = 9.81
 SHEAR_RATIO = 2.6
 #: Shortest internal step [s]: a thousandth of the usual one, below which a run would never end.
 SHORTEST_STEP = 1e-6
-#: Largest seed: the largest whole number of FMI.
-LARGEST_SEED = 2**31 - 1
+#: Line-wide numbers, and the key of [supports] that replaces them.
+_OF_SUPPORTS = {
+    "profile.contact_wire_height": "contact_wire_height",
+    "profile.encumbrance": "encumbrance",
+    "steady_arm.length": "arm_length",
+    "steady_arm.angle": "arm_angle",
+}
 _ACTIVE = re.compile(r"fault\[(\d+)\]\.active")
 
 
@@ -189,47 +196,6 @@ class Dynamics:
     )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class Irregularity:
-    """Errors of assembly, normal and limited to three standard deviations; every seed has its own."""
-
-    seed: int = count("number that decides which errors are drawn", default=0, maximum=LARGEST_SEED)
-    dropper_length_sigma: float = quantity(
-        "m", "standard deviation of the unstrained lengths of droppers and hangers about the design's; 0: none",
-        default=0.0, minimum=0.0, maximum=0.5,
-    )  # fmt: skip
-    support_height_sigma: float = quantity(
-        "m", "standard deviation of the heights of supports (messenger wire and registration end) about the design's; "
-        "0: none",
-        default=0.0, minimum=0.0, maximum=0.5,
-    )  # fmt: skip
-
-
-FaultKind = Literal["dropper_broken", "dropper_slipped"]
-FAULT_KINDS: tuple[FaultKind, ...] = ("dropper_broken", "dropper_slipped")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fault:
-    """A fault of one dropper, there from the start of a run if it is active."""
-
-    kind: FaultKind = text(choices=FAULT_KINDS)
-    section: int = count("section, from 1", default=1, minimum=1, tunable=False)
-    span: int = count("span of the section, from 1", minimum=1, tunable=False)
-    dropper: int = count("dropper of the span, from 1", minimum=1, tunable=False)
-    active: int = count("whether the fault acts: 1 yes, 0 no", default=1, maximum=1)
-    value: float | None = quantity(
-        "m", "how far the dropper has slipped: what it is longer than designed", default=None, minimum=-5.0, maximum=5.0
-    )
-
-    def problems(self) -> Iterator[tuple[str, str]]:
-        """Yield a problem if the value is missing or means nothing."""
-        if self.kind == "dropper_slipped" and self.value is None:
-            yield "value", "is missing: how far has the dropper slipped?"
-        if self.kind == "dropper_broken" and self.value is not None:
-            yield "value", "means nothing for a broken dropper: remove it"
-
-
 @dataclass(frozen=True)
 class Span:
     """A span: its ends, its droppers, and in a compound line the hangers of its auxiliary wire.
@@ -259,11 +225,21 @@ class Span:
 
 @dataclass(frozen=True)
 class Support:
-    """A support of the messenger wire; with a steady arm where the contact wire is registered."""
+    """A support of the messenger wire; with a steady arm where the contact wire is registered.
+
+    What is None is line-wide: of the profile, of the steady arms. The messenger wire is then above the contact wire,
+    and the arm on the side from which it pulls.
+    """
 
     x: float
     stagger: float
     has_steady_arm: bool
+    contact_wire_height: float | None = None
+    encumbrance: float | None = None
+    messenger_stagger: float | None = None
+    arm_length: float | None = None
+    arm_angle: float | None = None
+    arm_side: int | None = None
 
 
 @dataclass(frozen=True)
@@ -315,6 +291,11 @@ class Section:
     ends: EndSpans
     measured: tuple[tuple[float, float], ...] = ()
     periodic: bool = False
+
+    @property
+    def inner_supports(self) -> tuple[Support, ...]:
+        """Return the supports without the anchors, which a periodic line has not."""
+        return self.supports if self.periodic else self.supports[1:-1]
 
     @property
     def period(self) -> float:
@@ -372,6 +353,7 @@ class CatenaryDefinition:
     steady_arm: SteadyArm | None = part(SteadyArm, default=None)
     messenger_support: MessengerSupport | None = part(MessengerSupport, default=None)
     dynamics: Dynamics = part(Dynamics, default=Dynamics())
+    track: Track | None = part(Track, default=None)
     irregularity: Irregularity = part(Irregularity, default=Irregularity())
     fault: tuple[Fault, ...] = ()
     extrapolation_order: int = count(
@@ -383,8 +365,19 @@ class CatenaryDefinition:
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return every tunable number of the line."""
-        return tuple(map(self._with_place, field_schema.parameters(self, self.provenance)))
+        """Return every tunable number of the line, without line-wide ones that every support has of its own."""
+        replaced = self._replaced()
+        every = field_schema.parameters(self, self.provenance)
+        return tuple(self._with_place(p) for p in every if p.name not in replaced)
+
+    def _replaced(self) -> dict[str, str]:
+        """Return the line-wide numbers in whose place every support has its own, with the key that gives these."""
+        inner = [support for section in self.sections for support in section.inner_supports]
+        return {
+            wide: key
+            for wide, key in _OF_SUPPORTS.items()
+            if inner and all(getattr(support, key) is not None for support in inner)
+        }
 
     def _with_place(self, parameter: Parameter) -> Parameter:
         """Return a parameter; the description of one that makes a fault act says which dropper it is of."""
@@ -403,6 +396,10 @@ class CatenaryDefinition:
         Raises
         ------
         ParameterError
-            If a name is unknown or a value out of its range.
+            If a name is unknown, a value out of its range, or every support has its own in its place.
         """
+        replaced = self._replaced() if values else {}
+        for name in values:
+            if name in replaced:
+                raise ParameterError(f"parameter '{name}': every support has its own, in [supports] {replaced[name]}")
         return field_schema.with_values(self, values)

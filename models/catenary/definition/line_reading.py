@@ -8,12 +8,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from models.catenary.definition.line_definition import (
-    LINE_TYPES,
-    CatenaryDefinition,
-    Fault,
-    Section,
-)
+from models.catenary.definition.condition_definition import Fault
+from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition, Section
 from models.catenary.definition.section_reading import read_section
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
@@ -39,7 +35,7 @@ def read(table: Table) -> CatenaryDefinition:
     faults = table.tables("fault")
     listed = tuple(field_schema.read(Fault, t) for t in faults)
     definition = dataclasses.replace(line, sections=sections, fault=listed)
-    for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic):
+    for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track):
         check(table, definition)
     _check_faults(faults, definition)
     table.finish()
@@ -82,9 +78,23 @@ def _any_between(x: Sequence[float], low: float, high: float) -> bool:
 def _check_auxiliary(table: Table, definition: CatenaryDefinition) -> None:
     profile = definition.profile
     height = profile.auxiliary_height
-    if height is not None and height >= profile.encumbrance:
-        text = f"{height:g} m: the auxiliary wire must lie below the encumbrance, {profile.encumbrance:g} m"
+    own = [s.encumbrance for section in definition.sections for s in section.supports if s.encumbrance is not None]
+    encumbrance = min(own, default=profile.encumbrance)
+    if height is not None and height >= encumbrance:
+        text = f"{height:g} m: the auxiliary wire must lie below the encumbrance, {encumbrance:g} m"
         table.problem("profile.auxiliary_height", text)
+
+
+def _check_track(table: Table, definition: CatenaryDefinition) -> None:
+    """Check that a track says something, and that of a line that closes on itself is the same all around."""
+    track = definition.track
+    if track is None:
+        return
+    if not {"curvature", "radius", "cant", "vertical_curvature"} & set(table.data["track"]):
+        table.problem("track", "says nothing of the track: give curvature (or radius), cant or vertical_curvature")
+    if any(section.periodic for section in definition.sections) and track.positions and not track.is_constant:
+        text = "a line that closes on itself takes a constant track only: the same values at every position"
+        table.problem("track.positions", text)
 
 
 def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:

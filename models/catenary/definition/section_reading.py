@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
+from models.catenary.definition.support_reading import listed_stagger, with_own_values
 from models.definition_files.toml_reader import Table
 
 #: Largest numbers of spans in a section, of droppers in a span and of droppers in a section.
@@ -32,13 +33,18 @@ def read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
     if has_hangers:
         hangers = _read_hung(spans_table, boundaries, "hangers", "listed_hangers")
     periodic = spans_table.flag("periodic", default=False)
+    own = table.table("supports")
     if periodic:
-        ends, supports = _read_ring(table, boundaries, has_arms=has_arms)
+        ends, supports = _read_ring(table, boundaries, own, has_arms=has_arms)
     else:
         free, ends = _read_ends(table.required_table("ends"), boundaries)
-        supports = _read_supports(table, boundaries, free, has_arms=has_arms)
+        supports = _read_supports(table, boundaries, free, own, has_arms=has_arms)
+    if own is not None:
+        supports = with_own_values(own, supports, periodic=periodic, has_arms=has_arms)
     spans = tuple(_span(a, b, d, h) for (a, b), d, h in zip(pairwise(boundaries), droppers, hangers, strict=True))
     measured = _read_measured(table, boundaries)
+    if measured and own is not None and own.has("contact_wire_height"):
+        own.problem("contact_wire_height", "gives the contact wire's heights, and so does [measured]: give one of them")
     if measured and any(s.dropper_lengths for s in spans):
         table.problem("measured", "gives the contact wire's profile, and so do the droppers' lengths: give one of them")
     if periodic and measured and abs(measured[-1][1] - measured[0][1]) > 1e-6:
@@ -194,50 +200,76 @@ def _read_end(table: Table, boundaries: Sequence[float]) -> _End:
     return _End(free, working, rise)
 
 
-def _read_ring(table: Table, boundaries: Sequence[float], *, has_arms: bool) -> tuple[EndSpans, tuple[Support, ...]]:
+def _read_ring(
+    table: Table, boundaries: Sequence[float], own: Table | None, *, has_arms: bool
+) -> tuple[EndSpans, tuple[Support, ...]]:
     """Return the ends of a periodic line, which have no rise, and its supports; the one at the seam is listed once."""
     if table.has("ends"):
         table.problem("ends", "a periodic line has no ends: remove this table")
         _read_ends(table.required_table("ends"), boundaries)
     inner, ends = boundaries[:-1], (boundaries[0], boundaries[-1])
-    stagger = table.required_table("stagger")
+    listed = listed_stagger(own, len(inner))
+    stagger = _stagger_table(table, listed)
     if stagger.has("anchor"):
         stagger.problem("anchor", "a periodic line has no anchors: remove this value")
         stagger.quantity("anchor", "m")
     if stagger.has("amplitude") and len(inner) % 2:
         text = f"changes sides at every support, and after {len(inner)} spans the line would close on the other side:"
         stagger.problem("amplitude", f"{text} take an even number of spans, or list the stagger of every support")
-    supports = zip(inner, _registered_stagger(stagger, len(inner)), strict=True)
+    supports = zip(inner, _registered_stagger(stagger, len(inner), listed), strict=True)
     return EndSpans(ends, ends, (0.0, 0.0)), tuple(Support(x, y, has_steady_arm=has_arms) for x, y in supports)
 
 
 def _read_supports(
-    table: Table, boundaries: Sequence[float], free: tuple[int, int], *, has_arms: bool
+    table: Table, boundaries: Sequence[float], free: tuple[int, int], own: Table | None, *, has_arms: bool
 ) -> tuple[Support, ...]:
     """Return the supports with their stagger: alternating where registered, straight on to the anchors."""
     last = len(boundaries) - 1
     registered = [max(free[0], 1) <= i <= last - max(free[1], 1) for i in range(last + 1)]
-    staggers = _read_stagger(table.required_table("stagger"), boundaries, registered)
+    listed = listed_stagger(own, max(0, last - 1))
+    staggers = _read_stagger(_stagger_table(table, listed), boundaries, registered, listed)
     return tuple(
         Support(x, y, has_steady_arm=has_arms and ok) for x, y, ok in zip(boundaries, staggers, registered, strict=True)
     )
 
 
-def _read_stagger(table: Table, boundaries: Sequence[float], registered: Sequence[bool]) -> list[float]:
+def _stagger_table(table: Table, own: Sequence[float]) -> Table:
+    """Return the table [stagger], which may be absent where the supports have their own, ``own``."""
+    if own and not table.has("stagger"):
+        return Table.from_dict({})
+    return table.required_table("stagger")
+
+
+def _read_stagger(
+    table: Table, boundaries: Sequence[float], registered: Sequence[bool], own: Sequence[float]
+) -> list[float]:
+    """Return the wire's place at every boundary; ``own`` has that of every one between the anchors, if supports do."""
     inner = [i for i, ok in enumerate(registered) if ok]
-    values = dict(zip(inner, _registered_stagger(table, len(inner)), strict=True))
+    values = dict(zip(inner, _registered_stagger(table, len(inner), [own[i - 1] for i in inner if own]), strict=True))
+    values |= dict(enumerate(own, 1))
     anchors = table.quantity("anchor", "m", default=0.0, minimum=-10.0, maximum=10.0)
     known = {0: anchors, len(boundaries) - 1: anchors} | values
     held = sorted(known)
     return [_straight(known, held, boundaries, i) for i in range(len(boundaries))]
 
 
-def _registered_stagger(table: Table, count: int) -> tuple[float, ...]:
-    """Return the stagger of the registered supports: listed, or alternating."""
+def _registered_stagger(table: Table, count: int, own: Sequence[float]) -> tuple[float, ...]:
+    """Return the stagger of the registered supports: their own, listed, or alternating."""
+    if own:
+        _read_replaced(table, count)
+        return tuple(own)
     if table.has("listed"):
         return table.quantities("listed", "m", length=count, minimum=-1.0, maximum=1.0)
     amplitude = table.quantity("amplitude", "m", minimum=0.0, maximum=1.0)
     return tuple(amplitude * (-1.0) ** n for n in range(count))
+
+
+def _read_replaced(table: Table, count: int) -> None:
+    """Read what the supports' own stagger replaces, as far as it is there: it must be right all the same."""
+    if table.has("listed"):
+        table.quantities("listed", "m", length=count, minimum=-1.0, maximum=1.0)
+    else:
+        table.quantity("amplitude", "m", default=0.0, minimum=0.0, maximum=1.0)
 
 
 def _straight(known: Mapping[int, float], held: Sequence[int], x: Sequence[float], i: int) -> float:

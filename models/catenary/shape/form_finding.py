@@ -352,7 +352,9 @@ def _check_arms(shape: LineShape, force: FloatArray) -> None:
     arm = shape.definition.steady_arm
     if arm is None:
         return
-    pushing = np.flatnonzero(force < -GRAVITY * arm.mass * arm.length)
+    end, node = shape.mesh.arms.T
+    length = np.linalg.norm(shape.points[node] - shape.points[end], axis=1)
+    pushing = np.flatnonzero(force < -GRAVITY * arm.mass * length)
     if pushing.size:
         x = shape.points[shape.mesh.arms[pushing, 1], 0]
         listed = ", ".join(

@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 
 from models.arrays import FloatArray, Snapshot
-from models.catenary.definition import line_definition
+from models.catenary.definition import line_definition, track_definition
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_set import dropper_set
@@ -80,7 +80,7 @@ def _key(definition: CatenaryDefinition, mesh: CatenaryMesh) -> str:
     """Return a hash of definition, mesh, code, libraries and processor; empty where the code cannot be read."""
     whole = hashlib.sha256()
     try:
-        for path in (*sorted(Path(__file__).parent.glob("*.py")), _source(line_definition)):
+        for path in (*sorted(Path(__file__).parent.glob("*.py")), *map(_source, (line_definition, track_definition))):
             whole.update(path.read_bytes())
     except OSError:
         return ""

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, SHEAR_RATIO, CatenaryDefinition
+from models.catenary.definition.track_definition import Track
 from models.catenary.shape.beam_elements import (
     NODE_DOFS,
     bar_geometric_stiffness,
@@ -19,6 +20,7 @@ from models.catenary.shape.beam_elements import (
     to_global,
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
+from models.catenary.shape.track import acceleration, curve_load
 
 #: Stiffness that holds a wire without anchors along the track at every support [N/m]: soft enough not to matter (a span
 #: of messenger wire on it has a period of half a minute), but enough to fix the position of the wire.
@@ -48,7 +50,8 @@ class Matrices:
     K, M, C : sparse, shape (6 n, 6 n)
         Stiffness, mass (with clamps and droppers) and damping.
     load : ndarray, shape (6 n,)
-        Gravity, tensioning, and the load that keeps the kinks of the reference polygon from being stress-free.
+        Gravity, tensioning, curves of the track, and the load that keeps the kinks of the reference polygon from being
+        stress-free.
     """
 
     K: sp.csc_matrix
@@ -91,7 +94,9 @@ def assemble(
     size = NODE_DOFS * len(points)
     lumped = _clamp_mass(mesh, size) + _dropper_mass(mesh, dropper_mass, size)
     M = _assembled(M_e, dofs, size) + lumped
-    load = _gravity(M) + _tensioning(mesh, axes, properties.tension, size)
+    load = _gravity(M, definition.track, points) + _tensioning(mesh, axes, properties.tension, size)
+    if definition.track is not None:
+        load += _curve(definition.track, mesh, points, axes, properties.tension)
     load += _kinks(K_e, axes, dofs, properties.tension > 0.0, size)
     # The part of the droppers' damping that is proportional to their stiffness is added together with it.
     C = _assembled(C_e, dofs, size) + definition.damping.of("dropper").beta * lumped
@@ -254,11 +259,24 @@ def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray, size: int) -> sp.csc_mat
     return _assembled(mass[:, None, None] * pattern, _translations(mesh.droppers), size)
 
 
-def _gravity(M: sp.csc_matrix) -> FloatArray:
-    """Return the weight: the consistent mass times a uniform acceleration field."""
+def _gravity(M: sp.csc_matrix, track: Track | None, points: FloatArray) -> FloatArray:
+    """Return the weight: the consistent mass times a field of acceleration, which a cant turns in the line's axes."""
     field = np.zeros((M.shape[0] // NODE_DOFS, NODE_DOFS))
-    field[:, 2] = -GRAVITY
+    if track is None:
+        field[:, 2] = -GRAVITY
+    else:
+        field[:, :3] = acceleration(track, points[:, 0])
     return np.asarray(M @ field.ravel())
+
+
+def _curve(track: Track, mesh: CatenaryMesh, points: FloatArray, axes: FloatArray, tension: FloatArray) -> FloatArray:
+    """Return the load of the track's curves and ramps on tensioned wires."""
+    wires = np.flatnonzero(mesh.component != COMPONENTS.index("steady_arm"))
+    elements = mesh.beams[wires]
+    load = np.zeros(NODE_DOFS * len(points))
+    nodal = curve_load(track, points[elements], axes[wires], tension[wires])
+    np.add.at(load, element_dofs(mesh.owner[elements]), nodal)
+    return load
 
 
 def _tensioning(mesh: CatenaryMesh, axes: FloatArray, tension: FloatArray, size: int) -> FloatArray:

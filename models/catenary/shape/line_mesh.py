@@ -18,6 +18,7 @@ import numpy as np
 
 from models.arrays import BoolArray, FloatArray, IntArray
 from models.catenary.definition.line_definition import COMPONENTS, CatenaryDefinition, Section, Span
+from models.catenary.shape.support_places import SupportPlaces
 
 #: Positions closer than this coincide [m].
 _SAME = 1e-6
@@ -188,16 +189,18 @@ def build_mesh(definition: CatenaryDefinition) -> CatenaryMesh:
     return _numbered(draft)
 
 
-def contact_wire_height(definition: CatenaryDefinition, section: Section, x: float) -> float:
+def contact_wire_height(places: SupportPlaces, x: float) -> float:
     """Return the specified static height of the contact wire at a dropper [m].
 
-    Nominal height minus the pre-sag parabola of the span, or the measured table; plus the rise to the anchors.
+    Straight between the heights at the supports, minus the pre-sag parabola of the span, or the measured table; plus
+    the rise to the anchors.
     """
+    section = places.section
     if section.measured:
         xs, zs = zip(*section.measured, strict=True)
         return float(np.interp(x, xs, zs))
     span = _span_at(section, x)
-    return definition.profile.contact_wire_height + section.ends.rise_at(x) - _pre_sag(definition, span, x)
+    return places.height(x) + section.ends.rise_at(x) - _pre_sag(places.definition, span, x)
 
 
 def _span_at(section: Section, x: float) -> Span:
@@ -221,12 +224,8 @@ class _SectionMesher:
         self.definition, self.section, self.index, self.draft = definition, section, index, draft
         self.elements = definition.mesh.elements_between_droppers
         self.boundaries = [section.spans[0].start, *(span.end for span in section.spans)]
-        held = section.supports if section.periodic else section.supports[1:-1]
-        self.supports = [s.x for s in held]
-        staggers = [(s.x, s.stagger) for s in section.supports]
-        if section.periodic:
-            staggers.append((self.boundaries[-1], section.supports[0].stagger))
-        self._staggers = np.array(staggers).T
+        self.supports = [s.x for s in section.inner_supports]
+        self.places = SupportPlaces(definition, section)
         self.droppers = [x for span in section.spans for x in span.droppers]
         self.hangers = [x for span in section.spans for x in span.hangers]
         self.lengths = _given_lengths((s.droppers, s.dropper_lengths) for s in section.spans)
@@ -254,25 +253,22 @@ class _SectionMesher:
         wire = _Wire(self.draft, component, self.index)
         *inner, last = _subdivide(breaks, self.elements)
         for x in inner:
-            wire.append(x, self.draft.node(x, self._lateral(x), height(x)))
+            wire.append(x, self.draft.node(x, self.places.lateral(x, component), height(x)))
         if self.section.periodic:
             wire.append(last, self.draft.image(wire.nodes[0], last))
         else:
-            wire.append(last, self.draft.node(last, self._lateral(last), height(last)))
+            wire.append(last, self.draft.node(last, self.places.lateral(last, component), height(last)))
             for end in (wire.nodes[0], wire.nodes[-1]):
                 # Held against torsion as well: nothing else does, and a static solution needs it.
                 self.draft.hold(end, "x y z rx")
         wire.close()
         return wire
 
-    def _lateral(self, x: float) -> float:
-        return float(np.interp(x, *self._staggers))
-
     def _contact_height(self, x: float) -> float:
-        return contact_wire_height(self.definition, self.section, x)
+        return contact_wire_height(self.places, x)
 
     def _base_height(self, x: float) -> float:
-        return self.definition.profile.contact_wire_height + self.section.ends.rise_at(x)
+        return self.places.height(x) + self.section.ends.rise_at(x)
 
     def _messenger_height(self, x: float) -> float:
         """Return the height at the supports; between them a first guess that form finding replaces."""
@@ -280,7 +276,7 @@ class _SectionMesher:
         sag = (x - span.start) * (span.end - x) / (2.0 * self.definition.messenger_wire.tension) * 20.0
         ends = [self._base_height(span.start), self._base_height(span.end)]
         straight = float(np.interp(x, [span.start, span.end], ends))
-        return straight + self.definition.profile.encumbrance - sag
+        return straight + self.places.encumbrance(x) - sag
 
     def _auxiliary_height(self, x: float) -> float:
         return self._base_height(x) + (self.definition.profile.auxiliary_height or 0.0)
@@ -314,9 +310,10 @@ class _SectionMesher:
             if support.has_steady_arm:
                 node = contact.at(support.x)
                 x, y, z = self.draft.points[node]
-                side = math.copysign(1.0, support.stagger)
-                y += side * arm.length * math.cos(arm.angle)
-                end = self.draft.node(x, y, z - arm.length * math.sin(arm.angle), "x y z")
+                length = arm.length if support.arm_length is None else support.arm_length
+                angle = arm.angle if support.arm_angle is None else support.arm_angle
+                y += self.places.side(support) * length * math.cos(angle)
+                end = self.draft.node(x, y, z - length * math.sin(angle), "x y z")
                 self.draft.beam(end, node, "steady_arm")
                 self.draft.arms.append((end, node))
                 self.draft.mass[node] += self.definition.clamps.steady_arm

@@ -9,6 +9,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition, Section
 from models.catenary.shape.line_mesh import contact_wire_height
+from models.catenary.shape.support_places import SupportPlaces
 
 
 class _Course(NamedTuple):
@@ -64,7 +65,8 @@ class NominalHeight:
 
 def _course(definition: CatenaryDefinition, section: Section) -> _Course:
     x = [section.spans[0].start, *(span.end for span in section.spans)]
-    z = [contact_wire_height(definition, section, place) for place in x]
+    places = SupportPlaces(definition, section)
+    z = [contact_wire_height(places, place) for place in x]
     if section.periodic:
         z[-1] = z[0]
     return _Course(np.array(x), np.array(z), section.period)

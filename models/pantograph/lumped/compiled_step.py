@@ -33,7 +33,7 @@ class CompiledStep:
 
     def __init__(self, model: LumpedModel, kernels: ModuleType) -> None:
         self._model = model
-        self._constants = np.array(kernels.Constants(**_constants(model.definition)))
+        self._constants = np.array(kernels.Constants(**_constants(model.definition, model.balance)))
         self._known = np.zeros(kernels.WIDTH)
         self._following: dict[float, FloatArray] = {}
         self._step = kernels.step
@@ -86,8 +86,8 @@ class CompiledStep:
         hung : (float, float, float)
             That reference, the height of the roof at the end of the step before, and the rate given from outside
             [m, m, m/s].
-        own : ndarray, shape (n,)
-            Loads that do not change in the step [N].
+        own : ndarray, shape (n + 9 m,)
+            Loads that do not change in the step [N], then the table of stops and friction; see `held_forces`.
         outputs : ndarray, shape (12 + 3 n,)
             Result.
         """
@@ -120,11 +120,12 @@ def compiled_step(model: LumpedModel) -> CompiledStep | None:
     return None if kernels is None else CompiledStep(model, kernels)
 
 
-def _constants(definition: LumpedDefinition) -> dict[str, float]:
+def _constants(definition: LumpedDefinition, balance: float) -> dict[str, float]:
     lowest = definition.stage[0]
     return {
         "order": definition.extrapolation_order,
         "static_force": definition.static_force,
+        "balance": balance,
         "raise_start": definition.raise_start,
         "raise_duration": definition.raise_duration,
         "stiffness": lowest.stiffness,

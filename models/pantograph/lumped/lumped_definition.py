@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,10 @@ class Stage:
     mass: float = quantity("kg", "mass", positive=True, minimum=1e-3, maximum=1e3)
     stiffness: float = quantity("N/m", "stiffness to the stage below", minimum=0.0, maximum=1e9)
     damping: float = quantity("N.s/m", "damping to the stage below", minimum=0.0, maximum=1e6)
+    friction: float = quantity("N", "dry friction against the stage below", default=0.0, minimum=0.0, maximum=1e4)
+    friction_slip: float = quantity(
+        "m", "displacement at which the dry friction slips", default=1e-4, minimum=1e-6, maximum=0.1
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,16 +64,64 @@ class LumpedDefinition(Operation):
     aerodynamic_share: tuple[float, ...] = series(
         "1", "share of the aerodynamic uplift that acts on each stage", default=(), minimum=0.0, maximum=1.0
     )
+    lowest_height: float | None = quantity(
+        "m",
+        "height of the strip at which the lowest mass, at rest, is at its lower stop",
+        default=None,
+        minimum=0.1,
+        maximum=10.0,
+    )
+    highest_height: float | None = quantity(
+        "m",
+        "height of the strip at which the lowest mass, at rest, is at its upper stop",
+        default=None,
+        minimum=0.1,
+        maximum=10.0,
+    )
+    stop_stiffness: float = quantity("N/m", "stiffness of the stops", default=1e5, minimum=1.0, maximum=1e8)
+    stop_damping: float = quantity("N.s/m", "damping of the stops", default=500.0, minimum=0.0, maximum=1e6)
+    start_height: float | None = quantity(
+        "m",
+        "height of the strip at time 0, where that is not the reference height",
+        default=None,
+        minimum=0.1,
+        maximum=10.0,
+    )
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
 
     def problems(self) -> Iterator[tuple[str, str]]:
-        """Yield what is wrong with the direction and the shares of the air's force."""
+        """Yield what is wrong with the direction, the shares of the air's force, and heights."""
         yield from super().problems()
         share, stages = self.aerodynamic_share, len(self.stage)
         if share and len(share) != stages:
             yield "aerodynamic_share", f"has {len(share)} values for {stages} stages"
         elif share and abs(sum(share) - 1.0) > 1e-9:
             yield "aerodynamic_share", f"sums to {sum(share):.6g}, not to 1"
+        yield from self._height_problems()
+
+    def _height_problems(self) -> Iterator[tuple[str, str]]:
+        low, high = self.range
+        if low >= high:
+            yield "highest_height", f"{high:g} m is not above the lowest_height of {low:g} m"
+            return
+        for key in ("reference_height", "start_height"):
+            height = getattr(self, key)
+            if height is not None and not low <= height <= high:
+                yield (
+                    key,
+                    f"{height:g} m is outside the range from {low:g} to {high:g} m (lowest_height, highest_height)",
+                )
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Heights of the strip between the stops [m], infinite without one."""
+        low, high = self.lowest_height, self.highest_height
+        return -math.inf if low is None else low, math.inf if high is None else high
+
+    @property
+    def rise(self) -> float:
+        """How far above the reference height the strip starts [m]."""
+        return 0.0 if self.start_height is None else self.start_height - self.reference_height
 
     @property
     def air_shares(self) -> tuple[float, ...]:

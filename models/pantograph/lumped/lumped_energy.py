@@ -27,6 +27,8 @@ class LumpedBalance:
     ----------
     stretch : float
         Of a lowest spring that hangs on a reference, as it is [m].
+    held : float
+        What the springs of stops and friction store [J].
     """
 
     def __init__(self, model: LumpedModel, load: FloatArray, force: float) -> None:
@@ -36,7 +38,7 @@ class LumpedBalance:
         self._stiffness = model.K.copy()
         self._hung = model.definition.stage[0].stiffness if model.follows else 0.0
         self._stiffness[0, 0] -= self._hung
-        self.stretch = 0.0
+        self.stretch = self.held = 0.0
 
     @property
     def contact_work(self) -> FloatArray:
@@ -77,11 +79,16 @@ class LumpedBalance:
         self._ledger.work -= self._hung * rate * first
         self._ledger.dissipated += self._hung / self._model.definition.reference_time * second
 
+    def add_held(self, work: float, stored: float) -> None:
+        """Add the work that stops and friction take in a step and what their springs store at its end [J]."""
+        self._ledger.dissipated += work - (stored - self.held)
+        self.held = stored
+
     def balance(self, state: LumpedState) -> FloatArray:
         """Return the values of `models.numerics.energy_ledger.BALANCE` [J], shape (4,)."""
         d, v, model = state.displacement, state.velocity, self._model
         stored = v @ model.M @ v + d @ self._stiffness @ d + self._hung * self.stretch**2
-        return self._ledger.balance(0.5 * float(stored))
+        return self._ledger.balance(0.5 * float(stored) + self.held)
 
     def snapshot(self) -> Snapshot:
         """Return the whole state."""

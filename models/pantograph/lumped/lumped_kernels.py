@@ -12,6 +12,8 @@ from numba import njit
 #: Of the contact force: number of values known, their times, the values, latest first.
 WIDTH = 7
 _KNOWN, _TIME, _FORCE = 0, 1, 4
+#: Of the table of stops and friction: columns, and that of the force, before that of the place.
+_WIDTH, _HELD = 9, 7
 #: As in `models.numerics.extrapolation`.
 _STAMP_TOLERANCE = 0.25
 _LEAST_TRAVEL = 1e-9
@@ -21,6 +23,7 @@ Constants = namedtuple(
     (
         "order",
         "static_force",
+        "balance",
         "raise_start",
         "raise_duration",
         "stiffness",
@@ -47,7 +50,7 @@ def step(
         Motion, replaced, and work space for the load; see `LumpedModel.transition`.
     transition : ndarray, shape (3 n, 4 n)
         Of a step of ``duration / count``.
-    constants : ndarray, shape (7,)
+    constants : ndarray, shape (8,)
         See `Constants`.
     began, time, duration : float
         When the run began, when the step does, how long it is [s].
@@ -62,8 +65,9 @@ def step(
         What the lowest spring hangs on, height of the roof before, rate given from outside [m, m, m/s].
     following : ndarray, shape (5,)
         Stiffness of a spring that follows (0: none), keep, before, after, lead; see `FollowingReference`.
-    own : ndarray, shape (n,)
-        Loads that do not change in the step [N].
+    own : ndarray, shape (n + 9 m,)
+        Loads that do not change in the step [N], then the table of stops and friction, changed in place; see
+        `held_forces`.
     outputs : ndarray, shape (12 + 3 n,)
         Result: ends of the strip and what is observed of the masses.
 
@@ -80,8 +84,8 @@ def step(
     for k in range(1, count + 1):
         end = time + k * h
         height, velocity = base[0] + k * h * base[1], base[1]
-        values[rows:] = own
-        uplift = c.static_force * raised(end - began, c.raise_start, c.raise_duration)
+        values[rows:] = own[:n]
+        uplift = c.balance + (c.static_force - c.balance) * raised(end - began, c.raise_start, c.raise_duration)
         values[rows] += uplift + (c.stiffness * height + c.damping * velocity)
         before = values[0] - roof
         reference = following[1] * reference + following[2] * before + following[4] * rate
@@ -92,6 +96,8 @@ def step(
             for j in range(columns):
                 total += transition[i, j] * values[j]
             result[i] = total
+        if len(own) > n:
+            hold(own[n:].reshape(-1, _WIDTH), transition, result, height, velocity)
         values[:rows] = result
         reference += following[3] * (values[0] - height)
         roof = height
@@ -102,7 +108,65 @@ def step(
 @_compiled
 def constants_of(array):
     """Return the constants as a tuple."""
-    return array[0], array[1], array[2], array[3], array[4], array[5], array[6]
+    return array[0], array[1], array[2], array[3], array[4], array[5], array[6], array[7]
+
+
+@_compiled
+def hold(table, transition, motion, z, vz):
+    """Let stops and friction act in a step; see `held_forces.HeldForces.act`."""
+    count, n = len(table), len(motion) // 3
+    free, give = np.empty((count, 2)), np.empty((count, count, 2))
+    columns, force = np.empty((count, 3 * n)), table[:, _HELD].copy()
+    for k in range(count):
+        upper, lower = int(table[k, 0]), int(table[k, 1])
+        for i in range(3 * n):
+            below = transition[i, 3 * n + lower] if lower >= 0 else 0.0
+            columns[k, i] = transition[i, 3 * n + upper] - below
+        relative(table[k], motion, z, vz, free[k])
+    for k in range(count):
+        for m in range(count):
+            relative(table[m], columns[k], 0.0, 0.0, give[k, m])
+    for _ in range(200):
+        change = 0.0
+        for k in range(count):
+            row, x, v = table[k], free[k, 0], free[k, 1]
+            for m in range(count):
+                if m != k:
+                    x -= give[m, k, 0] * force[m]
+                    v -= give[m, k, 1] * force[m]
+            new = held(row, x, v, give[k, k, 0], give[k, k, 1])
+            change, force[k] = max(change, abs(new - force[k])), new
+        if change <= 1e-11:
+            break
+    for k in range(count):
+        for i in range(3 * n):
+            motion[i] -= force[k] * columns[k, i]
+    for k in range(count):
+        relative(table[k], motion, z, vz, free[k])
+        table[k, _HELD], table[k, _HELD + 1] = force[k], free[k, 0]
+
+
+@_compiled
+def relative(row, motion, z, vz, out):
+    """Write displacement and velocity against each other of what a force joins."""
+    upper, lower = int(row[0]), int(row[1])
+    if lower >= 0:
+        z, vz = motion[3 * lower], motion[3 * lower + 1]
+    out[0], out[1] = motion[3 * upper] - z, motion[3 * upper + 1] - vz
+
+
+@_compiled
+def held(row, x, v, give, give_rate):
+    """Return the force of friction, sticking or at its limit, or of a stop; see `held_forces`."""
+    stiffness, second = row[3], row[4]
+    if row[2] != 0.0:
+        trial = (row[_HELD] + stiffness * (x - row[_HELD + 1])) / (1.0 + stiffness * give)
+        return max(-second, min(second, trial))
+    beyond = row[6] * (x - row[5])
+    if beyond <= 0.0:
+        return 0.0
+    force = (stiffness * beyond + second * row[6] * v) / (1.0 + stiffness * give + second * give_rate)
+    return row[6] * max(0.0, min(force, beyond / give))
 
 
 @_compiled

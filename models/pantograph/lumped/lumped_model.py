@@ -47,14 +47,20 @@ class LumpedModel:
         self.K = _chain([s.stiffness for s in definition.stage])
         self.size = n
         self.follows = bool(definition.follow_height)
+        # What holds a strip that starts elsewhere, until it is raised: the spring on the roof would move it.
+        self.balance = 0.0 if self.follows else definition.stage[0].stiffness * definition.rise
         self._following: dict[float, FollowingReference] = {}
         self._inverse: dict[float, tuple[Newmark, FloatArray]] = {}
         self._transition: dict[float, FloatArray] = {}
 
     def initial_state(self, load: FloatArray | None = None) -> LumpedState:
-        """Return the pantograph at rest at its reference height, its acceleration that of ``load``, shape (n,) [N]."""
-        acceleration = np.zeros(self.size) if load is None else load / np.diag(self.M)
-        return LumpedState(np.zeros(self.size), np.zeros(self.size), acceleration)
+        """Return the pantograph at rest at its start height, its acceleration that of ``load``, shape (n,) [N]."""
+        displacement = np.full(self.size, self.definition.rise)
+        pull = self.K @ displacement
+        reference = self.definition.rise if self.follows else 0.0
+        pull[0] -= self.definition.stage[0].stiffness * reference
+        load = np.zeros(self.size) if load is None else load - pull
+        return LumpedState(displacement, np.zeros(self.size), load / np.diag(self.M), reference)
 
     def following(self, step: float) -> FollowingReference:
         """Return how the reference moves in a step [s], if it follows."""
@@ -164,7 +170,7 @@ class LumpedModel:
         """
         result = np.zeros(self.size)
         lowest, (height, velocity) = self.definition.stage[0], base.tolist()
-        uplift = self.definition.static_force * self.definition.raised(time)
+        uplift = self.balance + (self.definition.static_force - self.balance) * self.definition.raised(time)
         result[0] = uplift + (lowest.stiffness * height + lowest.damping * velocity)
         return result
 

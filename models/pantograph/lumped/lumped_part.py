@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation
 from models.numerics.newmark import steps_within
+from models.pantograph.excursions import Excursions, Place
 from models.pantograph.lumped.compiled_step import CompiledStep, compiled_step
+from models.pantograph.lumped.held_forces import HeldForces, held_forces
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
@@ -32,6 +36,8 @@ class LumpedPantographPart:
         End A (left), B (right); position, velocity; x, y, z.
     observed : tuple of (name, unit, description)
         What ``observation_values`` gives.
+    told : list of str
+        What the user should know of the steps so far; whoever fetches it empties it.
     """
 
     def __init__(self, definition: LumpedDefinition) -> None:
@@ -56,9 +62,16 @@ class LumpedPantographPart:
         self._base = np.zeros(2)
         self._roof = 0.0
         self._shares = np.array(definition.air_shares)
-        self._own = np.zeros(n)
+        held = held_forces(definition)
+        # Loads that do not change in a step, and behind them the table of stops and friction, if there are any.
+        self._own = np.zeros(n + held.size)
+        self._own[n:] = held.ravel()
+        self._held = HeldForces(self._own[n:].reshape(held.shape)) if held.size else None
+        self._range = definition.range
+        self._excursions = Excursions() if self._range != (-math.inf, math.inf) else None
+        self.told: list[str] = [] if self._excursions is None else self._excursions.told
+        self._has_met = False
         self._driven: tuple[float, float, float] | None = None  # what these loads are of
-        self.told: list[str] = []
         self._sway = SwayingStrip(definition)
         self._balance: LumpedBalance | None = None
         self._compiled: CompiledStep | None = None
@@ -84,14 +97,17 @@ class LumpedPantographPart:
         del point
         self.time = self._start_time = time
         self._roof = float(base[0])
-        self.state.reference = -self._roof
+        self.state.reference = self.definition.rise - self._roof
         self._train.begin(time, drive.train)
         load = self.model.load(0.0, base) + self._drive_loads(drive.air, drive.uplift, self._train.at(time).speed)
         if self.model.follows:  # the reference starts where the mass is
             load[0] -= self.definition.stage[0].stiffness * self._roof
         load[-1] -= force
         self._motion[:] = 0.0
+        self._motion[0::3] = self.definition.rise
         self.state.acceleration[:] = self.model.initial_state(load).acceleration
+        if self._held is not None:
+            self._held.start(self._motion, self._roof)
         self._balance = LumpedBalance(self.model, load, force) if self.definition.monitor_energy else None
         self._force.start(time, force)
         self._sway.receive(drive, base, 0.0)
@@ -106,7 +122,7 @@ class LumpedPantographPart:
         begin, middle, end = self._travel(start, step, drive)
         driven = drive.air, drive.uplift, middle.speed
         if driven != self._driven:
-            self._driven, self._own[:] = driven, self._drive_loads(*driven)
+            self._driven, self._own[: self.model.size] = driven, self._drive_loads(*driven)
         self._sway.receive(drive, base, step)
         if self._compiled is not None:
             when, contact = (self._start_time, start, step), (force, x)
@@ -117,6 +133,7 @@ class LumpedPantographPart:
             )
             self._roof = float(base[0]) + step * float(base[1])
             self._sway.place(self.strip)
+            self._watch(force, point)
             return
         self._force.receive_at(start, force, x, begin.x, middle.speed, step)
         h = step / count
@@ -127,6 +144,7 @@ class LumpedPantographPart:
             self._substep(start + k * h, h, drive.reference_rate)
         self._place()
         self._sway.place(self.strip)
+        self._watch(force, point)
 
     @property
     def energy(self) -> FloatArray:
@@ -153,6 +171,7 @@ class LumpedPantographPart:
             "acceleration": self.state.acceleration.copy(),
             "reference": np.array([self.state.reference, self._roof]),
             **self._force.snapshot(),
+            **({} if self._held is None else self._held.snapshot()),
             **self._sway.snapshot(),
             **self._train.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
@@ -165,8 +184,11 @@ class LumpedPantographPart:
             getattr(self.state, name)[:] = snapshot[name]
         self.state.reference, self._roof = (float(v) for v in snapshot["reference"])
         self._force.restore(snapshot)
+        if self._held is not None:
+            self._held.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
+            self._balance.held = 0.0 if self._held is None else self._held.stored
         self._sway.restore(snapshot)
         self._train.restore(snapshot)
         self._compile()
@@ -183,7 +205,7 @@ class LumpedPantographPart:
             self._compiled.take(self._force)
 
     def _substep(self, time: float, h: float, rate: float) -> None:
-        load = self.model.load(time - self._start_time, self._base) + self._own
+        load = self.model.load(time - self._start_time, self._base) + self._own[: self.model.size]
         force = self._force.at(time)
         load[-1] -= force
         outer = load.copy()
@@ -191,7 +213,12 @@ class LumpedPantographPart:
         if self.model.follows:
             self._hang(load, outer, before, h, rate)
         self._load[:] = load
-        after = self._moved(self.model.transition(h))
+        transition = self.model.transition(h)
+        after = self._moved(transition)
+        if self._held is not None:
+            work = self._held.act(transition, after, (self._base.item(0), self._base.item(1)))
+            if self._balance is not None:
+                self._balance.add_held(work, self._held.stored)
         if self._balance is not None:
             self._balance.add(h, after[0::3] - self.state.displacement, outer, force)
         if self.model.follows:
@@ -238,6 +265,18 @@ class LumpedPantographPart:
         loads = self._shares * self.definition.aerodynamic_force(air, speed)
         loads[0] += uplift
         return loads
+
+    def _watch(self, force: float, point: FloatArray) -> None:
+        """Note stops that are touched, and a contact outside the range."""
+        if self._excursions is None or self._held is None:
+            return
+        self._has_met |= force > 0.0
+        x, height = self.outputs.item(0), self.outputs.item(2)
+        for name in self._held.touched():
+            place = Place(self.time, x, height)
+            follows = self.model.follows
+            self._excursions.touch(name, place, has_met=self._has_met, is_loaded=force > 0.0, is_neutral=follows)
+        self._excursions.check_contact(force, Place(self.time, x, point.item(2)), *self._range)
 
     def _place(self) -> None:
         """Write the strip and what is observed."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.definition.line_definition import Fault
+from models.catenary.definition.condition_definition import Fault
 from models.catenary.shape.form_finding import find_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import load_line

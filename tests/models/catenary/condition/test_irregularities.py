@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
-from models.catenary.definition.line_definition import Irregularity
+from models.catenary.definition.condition_definition import Irregularity
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import load_line
 from models.numerics.random_numbers import normal_numbers

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 from models.catenary.condition import line_condition
 from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.definition.line_definition import Fault
+from models.catenary.definition.condition_definition import Fault
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, find_form, find_rest, weight

@@ -74,3 +74,9 @@ def test_one_system_gives_a_following_pantograph_the_rate_of_its_line(slope, cx)
     assert state.reference == pytest.approx(part.state.reference, rel=1e-9)
     assert state.displacement[-1] == pytest.approx(part.state.displacement[-1], rel=1e-6)
     assert state.reference > 1e-3
+
+
+def test_supports_with_heights_of_their_own_are_joined(line_maker):
+    heights = [[5.3, 5.3, 5.2, 5.2, 5.2], "m", "test"]
+    nominal = NominalHeight(line_maker(supports={"contact_wire_height": heights}))
+    assert nominal.at(125.0) == (pytest.approx(5.25, abs=1e-12), pytest.approx(-0.002, abs=1e-12))

@@ -42,7 +42,12 @@ TIERS: dict[str, list[set[str]]] = {
         {"statics", "line_energy", "strip_checks"},
         {"line_part", "line_advice"},
     ],
-    "models.pantograph": [{"operation", "working_height", "excursions"}, {"lumped", "multibody"}, {"identification"}],
+    "models.pantograph": [
+        {"train_motion", "working_height", "excursions"},
+        {"operation"},
+        {"lumped", "multibody"},
+        {"identification"},
+    ],
     "models.pantograph.multibody": [
         {"mechanism_definition", "base_motion"},
         {"mechanism_reading", "elements"},

@@ -9,7 +9,7 @@ One word for each thing around a contact::
               x attachments, + nodes      IntervalResponse  how the piece x...x gives way to a force within a step
                                           ContactCandidate  a strip over a WirePoint before any force: penetration,
                                                             velocity
-                                          AppliedForce      a force on the wire that is known before the step
+                                          AppliedForce      a WirePoint and a force that is known before the step
 
 A `ContactWire` and its intervals are places, not contacts. The local problem answers with `LocalForces`.
 

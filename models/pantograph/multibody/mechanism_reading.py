@@ -33,6 +33,7 @@ def read_mechanism(table: Table) -> MechanismDefinition:
     """Read a mechanism's definition from a parsed table; raises ``DefinitionError``."""
     table.text("type", choices=("multibody",))
     definition = field_schema.read(MechanismDefinition, table, provenance=table.provenance)
+    definition.check_speed(table)
     _check_references(table, definition)
     _check_pairs(table, definition)
     _check_lift(table, definition)

@@ -15,6 +15,7 @@ from models.catenary.shape.dropper_set import dropper_set
 from models.catenary.shape.line_matrices import beam_properties
 from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
 from models.catenary.shape.line_shape import line_shape
+from models.catenary.shape.support_places import SupportPlaces
 from models.library.catalogue import line_names, load_line
 
 GRAVITY = 9.81
@@ -91,7 +92,9 @@ def test_droppers_reach_from_the_wanted_height_upward(built):
     line, mesh, _ = built
     lower = mesh.points[mesh.droppers[~mesh.is_hanger, 0]]
     of = mesh.section[mesh.droppers[~mesh.is_hanger, 0]]
-    wanted = [contact_wire_height(line, line.sections[s], x) for s, x in zip(of, lower[:, 0], strict=True)]
+    wanted = [
+        contact_wire_height(SupportPlaces(line, line.sections[s]), x) for s, x in zip(of, lower[:, 0], strict=True)
+    ]
     assert lower[:, 2] == pytest.approx(wanted)
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from models.catenary.definition.line_definition import COMPONENTS
 from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
+from models.catenary.shape.support_places import SupportPlaces
 from models.library.catalogue import line_names, load_line
 
 
@@ -129,19 +130,19 @@ def test_pre_sag_begins_at_supports_or_at_the_first_dropper():
     ln2, ac = load_line("C270"), load_line("EN50318_2018_AC_simple")
     section = ln2.sections[0]
     middle = section.spans[12].start + 28.5
-    assert contact_wire_height(ln2, section, middle) == pytest.approx(5.3 - 0.057)
+    assert contact_wire_height(SupportPlaces(ln2, section), middle) == pytest.approx(5.3 - 0.057)
     section = ac.sections[0]
     start = section.spans[10].start
-    sags = [5.08 - contact_wire_height(ac, section, x) for x in section.spans[10].droppers[:5]]
+    sags = [5.08 - contact_wire_height(SupportPlaces(ac, section), x) for x in section.spans[10].droppers[:5]]
     assert np.array(sags) == pytest.approx(np.array([0.0, 0.024, 0.041, 0.052, 0.055]), abs=5e-4)
-    assert contact_wire_height(ac, section, start + 1.0) == 5.08
+    assert contact_wire_height(SupportPlaces(ac, section), start + 1.0) == 5.08
 
 
 def test_measured_heights_replace_the_rule(line_maker):
     measured = {"positions": [[0.0, 150.0, 300.0], "m", "test"], "heights": [[5.2, 5.0, 5.1], "m", "test"]}
     line = line_maker(measured=measured)
     section = line.sections[0]
-    heights = [contact_wire_height(line, section, x) for x in (75.0, 150.0, 225.0)]
+    heights = [contact_wire_height(SupportPlaces(line, section), x) for x in (75.0, 150.0, 225.0)]
     assert heights == pytest.approx([5.1, 5.0, 5.05])
 
 

@@ -55,7 +55,7 @@ def test_products_and_solutions_are_those_of_the_matrices(n, width, is_ring, com
     for part in work:
         part[:] = 0.0
     compiled_kernels.load(arrays, attached, pressed, pull, work)
-    expected = stiff @ attached[0] + heavy @ attached[1] + pressed + pull
+    expected = (stiff @ attached[0] + heavy @ attached[1] + pressed + pull)[arrays.order]
     assert work.right[arrays.slot] == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max())
 
 

@@ -55,9 +55,6 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
     def _told(self, part: MultibodyPantographPart) -> list[str]:
         return part.told
 
-    def _told(self, part: MultibodyPantographPart) -> list[str]:
-        return part.told
-
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:
         part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], _drive(inputs))
 

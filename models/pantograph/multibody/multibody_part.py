@@ -65,7 +65,6 @@ class MultibodyPantographPart:
         self._base = BaseMotion()
         self._sway = SwayMotion()
         self._train = definition.train_motion()
-        self.told: list[str] = []
         self._drive = NO_DRIVE
         self._y = np.zeros(0)
         self._last: LastEvaluation | None = None

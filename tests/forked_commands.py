@@ -12,6 +12,7 @@ import array
 import atexit
 import contextlib
 import functools
+import gc
 import importlib
 import json
 import os
@@ -165,6 +166,7 @@ def _server(crew: str) -> _Server:
 
 def _serve(connection: socket.socket) -> dict[str, Any]:
     """Fork for every request; return it in the child. The server itself ends when its tests do."""
+    gc.freeze()  # forks search none of it for garbage, and so copy none of it
     running: dict[int, tuple[int, int]] = {}  # descriptor of a process -> its id, and whom to tell its end
     while True:
         for descriptor in select.select([connection, *running], [], [])[0]:

@@ -29,9 +29,12 @@ RUNTIME = "resources/runtime"
 
 _SCRIPT = '''"""Entry for pythonfmu. Generated; the name of this file holds the content hash."""
 
-{imports}
-from {package}.fmus.slave.adapter import hold
-from {package}.{module} import {base}
+from {package}.fmus.slave.kept_code import kept_code
+
+with kept_code("{package}"):
+    {imports}
+    from {package}.fmus.slave.adapter import hold
+    from {package}.{module} import {base}
 
 hold(globals())
 
@@ -200,7 +203,7 @@ def _contents(wanted: Recipe, sources: FmuSources) -> dict[str, bytes]:
 def _script(wanted: Recipe, sources: FmuSources) -> str:
     # Everything is imported at once: the folder of the first of two instances may be gone later.
     names = [name for name, module in sources.modules.items() if not module.is_optional]
-    imports = "\n".join(f"import {sources.package}.{name}" for name in names)
+    imports = "\n    ".join(f"import {sources.package}.{name}" for name in names)
     settings = "".join(f"    {name} = {value!r}\n" for name, value in sorted(wanted.settings.items()))
     return _SCRIPT.format(
         title=wanted.title,

@@ -36,6 +36,8 @@ _PANTOGRAPHS: Mapping[str, tuple[str, str]] = {
     "lumped": ("fmus.slave.lumped_slave", "LumpedPantographSlave"),
     "multibody": ("fmus.slave.multibody_slave", "MultibodyPantographSlave"),
 }
+#: What the script of every FMU imports first.
+_KEPT_CODE = "fmus.slave.kept_code"
 #: Sources that are not carried along but decide about an FMU's bytes.
 _BUILDERS = (
     "builder/fmu_build.py",
@@ -270,7 +272,7 @@ def gather(wanted: Recipe) -> FmuSources:
         If a source is missing, or cannot be carried inside an FMU.
     """
     try:
-        modules = collect(wanted.module, wanted.roots, EMPTIED)
+        modules = {**collect(_KEPT_CODE, ROOTS, EMPTIED), **collect(wanted.module, wanted.roots, EMPTIED)}
         definition = wanted.definition.read_bytes() + wanted.added.encode()
     except (BundleError, SyntaxError) as error:
         raise BuildError(f"{wanted.name}: {error}") from error

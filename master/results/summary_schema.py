@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
@@ -16,11 +17,12 @@ from master.evaluation.en50367_limits import OwnLimits, Supply
 class _Loose(BaseModel):
     """Checks only what is computed with; the rest is shown as it is."""
 
-    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+    # Whoever reads nothing back is spared the making of the checks: a run.
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False, defer_build=True)
 
 
 class _Contact(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+    model_config = ConfigDict(extra="forbid", strict=True, defer_build=True)
 
     index: int
     catenary: str
@@ -44,7 +46,7 @@ class _Coupling(_Loose):
 
 
 class _Filter(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
     kind: Literal["butterworth", "fft"]
     order: int | None = None
@@ -67,10 +69,10 @@ class _Settings(_Loose):
     start: float | None = None
     stop: float | None = None
     step: float | None = None
-    interval: _Interval = _Interval()
+    interval: _Interval = Field(default_factory=_Interval)
     filter: _Filter | None = None
-    limits: _Limits = _Limits()
-    coupling: _Coupling = _Coupling()
+    limits: _Limits = Field(default_factory=_Limits)
+    coupling: _Coupling = Field(default_factory=_Coupling)
 
 
 class _Input(_Loose):
@@ -135,14 +137,14 @@ class _Performance(_Loose):
 class _Summary(_Loose):
     format: int = 1
     contacts: list[_Contact] = []
-    settings: _Settings = _Settings()
+    settings: _Settings = Field(default_factory=_Settings)
     components: list[_Component] = []
     warnings: list[_Caution] = []
     adjustments: list[str] = []
     scenario_warnings: list[str] = []
     interface_power: list[_Power] = []
     energy: list[_Energy] = []
-    performance: _Performance = _Performance()
+    performance: _Performance = Field(default_factory=_Performance)
     versions: dict[str, str] = {}
     scenario: str = ""
     title: str = ""
@@ -153,20 +155,24 @@ class _Summary(_Loose):
     time_reached: float | None = None
 
 
-_SUMMARY: Final[TypeAdapter[Any]] = TypeAdapter(_Summary)
-_GEOMETRY: Final[TypeAdapter[Any]] = TypeAdapter(
-    dict[str, dict[str, float]], config=ConfigDict(strict=True, allow_inf_nan=False)
-)
+@functools.cache
+def _summary_shape() -> TypeAdapter[Any]:
+    return TypeAdapter(_Summary)
+
+
+@functools.cache
+def _geometry_shape() -> TypeAdapter[Any]:
+    return TypeAdapter(dict[str, dict[str, float]], config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
 def read_summary(path: Path) -> dict[str, Any]:
     """Read ``summary.json``; raises `MasterError` if it is not what a run has written."""
-    return _read(path, _SUMMARY)
+    return _read(path, _summary_shape())
 
 
 def read_geometry(path: Path) -> dict[str, dict[str, float]]:
     """Read ``geometry.json``; raises `MasterError` if it is not what a run has written."""
-    return _read(path, _GEOMETRY)
+    return _read(path, _geometry_shape())
 
 
 def _read(path: Path, shape: TypeAdapter[Any]) -> dict[str, Any]:

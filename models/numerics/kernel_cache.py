@@ -25,7 +25,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -220,7 +220,8 @@ class _GuardedCache:
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the stored code for a signature, None if there is none that can be used."""
         try:
-            return self._cache.load_overload(sig, target_context)
+            with _without_declarations(target_context):
+                return self._cache.load_overload(sig, target_context)
         except Exception as error:  # whatever a damaged file may raise
             _warn(f"compiled kernels in {self._folder} are damaged and are compiled afresh ({error})")
             with contextlib.suppress(Exception):
@@ -245,6 +246,24 @@ class _GuardedCache:
     def flush(self) -> None:
         """Discard what is stored."""
         self._cache.flush()
+
+
+@contextlib.contextmanager
+def _without_declarations(target_context: Any) -> Iterator[None]:
+    """Spare numba what it prepares before it loads machine code: all that it can compile, a tenth of a second.
+
+    Code that is loaded needs numba's memory management alone; whatever has to be compiled after all prepares the rest.
+    """
+    runtime = getattr(sys.modules.get("numba.core.runtime"), "rtsys", None)
+    if runtime is None:  # another numba, which had better go its own way
+        yield
+        return
+    runtime.initialize(target_context)
+    target_context.refresh = lambda: None
+    try:
+        yield
+    finally:
+        del target_context.refresh
 
 
 def _checked_files(files: Any) -> Any:

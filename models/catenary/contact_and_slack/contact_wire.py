@@ -292,7 +292,7 @@ def height_polynomials(nodes: IntArray, static: StaticState, angles: FloatArray)
     """
     pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
     axes, length = frames(static.shape.points[pairs[:, 0]], static.shape.points[pairs[:, 1]])
-    rows = np.array([hermite_rows(axis, float(size)) for axis, size in zip(axes, length, strict=True)])
+    rows = hermite_rows(axes, length)
     local = static.displacement[element_dofs(pairs)].copy()
     # The static rotations count from a horizontal wire; the chord's own slope is in the reference height.
     local[:, [4, 10]] += axes[:, 0, 2, None]

@@ -23,6 +23,10 @@ _XY = np.array([1, 5, 7, 11])
 _XZ = np.array([2, 4, 8, 10])
 _XZ_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
 _AXIAL = np.array([0, 6])
+#: Hermite's cubics on an element of length 1, rows of the factors of 1, xi, xi^2, xi^3 over displacement and slope of
+#: either end [2.44]: what belongs to displacements, and what belongs to slopes.
+_HERMITE_DISPLACED = np.array([[1.0, 0, 0, 0], [0, 0, 0, 0], [-3.0, 0, 3.0, 0], [2.0, 0, -2.0, 0]])
+_HERMITE_TURNED = np.array([[0, 0, 0, 0], [0, 1.0, 0, 0], [0, -2.0, 0, -1.0], [0, 1.0, 0, 1.0]])
 _TORSION = np.array([3, 9])
 
 
@@ -176,38 +180,31 @@ def point_loads(points: FloatArray, axes: FloatArray, xi: FloatArray, force: Flo
     return np.asarray(np.einsum("nij,nbi->nbj", axes, local.reshape(-1, 4, 3)).reshape(-1, 12))
 
 
-def hermite_rows(axes: FloatArray, length: float) -> FloatArray:
-    """Return the height of an element's axis as a polynomial of xi = 0 ... 1.
+def hermite_rows(axes: FloatArray, length: FloatArray) -> FloatArray:
+    """Return the heights of elements' axes as polynomials of xi = 0 ... 1.
 
-    Row k holds the factor of xi^k: height(xi) = [1, xi, xi^2, xi^3] @ rows @ d, with the 12 global displacements
-    d of the element [2.44].
+    Row k of an element holds the factor of xi^k: height(xi) = [1, xi, xi^2, xi^3] @ rows @ d, with the 12 global
+    displacements d of the element [2.44].
 
     Parameters
     ----------
-    axes : ndarray, shape (3, 3)
-    length : float
+    axes : ndarray, shape (n, 3, 3)
+    length : ndarray, shape (n,)
 
     Returns
     -------
-    ndarray, shape (4, 12)
+    ndarray, shape (n, 4, 12)
     """
-    rows = np.zeros((4, 12))
-    linear = np.array([[1.0, 0.0], [-1.0, 1.0]])
-    cubic = np.array(
-        [
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, length, 0.0, 0.0],
-            [-3.0, -2.0 * length, 3.0, -length],
-            [2.0, length, -2.0, length],
-        ]
-    )
-    local = np.zeros((3, 4, 12))
-    local[0][:2, _AXIAL] = linear
-    local[1][:, _XY] = cubic
-    local[2][:, _XZ] = cubic * _XZ_SIGN
-    T = np.kron(np.eye(4), axes)
+    n = len(length)
+    cubic = _HERMITE_DISPLACED + length[:, None, None] * _HERMITE_TURNED
+    local = np.zeros((3, n, 4, 12))
+    local[0][:, :2, _AXIAL] = np.array([[1.0, 0.0], [-1.0, 1.0]])
+    local[1][:, :, _XY] = cubic
+    local[2][:, :, _XZ] = cubic * _XZ_SIGN
+    rows = np.zeros((n, 4, 12))
     for axis in range(3):
-        rows += axes[axis, 2] * local[axis] @ T
+        weighted = axes[:, axis, 2, None, None] * local[axis]
+        rows += (weighted.reshape(n, 16, 3) @ axes).reshape(n, 4, 12)
     return rows
 
 

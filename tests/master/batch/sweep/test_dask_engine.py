@@ -17,6 +17,7 @@ from tests import forked_commands
 from tests.master.batch.sweep.conftest import GRID, ROOT, ended, journal
 
 distributed = pytest.importorskip("distributed")
+import dask.config  # noqa: E402 (it comes with distributed)
 
 from master.batch.sweep import dask_engine, local_cluster  # noqa: E402 (it needs distributed)
 from master.batch.sweep.dask_engine import DaskEngine  # noqa: E402
@@ -83,6 +84,14 @@ def crew(tmp_path_factory):
         yield found
 
 
+@pytest.fixture
+def forked_processes(monkeypatch):
+    """Let Dask's processes be forks of one that has imported what they need; elsewhere they begin as users' do."""
+    monkeypatch.setenv("DASK_DISTRIBUTED__WORKER__MULTIPROCESSING_METHOD", "forkserver")
+    with dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
+        yield
+
+
 def _wait_for_runs(process, folder, count):
     deadline = time.monotonic() + 90.0
     while len(journal(folder)) < count:
@@ -91,6 +100,7 @@ def _wait_for_runs(process, folder, count):
         time.sleep(0.01)
 
 
+@pytest.mark.usefixtures("forked_processes")
 def test_the_same_bits_here_with_processes_and_through_a_scheduler(swept, tmp_path, crew):
     swept("here", **SMALL)
     swept("one", DaskEngine(jobs=1, renew_after=2), **SMALL)
@@ -154,6 +164,7 @@ def test_whoever_is_killed_a_second_sweep_ends_with_the_same_table(command, tmp_
     assert (out / "sweep.csv").read_bytes() == whole_table
 
 
+@pytest.mark.usefixtures("forked_processes")
 def test_an_interruption_ends_the_processes_and_leaves_what_is_finished(command, tmp_path, whole_table):
     process = command(*GRID, "--jobs", "2")
     _wait_for_runs(process, tmp_path / "out", 2)

@@ -121,7 +121,7 @@ def test_frequencies_of_a_beam_converge_with_fourth_order():
 
 def test_height_polynomial_takes_the_nodes_values_and_slopes():
     axes, length = frames(np.zeros((1, 3)), np.array([[LENGTH, 0.0, 0.0]]))
-    rows = hermite_rows(axes[0], float(length[0]))
+    rows = hermite_rows(axes, length)[0]
     d = np.zeros(12)
     d[[2, 4, 8, 10]] = 0.01, -0.02, 0.03, 0.04  # z, ry: a slope dz/dx is -ry
 
@@ -137,7 +137,7 @@ def test_height_polynomial_takes_the_nodes_values_and_slopes():
 
 def test_height_polynomial_of_an_inclined_element_follows_rigid_motion(oblique):
     start, end, axes, length = oblique
-    rows = hermite_rows(axes[0], float(length[0]))
+    rows = hermite_rows(axes, length)[0]
     for mode in _rigid_body_modes(start[0], end[0]):
         for xi in (0.0, 0.3, 1.0):
             expected = mode[2] + xi * (mode[8] - mode[2])

@@ -5,6 +5,7 @@ point force resents: what is left of the difference is that of the mesh, and hal
 """
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from models.catenary.line_model import CatenaryModel
 from models.catenary.statics import elasticity
 from models.library.catalogue import load_line
+from tests.effort import IS_LONG, count, some
 from tests.models.nonlinear_truss import Truss
 
 FORCE = 100.0
@@ -37,7 +39,7 @@ def rises(model, at):
     return 1e3 * FORCE * elasticity.elasticity(model, np.array(at), FORCE).value
 
 
-@pytest.mark.parametrize("name", ["LN2", "EN50318_2018_AC_simple", "LN6"])
+@pytest.mark.parametrize("name", some(["LN2", "EN50318_2018_AC_simple", "LN6"], "EN50318_2018_AC_simple"))
 def test_a_line_hangs_and_gives_way_as_a_nonlinear_truss_does(name):
     line = limp(name, 16)
     model, truss = CatenaryModel(line), Truss(line)
@@ -68,11 +70,10 @@ def test_the_truss_has_the_figure_of_the_specification():
 @pytest.mark.slow
 def test_what_is_left_of_the_difference_is_the_mesh():
     off = []
-    for elements in (8, 16, 32):
+    for elements in (8, 16, 32)[: count(2, 3)]:
         line = limp("LN2", elements)
         truss = Truss(line)
         at = places(line, truss)
         off.append(1.0 - rises(CatenaryModel(line), at)[0] / (1e3 * truss.uplift(at[0], FORCE)))
-    assert 0.0 < off[2] < 0.01
-    assert off[1] < 0.7 * off[0]
-    assert off[2] < 0.7 * off[1]
+    assert 0.0 < off[-1] < (0.01 if IS_LONG else off[0])
+    assert all(finer < 0.7 * coarser for coarser, finer in pairwise(off))

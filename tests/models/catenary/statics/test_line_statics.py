@@ -11,6 +11,7 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.statics import elasticity, rest_profile, wire_waves
 from models.commands.physics_main import main
 from models.library.catalogue import line_names, load_line
+from tests.effort import some
 from tests.models.nodal_line import NodalLine
 
 
@@ -162,7 +163,7 @@ def test_profile_and_droppers_belong_together(re330):
     assert z == pytest.approx(5.3 - 0.065 * 4.0 * share * (1.0 - share), abs=1e-4)
 
 
-@pytest.mark.parametrize("name", line_names())
+@pytest.mark.parametrize("name", some(line_names(), "LN2_overlap", "LN2_ring", "Re330", "Shinkansen"))
 def test_command_writes_tables_and_plots_of_every_line(name, tmp_path, capsys):
     assert main(["statics", name, "--out", str(tmp_path), "--speed", "250"]) == 0
     text = capsys.readouterr().out

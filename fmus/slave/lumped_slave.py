@@ -11,10 +11,11 @@ from typing import Any, ClassVar
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
-from models.pantograph.lumped.lumped_advice import working_height_warning
+from models.pantograph.lumped.lumped_advice import idle_values, working_height_warning
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, load_lumped
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from models.pantograph.operation import Drive
+from models.pantograph.train_motion import acceleration_warning
 
 #: Inputs of `operation.Drive`, in its order.
 DRIVE_SIGNALS = (
@@ -31,6 +32,11 @@ SWAY_SIGNALS = (
     Signal("base.yaw", "rad", "yaw of the vehicle's roof about the base, nose to the left", 0.0),
     Signal("base.yaw_rate", "rad/s", "rate of the yaw of the vehicle's roof", 0.0),
 )
+#: Inputs of `operation.Drive.train`, in its order.
+TRAIN_SIGNALS = (
+    Signal("train.x", "m", "way along the track from the start position, if use_train is 1", 0.0),
+    Signal("train.vx", "m/s", "speed along the track, if use_train is 1", 0.0),
+)
 
 
 class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
@@ -38,7 +44,8 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
 
     models: ClassVar[str] = (
         "A pantograph as a chain of masses above each other, joined by springs and dampers, the lowest to the "
-        "vehicle's roof, the highest carrying the collector strip; it moves along the track at constant speed. A "
+        "vehicle's roof, the highest carrying the collector strip; it moves along the track at its speed, by its speed "
+        "profile or as train.x and train.vx say. A "
         "static force lifts the lowest mass, raised smoothly from raise_start over raise_duration. It starts at rest "
         "at reference_height, where the springs carry the weights. The contact force acts on the highest mass; "
         "between communication points it is continued from its last values, so hosts that hold inputs lose no accuracy."
@@ -50,7 +57,7 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
         "of the lowest spring follows the height with the time constant reference_time, which makes it "
         "another model below 1 / (2 pi reference_time).",
         "Aerodynamic uplift is a coefficient times the square of the speed, as on open track.",
-        "Constant speed on straight track; the roof's motion is an input (base.z, base.vz; base.y, base.roll and their "
+        "Straight track; the roof's motion is an input (base.z, base.vz; base.y, base.roll and their "
         "rates, which shift and turn the strip but do not excite the masses; 0 if not connected).",
     )
 
@@ -61,12 +68,14 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
         return LumpedPantographPart(definition)
 
     def _make_ports(self, part: LumpedPantographPart) -> Ports:
-        ports = pantograph_ports(part, (*DRIVE_SIGNALS, *SWAY_SIGNALS[:4]))
+        ports = pantograph_ports(part, (*DRIVE_SIGNALS, *SWAY_SIGNALS[:4], *TRAIN_SIGNALS))
         signals = tuple(signal for port in ports.outputs for signal in port.signals)
         return replace(ports, outputs=(Port(signals, attrgetter("outputs")),))  # read in one piece
 
     def _start_warnings(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
+        yield idle_values(part.definition)
+        yield acceleration_warning(part.definition.speed_profile)
 
     def _told(self, part: LumpedPantographPart) -> list[str]:
         return part.told
@@ -79,8 +88,8 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
 
 
 def _drive(inputs: FloatArray) -> Drive:
-    rate, air, uplift, *sway = inputs[6:13].tolist()
-    return Drive(rate, air, uplift, sway=(*sway, 0.0, 0.0))
+    rate, air, uplift, *sway, x, vx = inputs[6:15].tolist()
+    return Drive(rate, air, uplift, 0.0, (*sway, 0.0, 0.0), (x, vx))
 
 
 def pantograph_ports(part: Any, more: Iterable[Signal] = ()) -> Ports:

@@ -10,7 +10,7 @@ from master.coupling.network import Network
 from master.errors import RunError
 from master.system.components import System
 from master.system.contacts import Contact
-from master.system.pantograph_motion import final_position, parameter_value
+from master.system.pantograph_motion import constant_speed, final_position, parameter_value
 
 #: Calculated parameters of a line that ends: where its contact wires begin and end along the track [m].
 BEGIN: Final = "contact_wire.begin"
@@ -98,7 +98,7 @@ class OffWireStop:
 
     def _check_stop(self, contact: Contact, extent: tuple[float, float]) -> None:
         pantograph = self._system.component(contact.pantograph)
-        x, speed = final_position(self._system, pantograph), parameter_value(pantograph, "speed")
+        x, speed = final_position(self._system, pantograph), constant_speed(pantograph)
         if x is not None and speed and x > extent[1]:
             latest = math.floor(100.0 * (self._system.stop - (x - extent[1]) / speed)) / 100.0
             raise RunError(

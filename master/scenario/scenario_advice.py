@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from master.system.components import Component, System
+from master.system.pantograph_motion import constant_speed
 
 #: Highest speed of operation over the wave speed of the contact wire (EN 50119).
 OPERATION_LIMIT: Final = 0.7
@@ -33,7 +34,7 @@ def warnings(system: System) -> Iterator[str]:
 
 def _too_fast(pantograph: Component, line: Component) -> Iterator[str]:
     """Compare a pantograph's speed with that of transverse waves, sqrt(T / rho)."""
-    speed, tension, mass = _value(pantograph, "speed"), *_wire(line)
+    speed, tension, mass = constant_speed(pantograph), *_wire(line)
     if speed is None or tension is None or mass is None:
         return
     C = math.sqrt(tension / mass)
@@ -75,4 +76,4 @@ def _value(component: Component, name: str) -> float | None:
         value = float(component.parameters.get(name, variable.start or 0.0))
     except ValueError:
         return None
-    return value if 0.0 < value < math.inf or name == "speed" else None
+    return value if 0.0 < value < math.inf else None

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from master.system.components import Component, System
-from master.system.pantograph_motion import final_position, pantographs, parameter_value
+from master.system.pantograph_motion import constant_speed, final_position, pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
 #: How long a run continues after the last pantograph has left the interval [s]: the filter looks that far ahead, and
@@ -75,8 +75,10 @@ def stop_after_interval(system: System) -> float | str:
         return "no pantograph receives a contact force, so none can pass the interval and end the run; give a stop time"
     times = []
     for pantograph in found:
-        start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
+        start, speed = parameter_value(pantograph, "start_position"), constant_speed(pantograph)
         if start is None or speed is None:
+            if parameter_value(pantograph, "speed") is not None and start is not None:
+                return f"'{pantograph.name}' moves as its inputs say (use_train = 1); give a stop time"
             return f"the FMU of '{pantograph.name}' gives no start_position and speed; give a stop time"
         if speed <= 0.0:
             return f"{pantograph.name}.speed = {speed:g} m/s never leads to the end of the interval, {end:g} m"
@@ -95,7 +97,7 @@ def _idle(pantograph: Component) -> Iterator[str]:
 
 def _uncovered(system: System, pantograph: Component) -> Iterator[str]:
     interval, last = system.settings.interval, final_position(system, pantograph)
-    start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
+    start, speed = parameter_value(pantograph, "start_position"), constant_speed(pantograph)
     if last is None or start is None or speed is None:
         return
     stride = speed * system.step

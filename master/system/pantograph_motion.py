@@ -7,6 +7,8 @@ from typing import Final
 
 from master.system.components import Component, System
 
+#: Parameter of a pantograph that moves along the track as inputs say, where it is 1.
+USE_TRAIN: Final = "use_train"
 #: Parameter that lifts a pantograph's strip to the wire.
 STATIC_FORCE: Final = "static_force"
 
@@ -23,6 +25,16 @@ def parameter_value(component: Component, name: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def constant_speed(component: Component) -> float | None:
+    """Return the speed that a pantograph keeps, None if its FMU does not say one or inputs say how it moves.
+
+    A pantograph with a speed profile has no parameter ``speed``.
+    """
+    switch = component.fmu.variables.get(USE_TRAIN)
+    is_moved = switch is not None and component.parameters.get(USE_TRAIN, switch.start) not in (None, "0")
+    return None if is_moved else parameter_value(component, "speed")
+
+
 def pantographs(system: System) -> tuple[Component, ...]:
     """Return the components that receive a contact force, each once."""
     names = dict.fromkeys(c.pantograph for c in system.contacts)
@@ -30,6 +42,6 @@ def pantographs(system: System) -> tuple[Component, ...]:
 
 
 def final_position(system: System, pantograph: Component) -> float | None:
-    """Return where a pantograph is at the stop time [m], None if its FMU does not give start and speed."""
-    start, speed = (parameter_value(pantograph, name) for name in ("start_position", "speed"))
+    """Return where a pantograph is at the stop time [m], None if its FMU gives no start or no constant speed."""
+    start, speed = parameter_value(pantograph, "start_position"), constant_speed(pantograph)
     return None if start is None or speed is None else start + speed * (system.stop - system.start)

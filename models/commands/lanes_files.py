@@ -85,6 +85,8 @@ def _job(path: Path, data: Mapping[str, Any]) -> LaneJob:
     monitored = [line.name] if line.monitor_energy else []
     monitored += [p.name for lane in lanes for p in lane.pantographs if p.monitor_energy]
     followed = [p.name for lane in lanes for p in lane.pantographs if p.follow_height]
+    for pantograph in (p for lane in lanes for p in lane.pantographs):
+        pantograph.refuse_varying_speed("a run in lanes")
     if followed:
         raise ParameterError(f"{followed[0]}: in lanes no pantograph follows the height; set follow_height to 0")
     held = [p.name for lane in lanes for p in lane.pantographs if len(held_forces(p)) or p.start_height is not None]

@@ -70,10 +70,12 @@ class CoupledModel:
     Raises
     ------
     ParameterError
-        If one has stops or friction, which one linear system cannot hold.
+        If the speed of one is not constant, or it has stops or friction, which one linear system cannot hold.
     """
 
     def __init__(self, line: CatenaryModel, pantographs: Sequence[LumpedDefinition]) -> None:
+        for pantograph in pantographs:
+            pantograph.refuse_varying_speed("this run")
         self.line = line
         for definition in pantographs:
             _check(definition)

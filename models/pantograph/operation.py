@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from models.definition_files.field_schema import count, monitoring, quantity, text, vector
+from models.definition_files.field_schema import count, monitoring, part, quantity, text, vector
+from models.definition_files.parameter import Parameter, ParameterError
+from models.definition_files.toml_reader import Table
+from models.pantograph.train_motion import SpeedProfile, TrainMotion
 
 #: A roof that does not sway; see `Drive.sway`.
 NO_SWAY: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -31,6 +34,8 @@ class Drive(NamedTuple):
         Value of the lifting element [N or N.m], for a pantograph whose ``lift_input`` is 1.
     sway : tuple of float
         Of the roof: lateral position and velocity [m, m/s], roll and its rate, yaw and its rate [rad, rad/s].
+    train : (float, float)
+        Way along the track from the start position and speed [m, m/s], for a pantograph whose ``use_train`` is 1.
     """
 
     reference_rate: float = 0.0
@@ -38,10 +43,13 @@ class Drive(NamedTuple):
     uplift: float = 0.0
     lift: float = 0.0
     sway: tuple[float, float, float, float, float, float] = NO_SWAY
+    train: tuple[float, float] = (0.0, 0.0)
 
 
 #: Nothing connected.
 NO_DRIVE = Drive()
+#: Keys that say nothing beside a speed profile.
+_BESIDE_PROFILE: Final = ("speed", "use_train")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +61,7 @@ class Operation:
 
     speed: float = quantity("m/s", "speed along the track", default=300.0 / 3.6, minimum=0.0, maximum=170.0)
     start_position: float = quantity("m", "position along the track at time 0", default=0.0, minimum=-1e7, maximum=1e7)
+    speed_profile: SpeedProfile | None = part(SpeedProfile, default=None)
     reference_height: float = quantity(
         "m",
         "height of the strip at time 0, where the springs carry the weights",
@@ -85,6 +94,10 @@ class Operation:
         "order of the extrapolation of the contact force inside a step: 0 held, 1 linear, 2 quadratic",
         default=2, minimum=0, maximum=2,
     )  # fmt: skip
+    use_train: int = count(
+        "what moves it along the track: 0 the speed, 1 the inputs train.x and train.vx in place of it",
+        default=0, maximum=1,
+    )  # fmt: skip
     monitor_energy: int = monitoring()
     # At least a thousandth of the usual one: a run in shorter steps would never end.
     time_step: float = quantity("s", "longest internal time step", default=1e-3, minimum=1e-6, maximum=0.1)
@@ -101,6 +114,35 @@ class Operation:
         """Yield what is wrong with the direction."""
         if self.direction == 0:
             yield "direction", "0 is neither 1 (as the definition says) nor -1 (the other way round)"
+        if self.use_train and self.speed_profile is not None:
+            yield "use_train", _idle_text("use_train")
+
+    def check_speed(self, table: Table) -> None:
+        """Tell a definition's table of keys that say nothing beside its speed profile."""
+        for key in _BESIDE_PROFILE if self.speed_profile is not None else ():
+            if table.has(key):
+                table.problem(key, _idle_text(key))
+
+    def tunable(self, parameters: Iterable[Parameter]) -> tuple[Parameter, ...]:
+        """Return those of the definition's parameters that do something."""
+        idle = _BESIDE_PROFILE if self.speed_profile is not None else ()
+        return tuple(p for p in parameters if p.name not in idle)
+
+    def refuse_idle(self, names: Iterable[str]) -> None:
+        """Raise ``ParameterError`` for a parameter that does nothing beside the speed profile."""
+        for name in _BESIDE_PROFILE if self.speed_profile is not None else ():
+            if name in names:
+                raise ParameterError(f"parameter '{name}': {_idle_text(name)}")
+
+    def refuse_varying_speed(self, who: str) -> None:
+        """Raise ``ParameterError`` for a pantograph whose speed is not constant, on behalf of who makes the run."""
+        if self.speed_profile is not None or self.use_train:
+            key = "use_train = 1" if self.use_train else "[speed_profile]"
+            raise ParameterError(f"{key}: {who} runs at constant speed; make a scenario of FMUs (openpanto new)")
+
+    def train_motion(self) -> TrainMotion:
+        """Return a motion along the track that has not begun."""
+        return TrainMotion(self.start_position, self.speed, self.speed_profile, bool(self.use_train))
 
     @property
     def air_coefficient(self) -> float:
@@ -112,3 +154,7 @@ class Operation:
         """Return the aerodynamic uplift [N] in air that moves along x [m/s], at the speed of the train or another."""
         against = (self.speed if speed is None else speed) - air
         return self.air_coefficient * abs(against) * against
+
+
+def _idle_text(key: str) -> str:
+    return f"does nothing beside [speed_profile], which says the speed: leave out '{key}' or the profile"

@@ -17,6 +17,7 @@ from master.fmu.fmu_provision import why_not_ours
 from master.recording.recording_plan import RecordingPlan, recording_plans
 from master.system.components import Component, Fmu, System
 from master.system.contacts import Contact
+from master.system.pantograph_motion import USE_TRAIN
 
 #: Version of the job; see ``models/commands/lanes_files.py``.
 _FORMAT: Final = 1
@@ -163,6 +164,8 @@ def _check_component(component: Component, *, is_pantograph: bool) -> None:
     if _chosen(component, "follow_height"):
         text = f"has no pantograph that follows the height ({component.name}.follow_height)"
         raise RequestError(f"--engine lanes {text}; {_INSTEAD}")
+    if _chosen(component, USE_TRAIN):
+        raise RequestError(f"--engine lanes runs at constant speed ({component.name}.{USE_TRAIN}); {_INSTEAD}")
     if _chosen(component, "monitor_energy"):
         raise RequestError(f"--engine lanes keeps no balance of energy ({component.name}.monitor_energy); {_INSTEAD}")
 

@@ -19,7 +19,7 @@ from master.ssp.ssp_units import COMMON, conversion
 from master.ssp.ssv import Value
 from master.system.components import Component, System, without
 from master.system.contacts import find_contacts
-from master.system.pantograph_motion import STATIC_FORCE, pantographs, parameter_value
+from master.system.pantograph_motion import STATIC_FORCE, constant_speed, pantographs, parameter_value
 from master.system.step_rounding import ROUNDING
 
 #: Swept values that the title of a run names.
@@ -259,7 +259,7 @@ def _with_forces(system: System, absent: Sequence[str], law: ForceLaw | None) ->
 
 def _speed(component: Component) -> float | None:
     """Return the speed of a pantograph [km/h], None if its FMU does not say."""
-    value = parameter_value(component, "speed")
+    value = constant_speed(component)
     if value is None:
         return None
     unit = component.fmu.variables["speed"].unit or "m/s"
@@ -288,7 +288,7 @@ def _moves_alike(base: System, changed: System) -> bool:
 
 def _slowness(before: Component, after: Component) -> float:
     """Return how many times as long as before a pantograph takes for the same way."""
-    old, new = (parameter_value(c, "speed") for c in (before, after))
+    old, new = (constant_speed(c) for c in (before, after))
     return old / new if old and new and old > 0.0 < new else 1.0
 
 

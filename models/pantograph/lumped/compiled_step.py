@@ -43,7 +43,8 @@ class CompiledStep:
         """Take a trial step, so that the first real one finds everything compiled: a paced run must not wait for it."""
         n, h = self._model.size, self._model.definition.time_step
         when, nothing = (0.0, 0.0, h), (0.0, 0.0, 0.0)
-        self.step(np.zeros(4 * n), when, 1, (0.0, 0.0), np.zeros(2), nothing, np.zeros(n), np.zeros(12 + 3 * n))
+        way = (0.0, 0.0, 0.0, 0.0)
+        self.step(np.zeros(4 * n), when, 1, (0.0, 0.0), way, np.zeros(2), nothing, np.zeros(n), np.zeros(12 + 3 * n))
 
     def take(self, force: ForceExtrapolation) -> None:
         """Go on from what is known of the contact force."""
@@ -60,6 +61,7 @@ class CompiledStep:
         when: tuple[float, float, float],
         count: int,
         contact: tuple[float, float],
+        way: tuple[float, float, float, float],
         base: FloatArray,
         hung: tuple[float, float, float],
         own: FloatArray,
@@ -77,6 +79,8 @@ class CompiledStep:
             Equal steps that it is divided into.
         contact : (float, float)
             Contact force [N] and its place along the track [m].
+        way : (float, float, float, float)
+            Place at the beginning of the step, speed within it, place and speed at its end [m, m/s].
         base : ndarray, shape (2,)
             Height and velocity of the roof [m, m/s].
         hung : (float, float, float)
@@ -91,7 +95,7 @@ class CompiledStep:
         transition, following = self._model.transition(h), self._follower(h)
         known, constants = self._known, self._constants
         return self._step(
-            known, values, transition, constants, *when, count, *contact, base, *hung, following, own, outputs
+            known, values, transition, constants, *when, count, *contact, way, base, *hung, following, own, outputs
         )
 
     def _follower(self, h: float) -> FloatArray:
@@ -126,7 +130,5 @@ def _constants(definition: LumpedDefinition, balance: float) -> dict[str, float]
         "raise_duration": definition.raise_duration,
         "stiffness": lowest.stiffness,
         "damping": lowest.damping,
-        "start_position": definition.start_position,
-        "speed": definition.speed,
         "reference_height": definition.reference_height,
     }

@@ -130,10 +130,11 @@ class LumpedDefinition(Operation):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return every tunable number."""
-        return tuple(field_schema.parameters(self, self.provenance))
+        return self.tunable(field_schema.parameters(self, self.provenance))
 
     def with_values(self, values: Mapping[str, float]) -> LumpedDefinition:
         """Return a copy with some parameters changed; raises ``ParameterError``."""
+        self.refuse_idle(values)
         return field_schema.with_values(self, values)
 
 
@@ -149,5 +150,6 @@ def read_lumped(table: Table) -> LumpedDefinition:
     if not stages:
         table.problem("stage", "a lumped pantograph needs at least one [[stage]]")
     definition = field_schema.read(LumpedDefinition, table, stage=stages, provenance=table.provenance)
+    definition.check_speed(table)
     table.finish()
     return definition

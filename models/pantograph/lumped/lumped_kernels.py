@@ -28,8 +28,6 @@ Constants = namedtuple(
         "raise_duration",
         "stiffness",
         "damping",
-        "start_position",
-        "speed",
         "reference_height",
     ),
 )
@@ -39,7 +37,7 @@ _compiled = njit(cache=True, error_model="numpy")
 
 @_compiled
 def step(
-    known, values, transition, constants, began, time, duration, count, force, x, base,
+    known, values, transition, constants, began, time, duration, count, force, x, way, base,
     reference, roof, rate, following, own, outputs,
 ):  # fmt: skip
     """Step from ``time`` over ``duration`` in ``count`` equal steps.
@@ -52,13 +50,15 @@ def step(
         Motion, replaced, and work space for the load; see `LumpedModel.transition`.
     transition : ndarray, shape (3 n, 4 n)
         Of a step of ``duration / count``.
-    constants : ndarray, shape (10,)
+    constants : ndarray, shape (8,)
         See `Constants`.
     began, time, duration : float
         When the run began, when the step does, how long it is [s].
     count : int
     force, x : float
         Contact force [N] and place along the track [m] where it acts, as received.
+    way : (float, float, float, float)
+        Place at the beginning of the step, speed within it, place and speed at its end [m, m/s].
     base : ndarray, shape (2,)
         Height and velocity of the roof [m, m/s].
     reference, roof, rate : float
@@ -80,7 +80,7 @@ def step(
     rows, columns = transition.shape
     n = columns - rows
     h, result = duration / count, np.empty(rows)
-    receive(known, time, force, x, c.start_position + c.speed * (time - began), c.speed, duration)
+    receive(known, time, force, x, way[0], way[1], duration)
     for k in range(1, count + 1):
         end = time + k * h
         height, velocity = base[0] + k * h * base[1], base[1]
@@ -101,14 +101,14 @@ def step(
         values[:rows] = result
         reference += following[3] * (values[0] - height)
         roof = height
-    place(values, c.start_position + c.speed * (time + duration - began), c.reference_height, n, outputs)
+    place(values, way[2], way[3], c.reference_height, n, outputs)
     return reference
 
 
 @_compiled
 def constants_of(array):
     """Return the constants as a tuple."""
-    return array[0], array[1], array[2], array[3], array[4], array[5], array[6], array[7], array[8], array[9]
+    return array[0], array[1], array[2], array[3], array[4], array[5], array[6], array[7]
 
 
 @_compiled
@@ -170,10 +170,10 @@ def held(row, x, v, give, give_rate):
 
 
 @_compiled
-def place(values, x, reference_height, n, outputs):
+def place(values, x, speed, reference_height, n, outputs):
     """Write where the ends of the strip are and what is observed of the masses."""
     for side in range(0, 12, 6):
-        outputs[side] = x
+        outputs[side], outputs[side + 3] = x, speed
         outputs[side + 2] = reference_height + values[3 * n - 3]
         outputs[side + 5] = values[3 * n - 2]
     for i in range(0, 3 * n, 3):

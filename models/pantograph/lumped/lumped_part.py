@@ -18,6 +18,7 @@ from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 from models.pantograph.lumped.swaying_strip import SwayingStrip
 from models.pantograph.operation import NO_DRIVE, Drive
+from models.pantograph.train_motion import Travel
 
 
 class LumpedPantographPart:
@@ -51,7 +52,8 @@ class LumpedPantographPart:
         self.state = LumpedState(self._motion[0::3], self._motion[1::3], self._motion[2::3])
         # A step changes x, z and z's velocity alone.
         half, y = 0.5 * definition.strip_length, definition.strip_offset
-        velocity = [definition.speed, 0.0, 0.0]
+        self._train = definition.train_motion()
+        velocity = [self._train.at(0.0).speed, 0.0, 0.0]
         self.outputs = np.zeros(12 + 3 * n)
         self.strip = self.outputs[:12].reshape(2, 2, 3)
         self.strip[...] = [[[0.0, y + side, 0.0], velocity] for side in (half, -half)]
@@ -67,9 +69,9 @@ class LumpedPantographPart:
         self._held = HeldForces(self._own[n:].reshape(held.shape)) if held.size else None
         self._range = definition.range
         self._excursions = Excursions() if self._range != (-math.inf, math.inf) else None
-        self.told = [] if self._excursions is None else self._excursions.told
+        self.told: list[str] = [] if self._excursions is None else self._excursions.told
         self._has_met = False
-        self._drive: Drive | None = None  # what these loads are of
+        self._driven: tuple[float, float, float] | None = None  # what these loads are of
         self._sway = SwayingStrip(definition)
         self._balance: LumpedBalance | None = None
         self._compiled: CompiledStep | None = None
@@ -95,8 +97,12 @@ class LumpedPantographPart:
         del point
         self.time = self._start_time = time
         self._roof = float(base[0])
+        self._has_met = False
+        if self._excursions is not None:
+            self._excursions.start()
         self.state.reference = self.definition.rise - self._roof
-        load = self.model.load(0.0, base) + self._drive_loads(drive)
+        self._train.begin(time, drive.train)
+        load = self.model.load(0.0, base) + self._drive_loads(drive.air, drive.uplift, self._train.at(time).speed)
         if self.model.follows:  # the reference starts where the mass is
             load[0] -= self.definition.stage[0].stiffness * self._roof
         load[-1] -= force
@@ -116,20 +122,23 @@ class LumpedPantographPart:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
         start, x, count = self.time, point.item(0), steps_within(step, self.definition.time_step)
         self.time = start + step
-        if drive != self._drive:
-            self._drive, self._own[: self.model.size] = drive, self._drive_loads(drive)
+        begin, middle, end = self._travel(start, step, drive)
+        driven = drive.air, drive.uplift, middle.speed
+        if driven != self._driven:
+            self._driven, self._own[: self.model.size] = driven, self._drive_loads(*driven)
         self._sway.receive(drive, base, step)
         if self._compiled is not None:
             when, contact = (self._start_time, start, step), (force, x)
             hung = (self.state.reference, self._roof, drive.reference_rate)
+            way = (begin.x, middle.speed, end.x, end.speed)
             self.state.reference = self._compiled.step(
-                self._values, when, count, contact, base, hung, self._own, self.outputs
+                self._values, when, count, contact, way, base, hung, self._own, self.outputs
             )
             self._roof = float(base[0]) + step * float(base[1])
             self._sway.place(self.strip)
             self._watch(force, point)
             return
-        self._force.receive_at(start, force, x, self._x(start), self.definition.speed, step)
+        self._force.receive_at(start, force, x, begin.x, middle.speed, step)
         h = step / count
         height, velocity = base.tolist()
         for k in range(1, count + 1):
@@ -167,6 +176,7 @@ class LumpedPantographPart:
             **self._force.snapshot(),
             **({} if self._held is None else self._held.snapshot()),
             **self._sway.snapshot(),
+            **self._train.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
 
@@ -183,6 +193,7 @@ class LumpedPantographPart:
             self._balance.restore(snapshot)
             self._balance.held = 0.0 if self._held is None else self._held.stored
         self._sway.restore(snapshot)
+        self._train.restore(snapshot)
         self._compile()
         self._place()
         self._sway.place(self.strip)
@@ -244,10 +255,18 @@ class LumpedPantographPart:
         if self._balance is not None:
             self._balance.stretch = after - self.state.reference
 
-    def _drive_loads(self, drive: Drive) -> FloatArray:
+    def _travel(self, start: float, step: float, drive: Drive) -> tuple[Travel, Travel, Travel]:
+        """Return the motion along the track at the beginning, the middle and the end of a step."""
+        train = self._train
+        train.receive(start, drive.train, step)
+        if train.told:
+            self.told.append(train.told)
+        return train.at(start), train.at(start + 0.5 * step), train.at(self.time)
+
+    def _drive_loads(self, air: float, uplift: float, speed: float) -> FloatArray:
         """Return what the air and a force from outside load the masses with, shape (n,) [N]."""
-        loads = self._shares * self.definition.aerodynamic_force(drive.air)
-        loads[0] += drive.uplift
+        loads = self._shares * self.definition.aerodynamic_force(air, speed)
+        loads[0] += uplift
         return loads
 
     def _watch(self, force: float, point: FloatArray) -> None:
@@ -256,19 +275,16 @@ class LumpedPantographPart:
             return
         self._has_met |= force > 0.0
         x, height = self.outputs.item(0), self.outputs.item(2)
-        for name in self._held.touched():
-            place = Place(self.time, x, height)
-            follows = self.model.follows
-            self._excursions.touch(name, place, has_met=self._has_met, is_loaded=force > 0.0, is_neutral=follows)
+        if touched := self._held.touched():
+            place, follows = Place(self.time, x, height), self.model.follows
+            self._excursions.touch(touched, place, has_met=self._has_met, is_loaded=force > 0.0, is_neutral=follows)
         self._excursions.check_contact(force, Place(self.time, x, point.item(2)), *self._range)
-
-    def _x(self, time: float) -> float:
-        return self.definition.start_position + self.definition.speed * (time - self._start_time)
 
     def _place(self) -> None:
         """Write the strip and what is observed."""
         outputs, height = self.outputs, self.definition.reference_height
-        outputs[0:12:6] = self._x(self.time)
+        now = self._train.at(self.time)
+        outputs[0:12:6], outputs[3:12:6] = now.x, now.speed
         outputs[2:12:6] = height + self._motion.item(-3)
         outputs[5:12:6] = self._motion.item(-2)
         np.add(self._motion, self._rest, out=outputs[12:])

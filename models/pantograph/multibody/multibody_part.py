@@ -9,6 +9,7 @@ import numpy as np
 from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
+from models.pantograph.excursions import Place
 from models.pantograph.multibody.analysis.cam_design import fit_force
 from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation, SwayMotion
@@ -18,6 +19,7 @@ from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
+from models.pantograph.multibody.range_watch import RangeWatch
 from models.pantograph.multibody.reduced.reduced_motion import ReducedMotion, reduced_if_possible
 from models.pantograph.multibody.reduced.reduction import unsuitable_drive
 from models.pantograph.multibody.step_memory import (
@@ -49,6 +51,8 @@ class MultibodyPantographPart:
         End A (left), B (right); position, velocity; x, y, z.
     observed : tuple of (name, unit, description)
         What ``observation_values`` gives.
+    told : list of str
+        What the user should know of the steps so far; whoever fetches it empties it.
     """
 
     def __init__(self, definition: MechanismDefinition) -> None:
@@ -58,11 +62,13 @@ class MultibodyPantographPart:
         self._is_blown = definition.air_coefficient != 0.0
         self.time = 0.0
         self.strip = np.zeros((2, 2, 3))
+        self.told: list[str] = []
         self._start_time = 0.0
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._lateral = LateralExtrapolation()
         self._base = BaseMotion()
         self._sway = SwayMotion()
+        self._train = definition.train_motion()
         self._drive = NO_DRIVE
         self._y = np.zeros(0)
         self._last: LastEvaluation | None = None
@@ -100,11 +106,14 @@ class MultibodyPantographPart:
         """
         built = self._ready()
         self._take(drive)
+        if built.watch is not None:
+            built.watch.start()
         self.time = self._start_time = time
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
         self._base.start(base)
         self._sway.start(drive.sway)
+        self._train.begin(time, drive.train)
         self._substep = self.definition.time_step
         self._history = None
         self._left = unsuitable_drive(drive)
@@ -141,20 +150,23 @@ class MultibodyPantographPart:
             If the motion becomes singular.
         """
         built = self._ready()
-        values = (force, *point.tolist(), *base.tolist(), *drive.sway, drive.air, drive.uplift, drive.lift)
+        self._look(built, force, point)
+        values = (force, *point.tolist(), *base.tolist(), *drive.sway, *drive.train, *drive[1:4])
         if not all(map(math.isfinite, values)):
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
         self._take(drive)
         operation = self.definition
+        speed = self._travel(drive, step)
         expected = 0.5 * (self.strip.item(0) + self.strip.item(6))
-        self._force.receive_at(self.time, force, float(point[0]), expected, operation.speed, step)
-        self._receive_lateral(force, point, expected, step)
+        self._force.receive_at(self.time, force, float(point[0]), expected, speed, step)
+        self._receive_lateral(force, point, speed, expected, step)
         self._base.receive(base, step)
         self._sway.receive(drive.sway, step)
         if self._reduced is not None and self._step_reduced(self._reduced, step, drive):
             return
         elapsed = self.time - self._start_time
-        kinks = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
+        raising = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
+        kinks = (*raising, *self._train.kinks(self.time))
         first, history = self._continuation()
         done = built.integrator.advance(self._y, self._inputs, step, self._substep, kinks, first, history)
         self._account(step, first, done)
@@ -164,6 +176,21 @@ class MultibodyPantographPart:
         self._sway.finish(step)
         self.time += step
         self._remember(done.evaluation, inputs)
+
+    def _look(self, built: _Built, force: float, point: FloatArray) -> None:
+        """Note stops that are touched and ranges that are left as a step begins."""
+        watch = built.watch
+        if watch is None or not watch.is_due(self.time, force):
+            return
+        x, z = (0.5 * (self.strip.item(k) + self.strip.item(6 + k)) for k in (0, 2))
+        watch.look(
+            self._y if self._reduced is None else self._reduced.posture(self._base.now),
+            Place(self.time, x, z),
+            force,
+            point.item(2),
+        )
+        self.told += watch.told
+        watch.told.clear()
 
     @property
     def energy(self) -> FloatArray:
@@ -215,6 +242,7 @@ class MultibodyPantographPart:
             **self._lateral.snapshot(),
             **self._base.snapshot(),
             **self._sway.snapshot(),
+            **self._train.snapshot(),
             **({} if self._balance is None else self._balance.snapshot()),
         }
 
@@ -235,6 +263,7 @@ class MultibodyPantographPart:
         self._lateral.restore(snapshot)
         self._base.restore(snapshot)
         self._sway.restore(snapshot)
+        self._train.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
 
@@ -267,7 +296,7 @@ class MultibodyPantographPart:
         operation, force, lateral, drive = self.definition, self._force, self._lateral, self._drive
         uplift = drive.uplift
         if self._is_blown:
-            uplift += operation.aerodynamic_force(drive.air)
+            uplift += operation.aerodynamic_force(drive.air, self._train.at(self.time).speed)
         return [
             self.time, self._start_time,
             force.known, *force.times, *force.values, force.order,
@@ -280,11 +309,9 @@ class MultibodyPantographPart:
     def _show_reduced(self) -> None:
         """Bring the strip up to the state; what is observed waits until somebody asks."""
         assert self._reduced is not None
-        built, operation = self._ready(), self.definition
+        built, travel = self._ready(), self._train.at(self.time)
         z, vz = self._base.now.tolist()
-        self._reduced.place_strip(
-            (self._track() - built.strip_x, z + built.base_height, operation.speed, vz), self.strip
-        )
+        self._reduced.place_strip((travel.x - built.strip_x, z + built.base_height, travel.speed, vz), self.strip)
         self._is_shown = False
 
     def _observe_reduced(self) -> None:
@@ -296,10 +323,6 @@ class MultibodyPantographPart:
         self._observation[: bodies.size] = bodies.ravel()
         self._observation[bodies.size :] = (*self._seen(self.strip), motion.lift_value(), *held, 0.0, 0.0)
         self._is_shown = True
-
-    def _track(self) -> float:
-        """Return where the train has taken the pantograph [m]."""
-        return self.definition.start_position + self.definition.speed * (self.time - self._start_time)
 
     def _seen(self, ends: FloatArray) -> tuple[float, float, float]:
         """Return roll, roll rate, and place of the contact along the strip for its ends, shape (2, 2, 3)."""
@@ -343,9 +366,16 @@ class MultibodyPantographPart:
             history = History(history.step, history.middle + change, history.begin + change)
         return first, history
 
-    def _receive_lateral(self, force: float, point: FloatArray, expected: float, step: float) -> None:
+    def _travel(self, drive: Drive, step: float) -> float:
+        """Take how the train moves; return its speed within the step [m/s]."""
+        self._train.receive(self.time, drive.train, step)
+        if self._train.told:
+            self.told.append(self._train.told)
+        return self._train.at(self.time + 0.5 * step).speed
+
+    def _receive_lateral(self, force: float, point: FloatArray, speed: float, expected: float, step: float) -> None:
         """Follow the contact point across the strip while there is contact."""
-        time = self.time + lead_of(float(point[0]), expected, self.definition.speed, step)
+        time = self.time + lead_of(float(point[0]), expected, speed, step)
         if force > 0.0:
             self._lateral.receive(time, float(point[1]))
         else:
@@ -355,13 +385,14 @@ class MultibodyPantographPart:
         """Return what acts ``tau`` [s] after the beginning of the step."""
         built, drive, time = self._ready(), self._drive, self.time + tau
         force = self._force.at(time)
-        lift, uplift = self._lift(time), self.definition.aerodynamic_force(drive.air) + drive.uplift
+        _, speed, pull = self._train.at(time)
+        lift, uplift = self._lift(time), self.definition.aerodynamic_force(drive.air, speed) + drive.uplift
         if self.definition.holds_force:
             lift, uplift = lift + uplift, 0.0
         driven = drive.lift if self.definition.lift_input else None
-        against = self.definition.speed - drive.air if built.mechanism.forces.air.count else 0.0
+        against = speed - drive.air if built.mechanism.forces.air.count else 0.0
         return Inputs(
-            self._base.at(tau), lift, force, self._lateral.at(time), uplift, self._sway.at(tau), 0.0, against, driven
+            self._base.at(tau), lift, force, self._lateral.at(time), uplift, self._sway.at(tau), pull, against, driven
         )
 
     def _take(self, drive: Drive) -> None:
@@ -393,10 +424,11 @@ class MultibodyPantographPart:
         built = self._ready()
         mechanism, operation = built.mechanism, self.definition
         ends = mechanism.strip_ends(self._y)
+        travel = self._train.at(self.time)
         self.strip[...] = ends
-        self.strip[:, 0, 0] += self._track() - built.strip_x
+        self.strip[:, 0, 0] += travel.x - built.strip_x
         self.strip[:, 0, 2] += built.base_height
-        self.strip[:, 1, 0] += operation.speed
+        self.strip[:, 1, 0] += travel.speed
         s, free = mechanism.split(self._y), slice(mechanism.driven, None)
         bodies = np.stack([s.r[free, 2] + built.base_height, s.v[free, 2], evaluation.acceleration[free, 2]], axis=1)
         values = evaluation.constraints
@@ -426,6 +458,7 @@ class _Built:
         self.reference = posture.reference
         self.balance = posture.start.lift
         self.base_height = posture.base_height
+        self.watch = RangeWatch.over(self.mechanism, self.standing, self.base_height)
         self.reduced, self.form = reduced_if_possible(self.mechanism, self.standing)
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 

@@ -28,7 +28,7 @@ def instance(fmu: Path) -> Iterator[Instance]:
 def test_has_the_ports_of_a_pantograph(instance):
     inputs = ["contact.force", "contact.x", "contact.y", "contact.z", "base.z", "base.vz"]
     inputs += ["reference.vz", "air.u", "uplift_force"]
-    inputs += ["base.y", "base.vy", "base.roll", "base.roll_rate"]
+    inputs += ["base.y", "base.vy", "base.roll", "base.roll_rate", "train.x", "train.vx"]
     assert names_of(instance, "input") == inputs
     strip = [f"{end}.{axis}" for end in "AB" for axis in ("x", "y", "z", "vx", "vy", "vz")]
     outputs = names_of(instance, "output")

@@ -194,6 +194,7 @@ def test_the_command_leaves_a_file_for_every_run(job, tmp_path, capsys):
         ({"lanes": [{"steps": 3, "pantographs": [{"speeed": 1.0}]}]}, "speeed"),
         ({"lanes": [{"steps": 3, "pantographs": [{"monitor_energy": 1}]}]}, "no balance of energy"),
         ({"lanes": [{"steps": 3, "pantographs": [{"follow_height": 1}]}]}, "no pantograph follows the height"),
+        ({"lanes": [{"steps": 3, "pantographs": [{"use_train": 1}]}]}, "use_train = 1: a run in lanes"),
         ({"line_values": {"monitor_energy": 1}}, "no balance of energy"),
         ({"start": "soon"}, "not a job for lanes"),
         ({"line": "train.toml"}, "train.toml"),

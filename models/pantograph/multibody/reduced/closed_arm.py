@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -154,17 +153,15 @@ class ArmTables:
         friction, its transition.
     reach : float
         Fastest body per theta' [m].
-    places : ndarray, shape (places,)
-        Theta of ``states``.
-    states : ndarray, shape (places, 13 n)
+    postures : QuinticTable
+        Positions and Euler parameters of the bodies: the first 7 n values of a state.
     """
 
     functions: QuinticTable
     outline: QuinticTable
     rows: FloatArray
     reach: float
-    places: FloatArray
-    states: FloatArray
+    postures: QuinticTable
 
 
 def tabulate(reduction: Reduction, finder: ArmFinder) -> ArmTables:
@@ -193,17 +190,13 @@ def tabulate(reduction: Reduction, finder: ArmFinder) -> ArmTables:
         values, first = np.delete(values, cut, axis=0), first + (cut == 0)
     if not panels or not edges[0] < 0.0 < edges[-1]:
         raise NotReducibleError("its arm stands at a dead centre, or what it carries is not smooth over its range")
-    split = sampler.outline_from
-    functions = QuinticTable(table.start, table.end, np.ascontiguousarray(table.cells[:, :split]))
-    outline = QuinticTable(table.start, table.end, np.ascontiguousarray(table.cells[:, split:]))
-    states = np.concatenate([p.states for p in panels])
-    places = np.concatenate([points_of(a, b) for a, b in itertools.pairwise(edges.tolist())])
-    return ArmTables(functions, outline, sampler.rows, max(p.reach for p in panels), places, states)
+    parts = np.split(table.cells, [sampler.outline_from, table.cells.shape[1] - 7 * finder.arm.count], axis=1)
+    tables = [QuinticTable(table.start, table.end, np.ascontiguousarray(cells)) for cells in parts]
+    return ArmTables(tables[0], tables[1], sampler.rows, max(p.reach for p in panels), tables[2])
 
 
 class _Panel(NamedTuple):
     values: FloatArray
-    states: FloatArray
     reach: float
 
 
@@ -231,7 +224,7 @@ def _panels(sampler: _Sampler, start: ArmPlace, way: float, rise: float) -> list
         states = np.array([p.y for p in places])
         speeds = states[:, 7 * sampler.arm.count : 10 * sampler.arm.count].reshape(len(places), -1, 3)
         reach = float(np.linalg.norm(speeds, axis=2).max())
-        found.append(_Panel(np.array(values)[ordered], states[ordered], reach))
+        found.append(_Panel(np.array(values)[ordered], reach))
     return found
 
 
@@ -274,7 +267,7 @@ class _Sampler:
         return float(self.arm.split(place.y).v[self.carrier, 2])
 
     def functions(self, place: ArmPlace) -> FloatArray:
-        """Return all functions, those of outputs last."""
+        """Return all functions, those of outputs and the posture last."""
         arm, free = self.arm, self._gravity_free
         kinematics = arm.kinematics(place.y)
         vectors = arm.pool.evaluate(kinematics)
@@ -290,7 +283,9 @@ class _Sampler:
         group = [moving, slope, -float(mass @ v[:, 2]), own, damping, lever, place_of_lift]
         outline = np.stack([s.r[free, 2], v[:, 2], bend[free, 2]], axis=1).ravel()
         carried = self._carrier(kinematics, place, spin)
-        return np.array([*group, *carried, *self._others(kinematics, vectors, spin), *outline])
+        return np.array(
+            [*group, *carried, *self._others(kinematics, vectors, spin), *outline, *place.y[: 7 * arm.count]]
+        )
 
     def _springs(self, kinematics: Kinematics, vectors: MovingVectors, spin: FloatArray) -> tuple[float, float, float]:
         """Return the generalised force of springs and drives, the damping, and the force per unit of what lifts."""

@@ -29,6 +29,7 @@ from models.pantograph.multibody.mechanism_definition import (
     Prismatic,
     Revolute,
     RevolutePrismatic,
+    SlideAndTurnFriction,
     SlidingFriction,
     TurningFriction,
 )
@@ -168,9 +169,11 @@ class HeadChain:
         for force in self.mechanism.definition.forces:
             if isinstance(force, LineForce) and {force.body_i, force.body_j} & set(self._head):
                 lines.append(self._line(force))
-            elif isinstance(force, SlidingFriction) and (found := self._link_of(force.joint)):
-                ends = [self.places[found.parent].slide, self.places[found.body].slide]
-                slides.append([*ends, force.force, force.transition])
+            elif isinstance(force, SlideAndTurnFriction):
+                slides += self._slide(force.sliding)
+                turns += [self._turn(force.turning)] if force.turning is not None else []
+            elif isinstance(force, SlidingFriction):
+                slides += self._slide(force)
             elif turn := self._turn(force):
                 turns.append(turn)
         return HeadRows(
@@ -262,6 +265,13 @@ class HeadChain:
 
     def _link_of(self, joint: str) -> Link | None:
         return next((link for link in self.reduction.head if link.joint.name == joint), None)
+
+    def _slide(self, f: SlidingFriction) -> list[list[float]]:
+        """Return the row of friction on a displacement, none if it is not in the head."""
+        link = self._link_of(f.joint)
+        if link is None:
+            return []
+        return [[self.places[link.parent].slide, self.places[link.body].slide, f.force, f.transition]]
 
     def _turn(self, f: Force) -> list[float]:
         """Return the row of a moment about the hinge, empty if the element is none in the head."""

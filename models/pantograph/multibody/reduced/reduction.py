@@ -30,6 +30,7 @@ from models.pantograph.multibody.mechanism_definition import (
     Prismatic,
     Revolute,
     RevolutePrismatic,
+    SlideAndTurnFriction,
     SlidingFriction,
     SpringDamper,
     TurningFriction,
@@ -51,10 +52,12 @@ _FORCES: Final = (
     AngleStop,
     SlidingFriction,
     TurningFriction,
+    SlideAndTurnFriction,
 )
 
-#: How many of `Drive`'s values the reduced form knows; what comes after them takes the general one.
-_KNOWN_INPUTS: Final = 3
+#: What of `Drive` the reduced form knows, or what does nothing where it is used; any other takes the general form.
+_KNOWN_INPUTS: Final = ("reference_rate", "air", "uplift", "lift", "train")
+_OTHER_INPUTS: Final = tuple(k for k, name in enumerate(Drive._fields) if name not in _KNOWN_INPUTS)
 
 
 class NotReducibleError(ValueError):
@@ -103,6 +106,9 @@ def unsuitable(definition: MechanismDefinition) -> str:
         return "the balance of energy is kept of the bodies (monitor_energy)"
     if definition.lift_input:
         return "its lift is an input (lift_input)"
+    profile = definition.speed_profile
+    if definition.use_train or (profile is not None and any(slope != 0.0 for *_, slope in profile.segments())):
+        return "its speed changes (speed_profile, use_train)"
     if definition.strip is None:
         return "there is no strip"
     for force in definition.forces:
@@ -113,11 +119,10 @@ def unsuitable(definition: MechanismDefinition) -> str:
 
 def unsuitable_drive(drive: Drive) -> str:
     """Return why what acts on a pantograph from outside takes the general form, empty if it does not."""
-    others = drive[_KNOWN_INPUTS:]
-    if others != NO_DRIVE[_KNOWN_INPUTS:]:
-        names = zip(Drive._fields[_KNOWN_INPUTS:], others, NO_DRIVE[_KNOWN_INPUTS:], strict=True)
-        return f"the inputs act that the reduced form does not know ({', '.join(n for n, a, b in names if a != b)})"
-    return ""
+    if drive is NO_DRIVE:
+        return ""
+    acting = [Drive._fields[k] for k in _OTHER_INPUTS if drive[k] != NO_DRIVE[k]]
+    return f"inputs act that the reduced form does not know ({', '.join(acting)})" if acting else ""
 
 
 def reduction_of(mechanism: Mechanism, standing: FloatArray) -> Reduction:
@@ -177,7 +182,7 @@ def _state_in(mechanism: Mechanism, y: FloatArray, part: Mechanism) -> FloatArra
 
 def _bodies(force: Force, joints: Iterable[Joint]) -> set[str]:
     """Return the bodies that a force acts between."""
-    if isinstance(force, SlidingFriction | TurningFriction):
+    if isinstance(force, SlidingFriction | TurningFriction | SlideAndTurnFriction):
         joint = next(j for j in joints if j.name == force.joint)
         return {joint.body_j, getattr(joint, "body_i", joint.body_j)}
     return {getattr(force, "body_i", ""), getattr(force, "body_j", "")}
@@ -242,6 +247,8 @@ def _check_forces(definition: MechanismDefinition, found: Reduction) -> None:
             raise NotReducibleError(f"force '{force.name}' acts between head and arm ({', '.join(sorted(bodies))})")
         if bodies & ends and isinstance(force, LiftingForce | LiftingMoment):
             raise NotReducibleError(f"force '{force.name}' lifts the head alone")
+        if isinstance(force, SlideAndTurnFriction) and not bodies & ends:
+            raise NotReducibleError(f"force '{force.name}' rubs in a joint of the arm that slides and turns")
 
 
 def is_still(values: FloatArray, tolerance: float = 1e-9) -> bool:

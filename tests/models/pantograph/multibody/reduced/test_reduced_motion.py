@@ -21,6 +21,7 @@ from models.pantograph.multibody.mechanism_definition import (
     Fixed,
     Prismatic,
     Revolute,
+    SlideAndTurnFriction,
     SlidingFriction,
     SpringDamper,
     TurningFriction,
@@ -99,6 +100,15 @@ def pitching_head():
     return replace(d, joints=joints, forces=(*d.forces, stop))
 
 
+def rubbing_head():
+    """The generic head, whose joint slides and turns, with friction of both."""
+    d = load_pantograph("generic_multibody")
+    friction = SlideAndTurnFriction(
+        name="f", joint="joint_8", force=9.0, slide_transition=0.1, moment=4.0, transition=0.3
+    )  # fmt: skip
+    return replace(d, forces=(*d.forces, friction))
+
+
 def reduced(definition):
     """The model about the working configuration, and the lift that balances it there."""
     mechanism = Mechanism(definition)
@@ -127,9 +137,9 @@ def random_states(model, rng, number):
         yield y
 
 
-@pytest.fixture(scope="module", params=[*LIBRARY, "with_everything", "pitching_head"])
+@pytest.fixture(scope="module", params=[*LIBRARY, "with_everything", "pitching_head", "rubbing_head"])
 def case(request):
-    own = {"with_everything": with_everything, "pitching_head": pitching_head}
+    own = {f.__name__: f for f in (with_everything, pitching_head, rubbing_head)}
     if request.param in own:
         definition = own[request.param]()
         return definition, *reduced_as_assembled(definition)

@@ -14,6 +14,7 @@ from models.pantograph.multibody.mechanism_definition import Bushing, SpringDamp
 from models.pantograph.multibody.reduced.reduced_motion import reduced_if_possible
 from models.pantograph.multibody.reduced.reduction import reduction_of, unsuitable_drive
 from models.pantograph.operation import NO_DRIVE, Drive
+from models.pantograph.train_motion import SpeedProfile
 
 
 def found(name):
@@ -75,6 +76,11 @@ def reasons():
     return {
         "general": (replace(d, formulation="general"), "the definition says so (formulation)"),
         "energy": (replace(d, monitor_energy=1), "the balance of energy is kept of the bodies (monitor_energy)"),
+        "train": (replace(d, use_train=1), "its speed changes (speed_profile, use_train)"),
+        "profile": (
+            replace(d, speed_profile=SpeedProfile(time=(0.0, 1.0), speed=(20.0, 30.0))),
+            "its speed changes (speed_profile, use_train)",
+        ),
         "lift": (replace(d, lift_input=1), "its lift is an input (lift_input)"),
         "across": (
             replace(d, forces=(*d.forces, across)),
@@ -98,8 +104,7 @@ def test_what_does_not_fit_stays_in_the_general_form_and_is_told_why(kind):
 
 def test_inputs_that_the_reduced_form_does_not_know_are_named():
     assert unsuitable_drive(NO_DRIVE) == ""
-    assert unsuitable_drive(Drive(air=3.0, uplift=20.0)) == ""
-    assert "(lift)" in unsuitable_drive(Drive(lift=1.0))
+    assert unsuitable_drive(Drive(air=3.0, uplift=20.0, lift=1.0, train=(3.0, 50.0))) == ""
     assert "(sway)" in unsuitable_drive(Drive(sway=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0)))
 
 

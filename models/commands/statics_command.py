@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from models.catenary.statics import rest_profile
-from models.commands import statics_plots
+from models.commands import route_plots, statics_plots
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import (
     check_folder,
@@ -62,6 +62,7 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
         ("non-uniformity of elasticity u [%]", f"{100.0 * e.non_uniformity:.1f}"),
         *_other_rows(result),
         *_arm_rows(result),
+        *result.verdicts,
         ("law by which droppers slacken", result.model.definition.dropper.slack_law),
         ("wave speed C [km/h]", f"{3.6 * w.speed:.1f}"),
         ("limit of operation 0.7 C [km/h]", f"{3.6 * w.limit:.1f}"),
@@ -72,18 +73,20 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
 
 
 def write(folder: Path, result: LineStatics) -> None:
-    """Write tables as CSV and plots as PNG."""
+    """Write tables as CSV and plots as PNG, the strip chart of the line as SVG too."""
     for name, (titles, columns) in result.tables.items():
         write_csv(folder / f"{name}.csv", titles, [column.astype(float) for column in columns])
     lines = [f'"{name}","{value}"' for name, value in summary(result)]
     write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
     plots = {
-        "profile": statics_plots.profile(result.profiles, result.droppers, result.span),
+        "span": statics_plots.span_profile(result.profiles, result.droppers, result.span),
         "elasticity": statics_plots.elasticity(result.elasticity, result.span),
         "droppers": statics_plots.droppers(result.span_droppers, result.span),
     }
     for name, figure in plots.items():
         write_figure(folder / f"{name}.png", figure, 150)
+    for ending in ("png", "svg"):
+        write_figure(folder / f"profile.{ending}", route_plots.profile(result), 150)
 
 
 _DROPPER_COLUMNS = ("x [m]", "from the support [m]", "unstrained length [m]", "tension [N]")

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLOURS: Final = {
+COLOURS: Final = {
     "contact_wire": "#c2571a",
     "messenger_wire": "#1f5fa8",
     "stitch_wire": "#2e7d4f",
     "auxiliary_wire": "#2e7d4f",
 }
-_GREY: Final = "#9aa0a6"
+GREY: Final = "#9aa0a6"
 
 
-def profile(profiles: Sequence[Profile], droppers: Droppers, span: Span) -> Figure:
+def span_profile(profiles: Sequence[Profile], droppers: Droppers, span: Span) -> Figure:
     """Line from anchor to anchor; one span with its droppers; its contact wire, magnified."""
     from matplotlib.figure import Figure
 
@@ -39,7 +39,7 @@ def profile(profiles: Sequence[Profile], droppers: Droppers, span: Span) -> Figu
     for p in profiles:
         if p.component == "contact_wire":
             inside = within(p, span)
-            contact.plot(p.x[inside], 1e3 * (p.z[inside] - p.z[inside].max()), color=_COLOURS[p.component])
+            contact.plot(p.x[inside], 1e3 * (p.z[inside] - p.z[inside].max()), color=COLOURS[p.component])
     contact.set_ylabel("contact wire [mm]\nbelow its highest point")
     for axes in (detail, contact):
         axes.set_xlim(span.start, span.end)
@@ -56,11 +56,11 @@ def elasticity(result: Elasticity, span: Span) -> Figure:
 
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     axes = figure.subplots()
-    axes.plot(result.x, 1e3 * result.value, color=_COLOURS["contact_wire"])
+    axes.plot(result.x, 1e3 * result.value, color=COLOURS["contact_wire"])
     for x in span.droppers:
-        axes.axvline(x, color=_GREY, linewidth=0.6)
+        axes.axvline(x, color=GREY, linewidth=0.6)
     for value, name, above in ((result.minimum, "minimum", -11), (result.maximum, "maximum", 3)):
-        axes.axhline(1e3 * value, color=_GREY, linewidth=0.6, linestyle="--")
+        axes.axhline(1e3 * value, color=GREY, linewidth=0.6, linestyle="--")
         label, place = f"{name} {1e3 * value:.3f}", (span.start, 1e3 * value)
         axes.annotate(label, place, xytext=(4, above), textcoords="offset points", fontsize=8)
     axes.set_ylim(0.0, 1.15e3 * result.maximum)
@@ -78,8 +78,8 @@ def droppers(result: Droppers, span: Span) -> Figure:
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     length, force = figure.subplots(2, 1, sharex=True)
     for chosen, name, colour in (
-        (~result.is_hanger, "droppers", _COLOURS["contact_wire"]),
-        (result.is_hanger, "hangers", _COLOURS["messenger_wire"]),
+        (~result.is_hanger, "droppers", COLOURS["contact_wire"]),
+        (result.is_hanger, "hangers", COLOURS["messenger_wire"]),
     ):
         if chosen.any():
             for axes, values in ((length, result.length), (force, result.force)):
@@ -98,7 +98,7 @@ def _wires(axes: Axes, profiles: Sequence[Profile]) -> None:
     for p in profiles:
         label = None if p.component in named else p.component.replace("_", " ")
         named.add(p.component)
-        axes.plot(p.x, p.z, color=_COLOURS[p.component], linewidth=1.0, label=label)
+        axes.plot(p.x, p.z, color=COLOURS[p.component], linewidth=1.0, label=label)
 
 
 def _hung(axes: Axes, profiles: Sequence[Profile], droppers: Droppers, span: Span) -> None:
@@ -109,4 +109,4 @@ def _hung(axes: Axes, profiles: Sequence[Profile], droppers: Droppers, span: Spa
         if span.start <= x <= span.end:
             wire = upper if hanger else lower
             end = float(np.interp(x, wire.x, wire.z))
-            axes.plot([x, x], [end, end - length if hanger else end + length], color=_GREY, linewidth=0.8)
+            axes.plot([x, x], [end, end - length if hanger else end + length], color=GREY, linewidth=0.8)

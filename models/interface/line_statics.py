@@ -16,10 +16,13 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics import elasticity as under_force
 from models.catenary.statics import rest_profile, wire_waves
+from models.catenary.statics.support_loads import SupportLoads, support_loads
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.interface.column_frames import column_frame
 from models.interface.line_and_pantograph import Line, open_line
+from models.interface.support_verdicts import support_verdicts
+from models.library.norm_tables import gradient_limits, support_limits
 
 if TYPE_CHECKING:
     import pandas
@@ -48,6 +51,10 @@ class LineStatics:
         ``x``, ``length`` [m], ``force`` [N], ``is_hanger`` of every dropper.
     arms : ArmLoads
         ``x`` [m], ``lateral``, ``lift`` [N] of every steady arm.
+    supports : SupportLoads
+        ``x``, ``height`` [m], ``lateral`` [N] (left > 0), ``gradient`` and more of every support between the anchors.
+    verdicts : tuple of (str, str)
+        What norms say of supports, droppers and gradients.
     elasticity : Elasticity
         ``x`` [m], ``value`` [m/N] along the span, ``minimum``, ``maximum``, ``non_uniformity``.
     others : dict
@@ -65,6 +72,8 @@ class LineStatics:
     profiles: tuple[rest_profile.Profile, ...]
     droppers: rest_profile.Droppers
     arms: rest_profile.ArmLoads
+    supports: SupportLoads
+    verdicts: tuple[tuple[str, str], ...]
     elasticity: under_force.Elasticity
     others: dict[int, tuple[int, under_force.Elasticity]]
     waves: wire_waves.Waves
@@ -80,7 +89,7 @@ class LineStatics:
 
     @property
     def tables(self) -> dict[str, Table]:
-        """Titles and columns by name: ``droppers``, ``elasticity``, ``steady_arms``, and every kind of wire."""
+        """Columns by name: ``droppers``, ``elasticity``, ``steady_arms``, ``supports``, and every kind of wire."""
         d, a = self.droppers, self.arms
         all_sections = {self.section: self.elasticity} | {section: other for section, (_, other) in self.others.items()}
         parts = [(np.full_like(e.x, section + 1), e.x, 1e3 * e.value) for section, e in sorted(all_sections.items())]
@@ -90,6 +99,7 @@ class LineStatics:
             "elasticity": (("section", "x [m]", "elasticity [mm/N]"), _joined(parts)),
             "steady_arms": (("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift)),
         }
+        found["supports"] = _support_table(self.supports)
         for component in dict.fromkeys(p.component for p in self.profiles):
             same = [(p.x, p.y, p.z) for p in self.profiles if p.component == component]  # stitch wires one by one
             found[component] = (("x [m]", "y [m]", "z [m]"), _joined(same))
@@ -194,14 +204,18 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         line_advice.slack_law_warning(definition),
         line_advice.track_warning(definition),
     )
+    hung = rest_profile.droppers(model, section=index)
+    supports = support_loads(model, index)
     return LineStatics(
         model=model,
         section=index,
         number=number,
         span=chosen,
         profiles=rest_profile.profiles(model, index),
-        droppers=rest_profile.droppers(model, section=index),
+        droppers=hung,
         arms=rest_profile.arm_loads(model, index),
+        supports=supports,
+        verdicts=tuple(support_verdicts(supports, hung, support_limits(), gradient_limits(), speed)),
         elasticity=_elasticity(model, index, number, force),
         others={
             other: (middle := (len(s.spans) + 1) // 2, _elasticity(model, other, middle, force))
@@ -211,6 +225,23 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         waves=wire_waves.waves(definition, speed, chosen.length),
         warnings=tuple(filter(None, warnings)),
     )
+
+
+def _support_table(s: SupportLoads) -> Table:
+    columns = {
+        "x [m]": s.x,
+        "contact wire height [m]": s.height,
+        "encumbrance [m]": s.encumbrance,
+        "stagger [m]": s.stagger,
+        "side of the arm [1: left]": s.side,
+        "lateral force on the wire [N]": s.lateral,
+        "lift [N]": s.lift,
+        "N [N]": s.tension,
+        "N/l [N/m]": s.pendulum,
+        "gradient to the next [permil]": 1e3 * s.gradient,
+        "change of gradient [permil]": 1e3 * s.change,
+    }
+    return tuple(columns), tuple(columns.values())
 
 
 def _elasticity(model: CatenaryModel, section: int, number: int, force: float) -> under_force.Elasticity:

@@ -1,0 +1,61 @@
+"""Limits by norms, read from `norms/*.toml`: gradients of the contact wire, loads of supports."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+
+from models.definition_files.field_schema import quantity, read, series, text
+from models.definition_files.toml_reader import Table
+from models.library.search_path import LIBRARY
+
+
+@dataclass(frozen=True, kw_only=True)
+class GradientLimits:
+    """How steep a contact wire may be by the speed of the line, in one norm."""
+
+    name: str = text()
+    speeds: tuple[float, ...] = series("m/s", "speed up to which a row holds", minimum=0.0)
+    gradients: tuple[float, ...] = series("1", "largest gradient in a row", minimum=0.0, maximum=1.0)
+    faster: float = quantity("1", "largest gradient beyond the last row", minimum=0.0, maximum=1.0)
+    change: float = quantity("1", "of the gradient, what its change at a support may be", minimum=0.0, maximum=2.0)
+
+    def at(self, speed: float) -> float:
+        """Return the largest gradient at a speed [m/s]; between rows that of the next faster one.
+
+        Examples
+        --------
+        >>> limits = GradientLimits(name="n", speeds=(20.0, 30.0), gradients=(0.02, 0.01), faster=0.0, change=0.5)
+        >>> limits.at(20.0), limits.at(21.0), limits.at(31.0)
+        (0.02, 0.01, 0.0)
+        """
+        # A speed in km/h is the row's own up to rounding.
+        row = bisect_left(self.speeds, speed * (1.0 - 1e-9))
+        return self.gradients[row] if row < len(self.speeds) else self.faster
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupportLimits:
+    """Loads of steady arms, lengths of droppers."""
+
+    largest_lateral: float = quantity("N", "lateral load of a standard arm", positive=True)
+    largest_with_proof: float = quantity("N", "lateral load of an arm with a proof", positive=True)
+    smallest_lateral: float = quantity("N", "lateral load below which an arm comes loose", default=math.nan)
+    shortest_dropper: float = quantity("m", "length of a dropper", positive=True)
+
+
+def gradient_limits() -> tuple[GradientLimits, ...]:
+    """Return the limits of gradients of every norm."""
+    whole = Table.load(LIBRARY / "norms" / "gradient.toml")
+    found = tuple(read(GradientLimits, table) for table in whole.tables("table"))
+    whole.finish()
+    return found
+
+
+def support_limits() -> SupportLimits:
+    """Return the limits of arms and droppers."""
+    whole = Table.load(LIBRARY / "norms" / "supports.toml")
+    found = read(SupportLimits, whole)
+    whole.finish()
+    return found

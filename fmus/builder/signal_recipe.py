@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ import numpy as np
 from fmus.builder.recipe import BuildError, Recipe
 from models.definition_files.message_text import hint
 from models.numerics.sampled_signal import HELD, LINEAR
-from models.signals.signal_definition import TABLE_FILE, Kind, Output, definition_text
+from models.signals.signal_definition import NUMBERS, TABLE_FILE, Kind, Output, definition_text
 from models.signals.signal_reading import SignalFileError, SignalTable, read_signals
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
@@ -66,8 +65,7 @@ def signal_recipe(wanted: SignalRequest) -> Recipe:
     title = f"Signals from {wanted.file.name}"
     columns = dict(zip(table.names, table.units, strict=True))
     text = definition_text(name, title, wanted.interpolation, wanted.repeats, columns, outputs)
-    data = io.BytesIO()
-    np.save(data, np.column_stack([table.time, table.values]), allow_pickle=False)
+    data = np.column_stack([table.time, table.values]).astype(NUMBERS).tobytes()
     return Recipe(
         f"Signal_{name}",
         title,
@@ -75,7 +73,7 @@ def signal_recipe(wanted: SignalRequest) -> Recipe:
         "SignalSlave",
         wanted.file,
         text=text.encode(),
-        resources={TABLE_FILE: data.getvalue()},
+        resources={TABLE_FILE: data},
     )
 
 

@@ -16,8 +16,9 @@ from models.definition_files.parameter import Parameter, ParameterError
 from models.definition_files.toml_reader import Table
 from models.numerics.sampled_signal import INTERPOLATIONS, SampledSignal
 
-#: The table itself, beside the definition: times in the first column.
-TABLE_FILE: Final = "signal.npy"
+#: The table itself, beside the definition: its rows one after the other, times first.
+TABLE_FILE: Final = "signal.f64"
+NUMBERS: Final = "<f8"
 _CHOICE: Final = "choice: as in the file"
 _SHIFT: Final = "time_shift"
 _LARGEST: Final = 1e9
@@ -127,7 +128,8 @@ def load_signals(path: Path) -> SignalDefinition:
         for t in table.tables("made")
     ]
     table.finish()
-    rows = np.load(path.with_name(TABLE_FILE), allow_pickle=False)
+    numbers = np.frombuffer(path.with_name(TABLE_FILE).read_bytes(), NUMBERS)
+    rows = numbers.reshape(-1, 1 + len(columns)).astype(np.float64)
     outputs = (
         *(Output(n, u, k, "value") for k, (n, u) in enumerate(columns)),
         *(Output(n, u, names.index(of), kinds[kind]) for n, u, of, kind in made),

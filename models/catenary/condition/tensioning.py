@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition, Section, Wire
-from models.catenary.definition.tensioning_definition import Tensioning, TensioningDevice
+from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState
 
@@ -190,6 +190,11 @@ def _section(design: StaticState, section: Section, index: int) -> list[WireTens
     ends = np.array([section.spans[0].start, *(span.end for span in section.spans)])
     fixed = tensioning.fixed_point
     fixed_point = 0.5 * (ends[0] + ends[-1]) if fixed is None else fixed
+    if not ends[0] <= fixed_point <= ends[-1]:
+        raise EquilibriumError(
+            f"line '{definition.name}': tensioning.fixed_point, {fixed_point:g} m, lies outside the line, "
+            f"{ends[0]:g} ... {ends[-1]:g} m"
+        )
     half = max(ends[-1] - fixed_point, fixed_point - ends[0])
     devices = {name: _device(design, name, section, index, half) for name in WIRES if getattr(definition, name)}
     distance = np.abs(ends[1:-1] - fixed_point)
@@ -218,10 +223,12 @@ def _device(design: StaticState, name: str, section: Section, index: int, half: 
     """Return the tension that the device of a wire gives [N], and the strain by which the wire moves outward."""
     definition = design.shape.definition
     tensioning, wire = _tensioning(definition), getattr(definition, name)
-    device: TensioningDevice = getattr(tensioning, name)
+    device = tensioning.of(name)
     expansion = device.expansion * tensioning.warming
     if device.kind == "weights":
         return wire.tension * device.efficiency**tensioning.direction, expansion
+    if not expansion:
+        return wire.tension, 0.0
     EA = wire.youngs_modulus * wire.area
     spring = math.inf if device.stiffness is None else device.stiffness * half
     span = ruling_span([s.length for s in section.spans])
@@ -267,7 +274,7 @@ def _losses(design: StaticState, index: int, ends: FloatArray, moved: dict[str, 
         lost[lower] += slant
         lost[upper] -= slant
     for name in moved:
-        if getattr(tensioning, name).kind == "fixed":
+        if tensioning.of(name).kind == "fixed":
             lost[name] = np.zeros(len(ends) - 2)
     return lost
 

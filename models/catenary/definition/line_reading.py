@@ -11,7 +11,6 @@ from pathlib import Path
 from models.catenary.definition.condition_definition import Fault
 from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition, Section
 from models.catenary.definition.section_reading import read_section
-from models.catenary.definition.tensioning_definition import TensioningDevice
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
 
@@ -108,7 +107,7 @@ def _check_tensioning(table: Table, definition: CatenaryDefinition) -> None:
             "tensioning", "a line that closes on itself has no ends that devices could hold: remove the table"
         )
         return
-    if tensioning.auxiliary_wire != TensioningDevice() and definition.auxiliary_wire is None:
+    if tensioning.auxiliary_wire is not None and definition.auxiliary_wire is None:
         table.problem("tensioning.auxiliary_wire", "the line has no auxiliary wire: remove this table")
     supports = [len(section.inner_supports) for section in sections]
     given = len(tensioning.mast_side)

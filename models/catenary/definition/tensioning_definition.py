@@ -69,7 +69,12 @@ class Tensioning:
     )  # fmt: skip
     contact_wire: TensioningDevice = part(TensioningDevice, default=TensioningDevice())
     messenger_wire: TensioningDevice = part(TensioningDevice, default=TensioningDevice())
-    auxiliary_wire: TensioningDevice = part(TensioningDevice, default=TensioningDevice())
+    auxiliary_wire: TensioningDevice | None = part(TensioningDevice, default=None)
+
+    def of(self, component: str) -> TensioningDevice:
+        """Return the device of a kind of wire."""
+        device: TensioningDevice | None = getattr(self, component)
+        return device or TensioningDevice()
 
     @property
     def warming(self) -> float:

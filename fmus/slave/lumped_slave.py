@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray
-from models.pantograph.lumped.lumped_advice import working_height_warning
+from models.pantograph.lumped.lumped_advice import idle_values, working_height_warning
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, load_lumped
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from models.pantograph.operation import Drive
@@ -74,6 +74,7 @@ class LumpedPantographSlave(Adapter[LumpedDefinition, LumpedPantographPart]):
 
     def _start_warnings(self, part: LumpedPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield working_height_warning(part.definition, float(inputs[1]), float(inputs[3]))
+        yield idle_values(part.definition)
         yield acceleration_warning(part.definition.speed_profile)
 
     def _told(self, part: LumpedPantographPart) -> list[str]:

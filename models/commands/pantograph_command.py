@@ -17,6 +17,7 @@ from models.commands.physics_options import check_folder, new_folder, print_tabl
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import doubts, load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
+from models.pantograph.lumped.lumped_advice import idle_values
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
 from models.pantograph.multibody.mechanism_advice import inertia_warning
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
 
 #: Significant digits of the tables: all that a double has.
 _DIGITS: Final = 17
+#: Speed at which the strip goes up and down against its wire [m/s].
+_SLOW: Final = 0.05
+#: Columns of what comes of that.
+LOOP: Final = ("strip height [m]", "force up [N]", "force down [N]", "mean [N]", "half difference [N]")
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,8 @@ class Characteristics:
     frequency : ndarray, shape (f,)
     apparent_mass : ndarray of complex, shape (f,)
         [kg]
+    up_and_down : ndarray, shape (h, 5)
+        See `LOOP`.
     """
 
     title: str
@@ -53,6 +60,7 @@ class Characteristics:
     modes: tuple[tuple[float, float, str, str], ...]
     frequency: FloatArray
     apparent_mass: npt.NDArray[np.complex128]
+    up_and_down: FloatArray
     freedom: int = 0
 
 
@@ -72,6 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         result.static_columns,
         ([f"{v:.3f}" if i == 0 else f"{round(v, 2) + 0.0:.2f}" for i, v in enumerate(row)] for row in result.statics),
     )
+    _print_loop(result.up_and_down, arguments.limit)
     freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
     print_table(
         f"Modes, strip free{freedom}", ("frequency [Hz]", "damping [%]", "motion", "remark"), _mode_rows(result)
@@ -85,6 +94,18 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _print_loop(loop: FloatArray, limit: float | None) -> None:
+    if not len(loop):
+        return
+    rows = ([f"{row[0]:.3f}", *(f"{round(v, 2) + 0.0:.2f}" for v in row[1:])] for row in loop)
+    print_table(f"Static force with the strip moved up and down at {_SLOW:g} m/s", LOOP, rows)
+    if limit is not None:
+        worst = int(np.argmax(loop[:, 4]))
+        verdict = "within" if loop[worst, 4] <= limit else "beyond"
+        found = f"{loop[worst, 4]:.2f} N at {loop[worst, 0]:.3f} m"
+        print(f"largest half difference {found}: {verdict} the limit of {limit:g} N")
+
+
 def write(folder: Path, result: Characteristics) -> None:
     """Write statics and response as CSV and the plots as PNG."""
     write_csv(folder / "statics.csv", result.static_columns, list(result.statics.T), _DIGITS)
@@ -93,6 +114,9 @@ def write(folder: Path, result: Characteristics) -> None:
     write_csv(folder / "apparent_mass.csv", names, response, _DIGITS)
     write_figure(folder / "apparent_mass.png", _plot_response(result), 120)
     write_figure(folder / "statics.png", _plot_statics(result), 120)
+    if len(result.up_and_down):
+        write_csv(folder / "static_force_up_down.csv", LOOP, list(result.up_and_down.T), _DIGITS)
+        write_figure(folder / "static_force_up_down.png", _plot_loop(result), 120)
 
 
 def _heights(arguments: argparse.Namespace, reference: float) -> FloatArray:
@@ -109,6 +133,11 @@ def _frequencies() -> FloatArray:
 def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Characteristics:
     heights = _heights(arguments, definition.reference_height)
     frequency = _frequencies()
+    warn([idle_values(definition)])
+    if definition.follow_height:
+        limit = lumped.alike_from(definition)
+        text = "the apparent mass has the modulus of the spring on the roof within 2 %"
+        print(f"follow_height = 1: from {limit:.2f} Hz on {text}")
     return Characteristics(
         definition.title,
         ("strip height [m]", "contact force [N]"),
@@ -116,13 +145,15 @@ def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Char
         tuple((m.frequency, m.damping, "", "") for m in lumped.modes(definition)),
         frequency,
         lumped.apparent_mass(definition, frequency),
+        _loop(lumped.up_and_down(definition, heights, _SLOW)),
     )
 
 
 def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -> Characteristics:
     rig = Rig(definition)
     reference = definition.reference_height
-    statics = rig.statics(_heights(arguments, reference), arguments.force)
+    heights = _heights(arguments, reference)
+    statics = rig.statics(heights, arguments.force)
     height = arguments.height if arguments.height is not None else reference
     dynamics = rig.dynamics(height, _frequencies(), arguments.force)
     warn([inertia_warning(definition), rig.warning(arguments.force)])
@@ -141,8 +172,15 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         tuple((m.frequency, m.damping, m.name, m.remark) for m in dynamics.motions if m.eigenvalue.imag >= 0.0),
         dynamics.frequency,
         dynamics.apparent_mass,
+        _loop(rig.up_and_down(heights, _SLOW)),
         rig.freedom,
     )
+
+
+def _loop(moved: FloatArray) -> FloatArray:
+    """Add mean and half difference to heights and forces up and down."""
+    up, down = moved[:, 1], moved[:, 2]
+    return np.column_stack([moved, 0.5 * (up + down), 0.5 * (down - up)])
 
 
 def friction_warning(
@@ -207,6 +245,22 @@ def _plot_response(result: Characteristics) -> Figure:
     for axes in (upper, lower):
         axes.grid(visible=True, alpha=0.4)
     figure.suptitle(result.title)
+    return figure
+
+
+def _plot_loop(result: Characteristics) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    axes = figure.subplots()
+    height, up, down, mean, _ = result.up_and_down.T
+    for values, label in ((up, "strip goes up"), (down, "strip goes down"), (mean, "mean")):
+        axes.plot(height, values, label=label, linestyle="--" if label == "mean" else "-")
+    axes.set_xlabel("strip height [m]")
+    axes.set_ylabel("contact force [N]")
+    axes.grid(visible=True, alpha=0.4)
+    axes.legend()
+    figure.suptitle(f"{result.title}: static force at {_SLOW:g} m/s")
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 #: How long a pantograph must have been back before another excursion is told [s] (choice: what rebounds is one).
@@ -32,19 +33,24 @@ class Excursions:
         self.told: list[str] = []
         self._last: dict[str, float] = {}
 
+    def start(self) -> None:
+        """Begin a run: nothing is beyond its limit, nothing told."""
+        self.told.clear()
+        self._last.clear()
+
     def is_new(self, name: str, time: float) -> bool:
         """Note that a limit of some name is passed at a time [s]; return whether that begins another excursion."""
         last = self._last.get(name)
         self._last[name] = time
         return last is None or not last <= time + _BACK or time - last > _BACK
 
-    def touch(self, stop: str, place: Place, *, has_met: bool, is_loaded: bool, is_neutral: bool) -> None:
-        """Note that a stop is touched.
+    def touch(self, stops: Sequence[str], place: Place, *, has_met: bool, is_loaded: bool, is_neutral: bool) -> None:
+        """Note that stops are touched.
 
         Parameters
         ----------
-        stop : str
-            Its name, and which end.
+        stops : sequence of str
+            Their names, and which end.
         place : Place
             Of the strip.
         has_met : bool
@@ -54,9 +60,11 @@ class Excursions:
         is_neutral : bool
             Whether without one it rests nowhere by itself.
         """
-        if not self.is_new(stop, place.time):
+        new = [stop for stop in stops if self.is_new(stop, place.time)]
+        if not new:
             return
-        text = f"{place}: the pantograph is at its stop, {stop}, the strip at {place.z:.3f} m"
+        listed = f"stop{'s' if len(new) > 1 else ''}, {' and '.join(new)}"
+        text = f"{place}: the pantograph is at its {listed}, the strip at {place.z:.3f} m"
         if not is_loaded and not has_met:
             text += "; it has met no wire on the way"
         elif not is_loaded and is_neutral:

@@ -19,8 +19,6 @@ from models.arrays import ComplexArray, FloatArray
 
 #: Below this step per time constant the series is the better formula.
 _SHORT: Final = 1e-3
-#: Change of the link's stiffness that counts as none.
-_SAME: Final = 0.02
 
 
 class FollowingReference(NamedTuple):
@@ -105,11 +103,3 @@ def link_stiffness(frequency: FloatArray, stiffness: float, damping: float, time
     s = 2j * np.pi * np.asarray(frequency)
     link: ComplexArray = stiffness * s * time / (1.0 + s * time) + damping * s
     return link
-
-
-def same_from(stiffness: float, damping: float, time: float) -> float:
-    """Return the frequency from which the link's modulus is that of the spring on the roof within 2 % [Hz]."""
-    frequency = np.geomspace(0.01, 100.0, 4001)
-    fixed = np.abs(stiffness + 2j * np.pi * frequency * damping)
-    differs = np.abs(np.abs(link_stiffness(frequency, stiffness, damping, time)) / fixed - 1.0) > _SAME
-    return float(frequency[np.flatnonzero(differs)[-1]]) if differs.any() else 0.0

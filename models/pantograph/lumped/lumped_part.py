@@ -97,6 +97,9 @@ class LumpedPantographPart:
         del point
         self.time = self._start_time = time
         self._roof = float(base[0])
+        self._has_met = False
+        if self._excursions is not None:
+            self._excursions.start()
         self.state.reference = self.definition.rise - self._roof
         self._train.begin(time, drive.train)
         load = self.model.load(0.0, base) + self._drive_loads(drive.air, drive.uplift, self._train.at(time).speed)
@@ -272,10 +275,9 @@ class LumpedPantographPart:
             return
         self._has_met |= force > 0.0
         x, height = self.outputs.item(0), self.outputs.item(2)
-        for name in self._held.touched():
-            place = Place(self.time, x, height)
-            follows = self.model.follows
-            self._excursions.touch(name, place, has_met=self._has_met, is_loaded=force > 0.0, is_neutral=follows)
+        if touched := self._held.touched():
+            place, follows = Place(self.time, x, height), self.model.follows
+            self._excursions.touch(touched, place, has_met=self._has_met, is_loaded=force > 0.0, is_neutral=follows)
         self._excursions.check_contact(force, Place(self.time, x, point.item(2)), *self._range)
 
     def _place(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from models.arrays import ComplexArray, FloatArray
 from models.pantograph.lumped.following_reference import link_stiffness
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel
+
+#: Change of a modulus that counts as none.
+_ALIKE: Final = 0.02
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,37 @@ def contact_force_over_height(definition: LumpedDefinition, heights: FloatArray)
     free_rise = flexibility[-1, 0] * definition.static_force
     result: FloatArray = (free_rise - (heights - definition.reference_height)) / flexibility[-1, -1]
     return result
+
+
+def up_and_down(definition: LumpedDefinition, heights: FloatArray, speed: float) -> FloatArray:
+    """Return strip heights [m] and the forces with which the strip presses as it goes up and down through them [N].
+
+    All masses move alike, slowly and for long, so that of dampers and friction those against the roof count, and a
+    reference that follows lags by speed times time constant.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (h,)
+    speed : float
+        [m/s]
+
+    Returns
+    -------
+    ndarray, shape (h, 3)
+    """
+    lowest = definition.stage[0]
+    lag = lowest.stiffness * definition.reference_time if definition.follow_height else 0.0
+    against = lowest.friction + (lowest.damping + lag) * speed
+    force = contact_force_over_height(definition, heights)
+    return np.stack([heights, force - against, force + against], axis=1)
+
+
+def alike_from(definition: LumpedDefinition) -> float:
+    """Return the frequency from which a following reference changes the strip's apparent mass by less than 2 % [Hz]."""
+    frequency = np.geomspace(0.01, 100.0, 4001)
+    fixed, following = (apparent_mass(definition.with_values({"follow_height": k}), frequency) for k in (0, 1))
+    differs = np.abs(np.abs(following) / np.abs(fixed) - 1.0) > _ALIKE
+    return float(frequency[np.flatnonzero(differs)[-1]]) if differs.any() else 0.0
 
 
 def modes(definition: LumpedDefinition) -> tuple[LumpedMode, ...]:

@@ -428,7 +428,42 @@ class TurningFriction(Force):
         return self.moment
 
 
-JointFriction = SlidingFriction | TurningFriction
+@dataclass(frozen=True, kw_only=True)
+class SlideAndTurnFriction(Force):
+    """Dry friction in a joint that slides and turns: a force against the slide and, if given, a moment besides."""
+
+    joint: str = text()
+    force: float = quantity("N", "{name}: friction force", **_FRICTION)
+    slide_transition: float = quantity("m/s", "{name}: speed of transition of the slide", **_TRANSITION)
+    moment: float = quantity("N.m", "{name}: friction moment", default=0.0, **_FRICTION)
+    transition: float | None = quantity("rad/s", "{name}: speed of transition", default=None, **_TRANSITION)
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield what is missing beside a moment, or means nothing without one."""
+        if self.moment > 0.0 and self.transition is None:
+            yield "transition", "is missing: the speed in rad/s at which 76 % of the moment act"
+        elif self.transition is not None and self.moment == 0.0:
+            yield "transition", "does nothing without a 'moment'; the slide has its 'slide_transition'"
+
+    @property
+    def level(self) -> float:
+        """Friction at speed [N], 0 if there is none at all."""
+        return self.force or self.moment
+
+    @property
+    def sliding(self) -> SlidingFriction:
+        """The part of the slide."""
+        return SlidingFriction(name=self.name, joint=self.joint, force=self.force, transition=self.slide_transition)
+
+    @property
+    def turning(self) -> TurningFriction | None:
+        """The part of the turn, None if there is none."""
+        if self.transition is None:
+            return None
+        return TurningFriction(name=self.name, joint=self.joint, moment=self.moment, transition=self.transition)
+
+
+JointFriction = SlidingFriction | TurningFriction | SlideAndTurnFriction
 
 
 def _spring(table: Table) -> type[Force]:
@@ -446,6 +481,8 @@ def _moment(table: Table) -> type[Force]:
 
 
 def _friction(table: Table) -> type[Force]:
+    if table.has("slide_transition"):
+        return SlideAndTurnFriction
     return SlidingFriction if table.has("force") else TurningFriction
 
 

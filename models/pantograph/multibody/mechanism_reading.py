@@ -16,6 +16,9 @@ from models.pantograph.multibody.mechanism_definition import (
     PairJoint,
     Prismatic,
     Revolute,
+    RevolutePrismatic,
+    SlideAndTurnFriction,
+    SlidingFriction,
     Spherical,
     Universal,
 )
@@ -84,5 +87,11 @@ def _check_friction(table: Table, d: MechanismDefinition) -> None:
                 f"force.{f.name}.joint",
                 f"there is no joint '{f.joint}' (joints: {', '.join(joints)}){hint(f.joint, joints)}",
             )
-        elif not isinstance(joint, Revolute | Spherical | Prismatic | Universal):
+        elif not isinstance(joint, Revolute | Spherical | Prismatic | Universal | RevolutePrismatic):
             table.problem(f"force.{f.name}.joint", f"a {joint.kind} joint takes no friction")
+        elif isinstance(joint, RevolutePrismatic) and isinstance(f, SlidingFriction):
+            text = f"that of the slide of a {joint.kind} joint is 'slide_transition'"
+            table.problem(f"force.{f.name}.transition", text)
+        elif isinstance(f, SlideAndTurnFriction) and not isinstance(joint, RevolutePrismatic):
+            text = f"is for a {RevolutePrismatic.kind} joint; '{f.joint}' is {joint.kind}: write 'transition'"
+            table.problem(f"force.{f.name}.slide_transition", text)

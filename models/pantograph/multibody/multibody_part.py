@@ -9,6 +9,7 @@ import numpy as np
 from models.arrays import FloatArray, Snapshot
 from models.numerics.energy_ledger import NO_BALANCE
 from models.numerics.extrapolation import ForceExtrapolation, lead_of
+from models.pantograph.excursions import Place
 from models.pantograph.multibody.analysis.cam_design import fit_force
 from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation, SwayMotion
@@ -18,6 +19,7 @@ from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
+from models.pantograph.multibody.range_watch import RangeWatch
 from models.pantograph.multibody.step_memory import (
     LastEvaluation,
     beyond_response,
@@ -47,6 +49,8 @@ class MultibodyPantographPart:
         End A (left), B (right); position, velocity; x, y, z.
     observed : tuple of (name, unit, description)
         What ``observation_values`` gives.
+    told : list of str
+        What the user should know of the steps so far; whoever fetches it empties it.
     """
 
     def __init__(self, definition: MechanismDefinition) -> None:
@@ -54,13 +58,13 @@ class MultibodyPantographPart:
         self.observed = _observed(definition)
         self.time = 0.0
         self.strip = np.zeros((2, 2, 3))
+        self.told: list[str] = []
         self._start_time = 0.0
         self._force = ForceExtrapolation(definition.extrapolation_order)
         self._lateral = LateralExtrapolation()
         self._base = BaseMotion()
         self._sway = SwayMotion()
         self._train = definition.train_motion()
-        self.told: list[str] = []
         self._drive = NO_DRIVE
         self._y = np.zeros(0)
         self._last: LastEvaluation | None = None
@@ -95,6 +99,8 @@ class MultibodyPantographPart:
         """
         built = self._ready()
         self._take(drive)
+        if built.watch is not None:
+            built.watch.start()
         self.time = self._start_time = time
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
@@ -131,6 +137,7 @@ class MultibodyPantographPart:
             If the motion becomes singular.
         """
         built = self._ready()
+        self._look(built, force, point)
         values = (force, *point.tolist(), *base.tolist(), *drive.sway, *drive.train, *drive[1:4])
         if not all(map(math.isfinite, values)):
             raise MechanismError(f"{self.definition.name}: an input at {self.time:.6g} s is not a number: {values}")
@@ -154,6 +161,16 @@ class MultibodyPantographPart:
         self._sway.finish(step)
         self.time += step
         self._remember(done.evaluation, inputs)
+
+    def _look(self, built: _Built, force: float, point: FloatArray) -> None:
+        """Note stops that are touched and ranges that are left as a step begins."""
+        watch = built.watch
+        if watch is None or not watch.is_due(self.time, force):
+            return
+        x, z = (0.5 * (self.strip.item(k) + self.strip.item(6 + k)) for k in (0, 2))
+        watch.look(self._y, Place(self.time, x, z), force, point.item(2))
+        self.told += watch.told
+        watch.told.clear()
 
     @property
     def energy(self) -> FloatArray:
@@ -346,6 +363,7 @@ class _Built:
         self.reference = posture.reference
         self.balance = posture.start.lift
         self.base_height = posture.base_height
+        self.watch = RangeWatch.over(self.mechanism, self.standing, self.base_height)
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 
 

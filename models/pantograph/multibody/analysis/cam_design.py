@@ -6,6 +6,7 @@ and F M_1(theta) for a force F on the strip, M_1 being the strip's rise per thet
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,8 @@ from models.pantograph.multibody.mechanism_definition import AngleStop, CamTable
 _POINTS: Final = 41
 #: Step on the way to the ends of a working range that no stop gives: of angles [rad], of lengths [m].
 _STEP: Final = {True: np.radians(1.0), False: 0.005}
+#: Longest way from one equilibrium to the next [rad or m].
+_STAGE: Final = 0.1
 #: Rise of the strip per angle below which the arms are at a dead centre [m/rad]; per length [1].
 _DEAD: Final = 0.05
 #: Force for which M_1 is found if none is set [N].
@@ -120,6 +123,21 @@ def _held(mechanism: Mechanism, place: float, start: FloatArray, force: float, l
     return equilibrium_where(
         mechanism, lambda y: where.at(mechanism.kinematics(y)) - place, start, contact_force=force, lift=lift
     )
+
+
+def strip_height_where(mechanism: Mechanism, standing: FloatArray, place: float) -> float:
+    """Return the strip's height above the base where the lifting element is at a place [m], with nothing on the strip.
+
+    Raises
+    ------
+    MechanismError
+        If there is no equilibrium.
+    """
+    now, y = _now(mechanism, standing), standing
+    stages = max(1, math.ceil(abs(place - now) / _STAGE))
+    for k in range(1, stages + 1):
+        y = _held(mechanism, now + (place - now) * k / stages, y, 0.0, 0.0).y
+    return mechanism.strip_height(y)
 
 
 def reach(mechanism: Mechanism, standing: FloatArray, way: float) -> tuple[float, float]:

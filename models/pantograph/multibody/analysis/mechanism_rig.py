@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.arrays import ComplexArray, FloatArray
+from models.pantograph.multibody.analysis.force_loop import moved_forces
 from models.pantograph.multibody.analysis.linearisation import (
     Mode,
     apparent_mass,
@@ -88,6 +90,8 @@ class Rig:
     ----------
     base_height : float
         Of the base's origin above top of rail [m].
+    reference : ndarray, shape (13 n,)
+        State with the strip at the reference height.
 
     Raises
     ------
@@ -99,17 +103,17 @@ class Rig:
         self.definition = definition
         self.mechanism = Mechanism(definition)
         posture = take_posture(self.mechanism)
-        self._start = posture.reference
+        self.reference = posture.reference
         self.base_height = posture.base_height
 
     @property
     def freedom(self) -> int:
         """Number of independent motions that the joints allow."""
-        return degrees_of_freedom(self.mechanism, self._start)
+        return degrees_of_freedom(self.mechanism, self.reference)
 
     def warning(self, contact_force: float) -> str:
         """Say so if there are motions too many, or some that grow, under a contact force [N]; empty if not."""
-        return freedom_warning(self.mechanism, self._start, contact_force)
+        return freedom_warning(self.mechanism, self.reference, contact_force)
 
     @property
     def lift_unit(self) -> str:
@@ -118,9 +122,7 @@ class Rig:
 
     def statics(self, heights: FloatArray, contact_force: float = 157.5) -> Statics:
         """Return the statics at strip heights above top of rail [m], going up and down from the reference height."""
-        reference = self.definition.reference_height
-        up = sorted(h for h in heights.tolist() if h >= reference)
-        down = sorted((h for h in heights.tolist() if h < reference), reverse=True)
+        up, down = self._outwards(heights)
         rows = sorted(self._sweep(up, contact_force) + self._sweep(down, contact_force))
         columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
         return Statics(columns[0], columns[1], columns[2], columns[3])
@@ -128,7 +130,7 @@ class Rig:
     def _sweep(self, heights: list[float], contact_force: float) -> list[tuple[float, float, float, float]]:
         """Solve height after height until one is out of reach."""
         rows = []
-        y = self._start
+        y = self.reference
         for height in heights:
             above = height - self.base_height
             try:
@@ -140,6 +142,37 @@ class Rig:
             rows.append((height, idle.lift, loaded.lift, pressed.inputs.force))
             y = idle.y
         return rows
+
+    def up_and_down(self, heights: FloatArray, speed: float) -> FloatArray:
+        """Return strip heights that can be reached [m] and the forces there as the strip goes up and down [N].
+
+        Parameters
+        ----------
+        heights : ndarray, shape (h,)
+            Of the strip above top of rail [m].
+        speed : float
+            [m/s]
+
+        Returns
+        -------
+        ndarray, shape (up to h, 3)
+        """
+        rows = []
+        for group in self._outwards(heights):
+            y = self.reference
+            with suppress(MechanismError, np.linalg.LinAlgError):
+                for height in group:
+                    above, lift = height - self.base_height, self.definition.lift
+                    found = moved_forces(self.mechanism, above, lift, speed, y)
+                    rows.append((height, found.up, found.down))
+                    y = found.y
+        return np.array(sorted(rows), dtype=np.float64).reshape(-1, 3)
+
+    def _outwards(self, heights: FloatArray) -> tuple[list[float], list[float]]:
+        """Return heights from the reference height up, and from there down."""
+        reference = self.definition.reference_height
+        up = sorted(h for h in heights.tolist() if h >= reference)
+        return up, sorted((h for h in heights.tolist() if h < reference), reverse=True)
 
     def dynamics(
         self, height: float, frequencies: FloatArray, contact_force: float = 157.5, lateral: float = 0.0
@@ -162,7 +195,7 @@ class Rig:
             height - self.base_height,
             contact_force=contact_force,
             lateral=lateral,
-            start=self._start,
+            start=self.reference,
         )
         try:
             model = linearise(self.mechanism, found.y, found.inputs)

@@ -34,8 +34,12 @@ from models.pantograph.multibody.mechanism_definition import (
     PointJoint,
     Prismatic,
     Revolute,
+    RevolutePrismatic,
+    SlideAndTurnFriction,
+    SlidingFriction,
     SpringDamper,
     Triple,
+    TurningFriction,
     WeightSpring,
 )
 
@@ -88,11 +92,13 @@ class ForceElements:
             raise ValueError(f"force '{strange[0].name}': nothing computes a {type(strange[0]).__name__}")
         by_name = {j.name: j for j in joints if isinstance(j, PairJoint)}
         rubbing = [(f, by_name[f.joint]) for f in forces if isinstance(f, JointFriction)]
-        slides = [(f, j) for f, j in rubbing if isinstance(j, Prismatic)]
+        slides = [(f, _Line.of(j, j.axis_i, numbers)) for f, j in rubbing if isinstance(j, Prismatic)]
+        heads = [(f, j) for f, j in rubbing if isinstance(f, SlideAndTurnFriction) and isinstance(j, RevolutePrismatic)]
+        slides += [(f.sliding, _Line.back(j, j.axis_j, numbers)) for f, j in heads]
         self.lines = LineElements([f for f in forces if isinstance(f, LineForce)], numbers, pool)
         turning = [f for f in forces if isinstance(f, ActuatorMoment | LiftingMoment)]
         self._moments = _Moments(turning, numbers, pool)
-        self._slides = _Lines([_Line.of(j, j.axis_i, numbers) for _, j in slides], len(numbers), pool)
+        self._slides = _Lines([line for _, line in slides], len(numbers), pool)
         self._friction = np.array([f.level for f, _ in slides])
         self._transition = np.array([f.transition for f, _ in slides])
         self.stops = AngleStops([f for f in forces if isinstance(f, AngleStop)], numbers, orientations)
@@ -102,7 +108,10 @@ class ForceElements:
         self.lift_place = self._place_of_lift(forces, numbers, orientations)
         self._others: list[_Friction | _Bushing] = []
         for f in forces:
-            if isinstance(f, JointFriction) and not isinstance(by_name[f.joint], Prismatic):
+            if isinstance(f, SlideAndTurnFriction):
+                if (turning_part := f.turning) is not None:
+                    self._others.append(_Friction(turning_part, by_name[f.joint], numbers))
+            elif isinstance(f, SlidingFriction | TurningFriction) and not isinstance(by_name[f.joint], Prismatic):
                 self._others.append(_Friction(f, by_name[f.joint], numbers))
             elif isinstance(f, Bushing):
                 self._others.append(_Bushing(f, numbers, orientations))
@@ -196,6 +205,12 @@ class _Line(NamedTuple):
     def of(cls, pair: LineForce | PointJoint, direction: Triple | None, numbers: dict[str, int]) -> _Line:
         """Return the line of an element's points."""
         start, to = Vector(numbers[pair.body_i], pair.point_i), Vector(numbers[pair.body_j], pair.point_j)
+        return cls(start, to, direction)
+
+    @classmethod
+    def back(cls, joint: PointJoint, direction: Triple, numbers: dict[str, int]) -> _Line:
+        """Return the line of a joint's points from body j to body i, with a direction of body j."""
+        start, to = Vector(numbers[joint.body_j], joint.point_j), Vector(numbers[joint.body_i], joint.point_i)
         return cls(start, to, direction)
 
 
@@ -352,7 +367,7 @@ class _Moments:
 class _Friction:
     """Moment against the relative rotation in a joint, M tanh(w / w0), for a hinge about its axis."""
 
-    def __init__(self, force: JointFriction, joint: PairJoint, numbers: dict[str, int]) -> None:
+    def __init__(self, force: SlidingFriction | TurningFriction, joint: PairJoint, numbers: dict[str, int]) -> None:
         self._i, self._j = numbers[joint.body_i], numbers[joint.body_j]
         self._level, self._transition = force.level, force.transition
         self._axis = np.array(joint.axis_i) if isinstance(joint, Revolute) else None

@@ -105,6 +105,34 @@ def _eight(builder, number):
     return builder.shuffle_vector(first, ir.Constant(_EIGHT, ir.Undefined), places)
 
 
+@part
+def plus_product(start, one, other):
+    """Return ``start + one * other``."""
+    return start + one * other
+
+
+@part
+def minus_product(start, one, other):
+    """Return ``start - one * other``."""
+    return start - one * other
+
+
+@part
+def product(one, other):
+    """Return ``one * other``."""
+    return one * other
+
+
+@intrinsic
+def spread(typing, number):
+    """Return a number eight times."""
+
+    def generate(context, builder, signature, arguments):
+        return _eight(builder, arguments[0])
+
+    return vector(types.float64), generate
+
+
 @intrinsic
 def nothing(typing):
     """Return eight zeros."""

@@ -102,7 +102,7 @@ class WirePoints:
         """Return the place at a position along the track [m]."""
         k = min(max(int(np.searchsorted(self._x, x, side="right")) - 1, 0), len(self._length) - 1)
         xi = (x - self._x[k]) / (self._x[k + 1] - self._x[k])
-        shape = np.array([1.0, xi, xi**2, xi**3]) @ hermite_rows(self._axes[k], float(self._length[k]))
+        shape = np.array([1.0, xi, xi**2, xi**3]) @ hermite_rows(self._axes[[k]], self._length[[k]])[0]
         return Point((int(self._nodes[k]), int(self._nodes[k + 1])), shape.reshape(2, NODE_DOFS))
 
 

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from master.batch.batch_session import Runner
 from master.errors import MasterError
+from master.report.log_notes import show_log
 from master.report.progress import progress_shown
 from master.report.terminal_summary import Terminal
 from master.scenario.overrides import Overrides
@@ -43,7 +44,9 @@ def batch_runner(options: argparse.Namespace) -> Runner:
     if options.quiet:
         return Runner(build=not options.no_build)
     console = Terminal(stderr=True)
-    return Runner(partial(progress_shown, console), partial(say, console=console), not options.no_build)
+    tell = partial(say, console=console)
+    show_log(tell)
+    return Runner(partial(progress_shown, console), tell, not options.no_build)
 
 
 def say_warnings(system: System, note: Callable[[str], None] = say) -> None:

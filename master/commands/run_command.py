@@ -21,6 +21,7 @@ from master.interface.scenario_runs import keep_apart
 from master.recording import checkpoint
 from master.recording.continuation import Continuation
 from master.report import report_files
+from master.report.log_notes import show_log
 from master.report.progress import ProgressObserver
 from master.report.terminal_summary import Terminal, printable_json, show_run
 from master.results import parquet_export, results_folder
@@ -121,6 +122,7 @@ def run_shown(system: System, folder: Path, quiet: bool, options: RunOptions = _
     if quiet:
         return run(system, folder, (), options)
     console = Terminal(stderr=True)  # that of the progress bar, which then stays below
+    show_log(lambda text: say(text, console))
     for text in adjustments(system, options.checkpoint_every):
         say(f"warning: {text}", console)
     warnings = FmuWarningObserver(lambda warning: say(str(warning), console))

@@ -12,7 +12,7 @@ from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart, LineGeometry
 from models.commands.lanes_files import FORMAT, read_job, write_arrays
-from models.commands.physics_options import warn
+from models.commands.physics_options import show_log, warn
 from models.coupled.lanes import Lane, LanePlan, LaneRecord, run_lanes, run_singly
 from models.numerics.kernel_cache import SWITCH, KernelError
 
@@ -32,6 +32,7 @@ _GEOMETRY = {
 def run(arguments: argparse.Namespace) -> int:
     """Make the runs of a job; a line of output says what has become of each, as soon as its file is there."""
     job = read_job(arguments.job)
+    show_log(lambda text: print(f"note {text}", flush=True))  # for the master, which passes it on
     arguments.out.mkdir(parents=True, exist_ok=True)
     part = CatenaryPart(job.line, len(job.lanes[0].pantographs))
     write_arrays(arguments.out / "line.arrays", {"format": FORMAT, "geometry": geometry(part)}, {})

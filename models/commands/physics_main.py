@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
+from models.commands.physics_options import show_log
 from models.commands.physics_verbs import add_couple, add_identify, add_lanes, add_pantograph, add_statics
 from models.definition_files.message_text import empty_argument, printable, said
 from models.definition_files.parameter import ParameterError
@@ -42,6 +43,7 @@ def main(argv: Sequence[str]) -> int:
 
 def carry_out(options: argparse.Namespace) -> int:
     """Carry out a verb that was understood and return the exit code; what a user can cause is one message."""
+    show_log(lambda text: print(printable(text), file=sys.stderr, flush=True))
     try:
         code = int(options.run(options))
         if sys.stdout is not None:  # closed by the caller

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import errno
+import logging
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -76,6 +77,27 @@ def warn(texts: Iterable[str]) -> None:
     """Print what deserves a second look; the command continues."""
     for text in dict.fromkeys(filter(None, texts)):
         print(f"warning: {printable(text)}", file=sys.stderr)
+
+
+class _LogLines(logging.Handler):
+    """Hands every message of the project's log to a function."""
+
+    def __init__(self, write: Callable[[str], None]) -> None:
+        super().__init__()
+        self._write = write
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Hand a message on."""
+        self._write(record.getMessage())
+
+
+def show_log(write: Callable[[str], None]) -> None:
+    """Have what is logged written from now on, and no longer where an earlier call wanted it: that kernels compile."""
+    logger = logging.getLogger("openpanto")
+    for handler in [h for h in logger.handlers if isinstance(h, _LogLines)]:
+        logger.removeHandler(handler)
+    logger.addHandler(_LogLines(write))
+    logger.setLevel(logging.INFO)
 
 
 def new_folder(path: Path) -> Path:

@@ -12,7 +12,7 @@ import numpy as np
 from models.arrays import BoolArray, FloatArray, IntArray
 from models.catenary.line_model import CatenaryModel
 from models.coupled.lane_matrices import LaneMatrices
-from models.numerics.kernel_cache import load_kernels
+from models.numerics.kernel_cache import joined, load_kernels
 from models.numerics.newmark import Newmark, steps_within
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel
@@ -22,6 +22,15 @@ if TYPE_CHECKING:  # they are compiled from copies, see `kernel_cache`
     from models.coupled import lanes_linear_kernels as _l  # noqa: F401
     from models.coupled import lanes_train_kernels as _t  # noqa: F401
 
+#: Their files by name, each after those that it imports.
+_KERNEL_FILES: Final = {
+    "linear": (
+        Path(__file__).parents[1] / "catenary" / "step" / "vector_kernels.py",
+        Path(__file__).with_name("lanes_linear_kernels.py"),
+    ),
+    "contact": (Path(__file__).with_name("lanes_contact_kernels.py"),),
+    "train": (Path(__file__).with_name("lanes_train_kernels.py"),),
+}
 #: Texts for what the kernels return for a lane.
 _FAILURES: Final = {
     1: "slack and contact forces have not settled; use a smaller time step",
@@ -31,8 +40,7 @@ _FAILURES: Final = {
 
 def kernels(part: str) -> ModuleType:
     """Return compiled kernels of lanes: ``linear``, ``contact`` or ``train``; raises ``ImportError`` without numba."""
-    source = Path(__file__).with_name(f"lanes_{part}_kernels.py").read_bytes()
-    return load_kernels(f"lanes_{part}", source)
+    return load_kernels(f"lanes_{part}", joined(_KERNEL_FILES[part]))
 
 
 class LaneBlock:
@@ -74,7 +82,7 @@ class LaneBlock:
         self._order = definition.extrapolation_order
         self._model = model
         self._matrices = LaneMatrices(model, self._h, self._linear, self._contact)
-        self.lanes: int = self._linear.LANES
+        self.lanes: int = self._linear.BLOCK
         self._allocate(pantographs, len(model.wires), len(model.modes.attached))
         self._trains = self._new_trains(pantographs, masses)
 

@@ -57,7 +57,7 @@ class LaneMatrices:
         slots = _Slots(matrices, linear)
         self.ends = slots.ends
         self.factor = None if isinstance(matrices.factor, Banded) else matrices.factor
-        lower, upper = self._band(matrices, linear)
+        lower, upper = self._band(matrices)
         self.linear = linear.Linear(
             a1=newmark.a1,
             first=slots.first,
@@ -65,9 +65,9 @@ class LaneMatrices:
             rates=slots.rates,
             modes=slots.modes,
             slot_end=slots.slot_end,
-            turn=_filled(_widened(modes.turn, slots.ends), linear.PAIR),
-            back=_filled(_widened(modes.turn, slots.ends).T, linear.PAIR),
-            own=_own(modes, newmark, linear.ENTRIES),
+            turn=_compressed(_widened(modes.turn, slots.ends)),
+            back=_compressed(_widened(modes.turn, slots.ends).T),
+            own=_own(modes, newmark),
             lower=lower,
             upper=upper,
         )
@@ -82,29 +82,31 @@ class LaneMatrices:
         responses = _Responses(model, matrices, Compliance(matrices.factor, law.B, by_change), slots.of_mode)
         self.wires, self.most = contact.Wires(*responses.wires), responses.most
 
-    def _band(self, matrices: StepMatrices, kernels: ModuleType) -> tuple[FloatArray, FloatArray]:
-        """Return the factor's rows and columns, each after the inverse of its diagonal."""
+    @staticmethod
+    def _band(matrices: StepMatrices) -> tuple[FloatArray, FloatArray]:
+        """Return the factor's rows and columns, divided by its diagonal, each after the inverse of that."""
         if not isinstance(matrices.factor, Banded):
-            nothing = np.zeros((len(matrices.modes.attached), 1))
+            nothing = np.zeros((len(matrices.modes.attached), 2))
             return nothing, nothing
         factor = matrices.factor.factor
-        width, n = factor.shape[0] - 1, factor.shape[1]
-        lower, upper = np.zeros((2, n, max(width, kernels.DIAGONALS * kernels.GROUPS) + 1))
+        width, n = max(factor.shape[0] - 1, 1), factor.shape[1]
+        lower, upper = np.zeros((2, n, width + 1))
         lower[:, 0] = upper[:, 0] = 1.0 / factor[0]
-        for k in range(1, width + 1):
-            lower[k:, k] = upper[: n - k, k] = factor[k, : n - k]
+        for k in range(1, len(factor)):
+            lower[k:, k] = factor[k, : n - k] / factor[0, k:]
+            upper[: n - k, k] = factor[k, : n - k] / factor[0, : n - k]
         return lower, upper
 
 
 class _Slots:
-    """Modes in the order of the kernels: those that move with few ends in groups of a multiple of three, then others.
+    """Modes in the order of the kernels: those that move with few ends, then others.
 
     Attributes
     ----------
     of_mode : ndarray of int, shape (n_modes,)
         Where a mode is.
     ends : int
-        Ends of intervals, filled up to what a group takes.
+        Ends of intervals, at least as many as a mode may move with.
     first, end, rates, modes, slot_end : ndarray
         See the kernels.
     """
@@ -118,7 +120,7 @@ class _Slots:
         self.ends = max(coupling.shape[1], slow)
         few = [g for g in groups if g.width <= kernels.ENDS]
         many = [g for g in groups if g.width > kernels.ENDS]
-        sizes = [-(-len(g.modes) // kernels.MODES) * kernels.MODES for g in few]
+        sizes = [len(g.modes) for g in few]
         self.first = np.concatenate([[0], np.cumsum(sizes)]).astype(np.uint64)
         begins = [
             *self.first[:-1].tolist(),
@@ -231,23 +233,12 @@ def _compressed(matrix: sp.spmatrix) -> _Compressed:
     return rows.indptr.astype(np.uint64), rows.indices.astype(np.uint64), rows.data.astype(np.float64)
 
 
-def _own(modes: IntervalModes, newmark: Newmark, group: int) -> _Compressed:
-    """Return -2 K and a2 M of the attachments on one pattern, see `_filled`; values (k, 2)."""
-    rows, columns, values = _filled(-2.0 * modes.K + 1j * newmark.a2 * modes.M, group)
-    return rows, columns, np.stack([values.real, values.imag], axis=1)
-
-
-def _filled(matrix: sp.spmatrix, group: int) -> _Compressed:
-    """Return a matrix compressed by rows, each filled up to whole groups of entries with zeros."""
-    known = sp.csr_matrix(matrix)
+def _own(modes: IntervalModes, newmark: Newmark) -> _Compressed:
+    """Return -2 K and a2 M of the attachments on one pattern; values (k, 2)."""
+    known = sp.csr_matrix(-2.0 * modes.K + 1j * newmark.a2 * modes.M)
     known.sort_indices()
-    counts = np.diff(known.indptr)
-    full = -(-counts // group) * group
-    rows = np.concatenate([[0], np.cumsum(full)])
-    place = np.arange(known.nnz) + np.repeat(rows[:-1] - known.indptr[:-1], counts)
-    columns, values = np.zeros(rows[-1], dtype=np.uint64), np.zeros(rows[-1], dtype=known.dtype)
-    columns[place], values[place] = known.indices, known.data
-    return rows.astype(np.uint64), columns, values
+    values = np.stack([known.data.real, known.data.imag], axis=1)
+    return known.indptr.astype(np.uint64), known.indices.astype(np.uint64), values
 
 
 def _pulls(B: sp.csr_matrix, stiffness: FloatArray, delay: FloatArray, by_change: FloatArray) -> _Compressed:

@@ -8,7 +8,10 @@ run, so the cache must neither be trusted blindly nor decide whether a run works
 - where nothing can be stored (no home, no space, no permission) the kernels are compiled into a temporary folder of
   this process, or kept in memory only.
 
-In each case one warning names the folder, through `logging`; results are the same with and without a cache.
+In each case one warning names the folder, through `logging`; results are the same with and without a cache. That
+kernels are compiled, which takes long, is said there too, at the level INFO: commands show it, other hosts need not.
+
+Of kernels of one name, as many versions are kept as were used last (`_MOST_VERSIONS`), a few megabytes each.
 """
 
 from __future__ import annotations
@@ -39,10 +42,15 @@ _FROM_PROJECT: Final = re.compile(
     rb"^from (?:openpanto_\w+\.)?models\.[\w.]+_kernels import (?:\([^)]*\)|[^(\n]*)$", re.MULTILINE
 )
 _LOG: Final = logging.getLogger("openpanto")
+_COMPILING: Final = "compiling kernels for this processor, once for each user and version: up to half a minute"
+#: The end of a folder's name.
+_VERSION: Final = re.compile(r"\w+-[0-9a-f]{16}")
 #: Length of the checksum before the content of a file [bytes].
 _DIGEST: Final = hashlib.sha256().digest_size
-#: Warnings given in this process.
+#: Warnings and notes given in this process.
 _named: set[str] = set()
+#: How many versions of kernels of one name are kept: every release, working tree and Python has its own.
+_MOST_VERSIONS: Final = 24
 
 
 class KernelError(RuntimeError):
@@ -143,7 +151,9 @@ def _kept_source(source: bytes, folder: str) -> Path:
         copy.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         for place in (home / "openpanto", copy.parent, copy.parent / "__pycache__"):
             check_owner(place)
-        _write(copy, source)
+        if _write(copy, source):
+            _make_room(home / "openpanto", copy.parent)
+        os.utime(copy.parent)  # used just now; the time of the source is numba's
     except (OSError, RuntimeError) as error:  # RuntimeError: a user without a home
         _warn(f"compiled kernels are not kept, and have to be compiled in every run: {error}")
     else:
@@ -158,10 +168,20 @@ def _kept_source(source: bytes, folder: str) -> Path:
     return copy
 
 
-def _write(copy: Path, source: bytes) -> None:
-    """Write the source to the place it is compiled from, unless it is already there."""
+def _make_room(home: Path, own: Path) -> None:
+    """Delete the versions of kernels of a name that were not used for longest, until few enough are left."""
+    name = own.name.rpartition("-")[0]
+    with contextlib.suppress(OSError):  # another process makes room, too
+        others = [folder for folder in home.glob(f"{name}-*") if folder != own and _VERSION.fullmatch(folder.name)]
+        by_use = sorted(others, key=lambda folder: folder.stat().st_mtime, reverse=True)
+        for folder in by_use[_MOST_VERSIONS - 1 :]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _write(copy: Path, source: bytes) -> bool:
+    """Write the source to the place it is compiled from, unless it is already there; return whether it was not."""
     if copy.is_file() and copy.read_bytes() == source:
-        return
+        return False
     part = copy.with_name(f"{copy.name}.{os.getpid()}.part")
     try:
         part.write_bytes(source)
@@ -169,6 +189,7 @@ def _write(copy: Path, source: bytes) -> None:
     except OSError:
         part.unlink(missing_ok=True)
         raise
+    return True
 
 
 def _warn(text: str) -> None:
@@ -221,12 +242,16 @@ class _GuardedCache:
         """Return the stored code for a signature, None if there is none that can be used."""
         try:
             with _without_declarations(target_context):
-                return self._cache.load_overload(sig, target_context)
+                found = self._cache.load_overload(sig, target_context)
         except Exception as error:  # whatever a damaged file may raise
             _warn(f"compiled kernels in {self._folder} are damaged and are compiled afresh ({error})")
             with contextlib.suppress(Exception):
                 self._cache.flush()
-            return None
+            found = None
+        if found is None and _COMPILING not in _named:
+            _named.add(_COMPILING)
+            _LOG.info(_COMPILING)
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store compiled code, if possible."""

@@ -34,7 +34,7 @@ class ChildEngine:
     Attributes
     ----------
     tell : callable
-        Shows the user that a process has died.
+        Shows the user that a process has died, or compiles kernels.
     renew_after : int
         Runs after which the process is replaced by a new one.
     """
@@ -84,7 +84,7 @@ class _Child:
         if self._count >= self._engine.renew_after:
             self.close()
         if self._process is None:
-            self._process, self._count = Process(_MODULE), 0
+            self._process, self._count = Process(_MODULE, self._engine.tell), 0
             self._process.channel.limit(None)
             self._process.channel.send(0, 0, self._scenario)
         return self._process

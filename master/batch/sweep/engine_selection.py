@@ -54,7 +54,7 @@ def engine_of(
     if request is not None and request.engine == "lanes":
         if jobs is not None or scheduler is not None:
             raise UsageError("--engine lanes makes its runs in one process: leave --jobs and --scheduler out")
-        return LanesEngine(request.check)
+        return LanesEngine(request.check, tell)
     if jobs is None and scheduler is None:
         return ChildEngine(tell, renew_after) if can_start_processes() else HereEngine()
     if jobs is not None and scheduler is not None:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +64,8 @@ class LanesEngine:
     ----------
     check : int
         How many runs are made as FMUs as well, before all others.
+    tell : callable
+        Shows the user what takes time.
 
     Attributes
     ----------
@@ -74,8 +76,8 @@ class LanesEngine:
     width = _SIDE_BY_SIDE
     is_rehearsed = False
 
-    def __init__(self, check: int = 1) -> None:
-        self._check = check
+    def __init__(self, check: int = 1, tell: Callable[[str], None] = lambda _: None) -> None:
+        self._check, self._tell = check, tell
         self.checks: list[Mapping[str, Any]] = []
 
     @contextmanager
@@ -100,7 +102,7 @@ class LanesEngine:
             yield from self._compared(base, checked)
             known = {r.key for r in checked}
             for group in grouped(base, [r for r in runs if r.key not in known]):
-                yield from (result for _, result, _ in _made(group))
+                yield from (result for _, result, _ in _made(group, self._tell))
 
         yield make
 
@@ -114,7 +116,7 @@ class LanesEngine:
         """
         found: list[SweepResult] = []
         for group in grouped(base, runs):
-            for wanted, result, forces in _made(group):
+            for wanted, result, forces in _made(group, self._tell):
                 difference = _difference(wanted, base, result, forces)
                 self.checks.append(LaneCheck(wanted.number, difference).data)
                 if not difference <= AGREEMENT:
@@ -145,7 +147,7 @@ def _difference(wanted: SweepRun, base: System, result: SweepResult, forces: Flo
     return float(np.abs(theirs - forces).max()) if theirs.shape == forces.shape else float("nan")
 
 
-def _made(group: LaneGroup) -> Iterator[tuple[SweepRun, SweepResult, FloatArray]]:
+def _made(group: LaneGroup, tell: Callable[[str], None]) -> Iterator[tuple[SweepRun, SweepResult, FloatArray]]:
     """Make the runs of a group in a process; yield each with its result and its contact forces, shape (n, P)."""
     with tempfile.TemporaryDirectory(prefix="lanes-") as name:
         folder = Path(name)
@@ -159,6 +161,8 @@ def _made(group: LaneGroup) -> Iterator[tuple[SweepRun, SweepResult, FloatArray]
                 kind, _, rest = line.strip().partition(" ")
                 if kind == "line":
                     geometry = LaneOutput.read(folder / "out" / "line.arrays").header["geometry"]
+                elif kind == "note":
+                    tell(rest)
                 elif kind == "lane":
                     number = int(rest.split()[0])
                     path = folder / "out" / f"lane_{number}.arrays"

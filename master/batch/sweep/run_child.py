@@ -13,6 +13,8 @@ from typing import Any, Final
 from master.batch.sweep.sweep_run import RunPlace, carry_out
 from master.batch.sweep.swept_systems import SweepRun
 from master.fmu.isolation.channel import Channel, EndedError
+from master.fmu.isolation.child_process import NOTE
+from master.report.log_notes import show_log
 from master.safety.supervision import die_with
 from master.system.components import System
 
@@ -25,6 +27,7 @@ def main() -> None:
     die_with(int(sys.argv[2]))
     # Ctrl-C is meant for the command, which ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    show_log(lambda text: print(f"{NOTE}{text}", flush=True))
     with suppress(EndedError):
         serve(Channel(socket.socket(fileno=int(sys.argv[1]))))
     # What FMUs have left behind, threads or handlers, must not keep the process.

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from threading import Thread
@@ -31,6 +31,10 @@ _PIECES: Final = 4
 _PIECE: Final = 4096
 
 
+#: How a line begins that a child prints for the user.
+NOTE: Final = "note: "
+
+
 class Process:
     """A child process with a connection to it, its own folder for temporary files, and a thread for what it prints.
 
@@ -38,6 +42,8 @@ class Process:
     ----------
     module : str
         What it runs, with the connection's file descriptor and the number of this process as arguments.
+    tell : callable
+        Shows the user a line that it prints after `NOTE`, as soon as that is printed.
 
     Attributes
     ----------
@@ -45,7 +51,8 @@ class Process:
         The master's end of the connection.
     """
 
-    def __init__(self, module: str = "master.fmu.isolation") -> None:
+    def __init__(self, module: str = "master.fmu.isolation", tell: Callable[[str], None] = lambda _: None) -> None:
+        self._tell = tell
         self._folder = tempfile.mkdtemp(prefix="isolated-")
         ours, theirs = socket.socketpair()
         with theirs:
@@ -107,6 +114,9 @@ class Process:
         with pipe:
             while piece := os.read(pipe.fileno(), _PIECE):
                 self._said.append(piece)
+                for line in piece.splitlines():
+                    if line.startswith(NOTE.encode()):
+                        self._tell(line.decode("utf-8", "replace").removeprefix(NOTE))
 
     def _last_words(self) -> str:
         lines = b"".join(self._said).decode("utf-8", "replace").split("\n")

@@ -13,16 +13,18 @@ class ArrayBook:
 
     Parameters
     ----------
-    arrays : sequence of ndarray
-        Contiguous, of one dimension.
+    first, last : sequence of ndarray
+        Contiguous; the arrays are those of the first, then those of the last.
 
     Attributes
     ----------
-    entries : ndarray of int, shape (2 * len(arrays),)
-        Address and length of each; `floats64` and the like of `models.catenary.step.vector_kernels` read them.
+    entries : ndarray of int, shape (2 n,)
+        Address and size of each; a `reader` of `models.catenary.step.vector_kernels` reads them, as of one dimension.
+    last
+        The parameter.
     """
 
-    def __init__(self, arrays: Sequence[Any]) -> None:
-        assert all(array.ndim == 1 and array.flags.c_contiguous for array in arrays)
-        self._arrays = tuple(arrays)
-        self.entries = np.array([(array.ctypes.data, array.size) for array in self._arrays], dtype=np.int64).ravel()
+    def __init__(self, first: Sequence[Any], last: Sequence[Any]) -> None:
+        self._first, self.last = first, last
+        assert all(array.flags.c_contiguous for array in (*first, *last))
+        self.entries = np.array([(array.ctypes.data, array.size) for array in (*first, *last)], dtype=np.int64).ravel()

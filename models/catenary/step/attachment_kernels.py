@@ -18,6 +18,7 @@ from models.catenary.step.vector_kernels import (
     plus_product,
     product,
     put,
+    reader,
 )
 
 #: Attachments in lanes. ``order``, ``slot``: displacements in the order of their slots, and these, so that arrays in
@@ -29,9 +30,11 @@ from models.catenary.step.vector_kernels import (
 #: ``after``: neighbours of the segments. ``size``: rows without separator, rows of a separator, width, rows read
 #: beyond the segment.
 Lanes = namedtuple("Lanes", "order slot rows targets values widths factor middle shifts before after size")
+lanes_of = reader(Lanes, "wwwwfuffuuuu")
 #: Arrays to work in, in lanes: displacements, velocities, forces that turn to the solution; separators, twice, and
 #: once.
 LanesWork = namedtuple("LanesWork", "x v right separators left")
+lanes_work_of = reader(LanesWork, "fffff")
 _0, _1, _2 = (np.uint64(i) for i in range(3))
 _LANES = np.uint64(LANES)
 

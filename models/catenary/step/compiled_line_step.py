@@ -29,7 +29,6 @@ _NO_STRIPS = np.zeros((0, 2, 2, 3)), np.zeros(0)
 #: No droppers.
 _NONE, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
 
-
 #: Displacements of attachments from which on a solution about a load takes less time than a whole one.
 _LONG = 12000
 
@@ -77,28 +76,28 @@ class CompiledLineStep:
         near = lanes if factor.matrix.shape[0] < _LONG else factor
         compliance = Compliance(near, droppers.B, droppers.by_change(newmark))
         self._records = StepRecords(line.wires, matrices, compliance, self.units.slots)
-        contact = line.contact
-        constants = np.array([newmark.a1, contact.stiffness, contact.exponent, contact.restitution, line.gap])
-        n_attached, n_droppers = len(modes.attached), len(droppers.stiffness)
-        arrays = (
-            *(constants, *lanes.arrays, *self.units.arrays, *_by_rows(droppers.B), droppers.elastic_at_rest),
+        contact, n_attached, n_droppers = line.contact, len(modes.attached), len(droppers.stiffness)
+        numbers = np.array([newmark.a1, contact.stiffness, contact.exponent, contact.restitution, line.gap])
+        #: As named tuples of the kernels: `Lanes`, `LanesWork`, `Modes`, `Droppers`, `Wires`.
+        self._line = (
+            *(*lanes.arrays, *lanes.work, *self.units.arrays, *_by_rows(droppers.B), droppers.elastic_at_rest),
             *(droppers.stiffness, droppers.slack_delay, droppers.unilateral, 2.0 * droppers.rest_load),
-            *(*self._records.wires, *lanes.work, np.zeros(n_attached), np.zeros(n_attached), np.zeros(n_droppers)),
+            *self._records.wires,
         )
-        self._book = ArrayBook(arrays)
         intervals = [interval for wire in line.wires for interval in wire.intervals]
         self._sizes = max(i.size for i in intervals), max(len(i.ends) for i in intervals)
-        self._local = np.zeros((2, self._sizes[0]))
-        self._droppers = np.zeros(n_droppers, dtype=np.bool_), np.zeros(n_droppers), np.zeros(n_droppers)
+        self._slack, self._lacks = np.zeros(n_droppers, dtype=np.int64), np.zeros(n_droppers)
         self._report = np.zeros(5, dtype=np.int64)
-        self._places: tuple[int, tuple[Any, ...], tuple[Any, ...]] = (0, (), ())
+        sizes = 2 * (n_attached,) + 2 * (n_droppers,) + 2 * self._sizes[:1]
+        self._work = (numbers, *map(np.zeros, sizes), self._slack, self._lacks)
+        self._lay_out(1)
 
     def step(self, state: CatenaryState, motion: StripMotion) -> ContactResult:
         """Advance the line by one step under moving strips; see `StepEngine`."""
-        count, shape = len(motion.strip), state.element.shape
+        shape = state.element.shape
         result = ContactResult(np.empty(shape), np.empty((*shape, 3)))
         strips = np.ascontiguousarray(motion.strip), np.ascontiguousarray(motion.compliance)
-        self._run(state, strips, (_NOWHERE, _NOTHING), count * shape[1], result.force, result.point)
+        self._run(state, strips, (_NOWHERE, _NOTHING), state.element.size, (result.force, result.point))
         return result
 
     def push(self, state: CatenaryState, forces: Sequence[GivenForce]) -> None:
@@ -108,7 +107,7 @@ class CompiledLineStep:
             placed = [(s, *self._wires[s].locate(x), force) for s, x, force in forces]
             given = np.array([place[:2] for place in placed]), np.array([place[2:] for place in placed])
         nothing = np.zeros((0, len(self._wires)))
-        self._run(state, _NO_STRIPS, given, len(forces), nothing, nothing[:, :, None])
+        self._run(state, _NO_STRIPS, given, len(forces), (nothing, nothing[:, :, None]))
 
     def _run(
         self,
@@ -116,29 +115,27 @@ class CompiledLineStep:
         strips: tuple[FloatArray, FloatArray],
         given: tuple[IntArray, FloatArray],
         places: int,
-        force: FloatArray,
-        point: FloatArray,
+        out: tuple[FloatArray, FloatArray],
     ) -> None:
         """Do one step, with what the kernels ask for on the way."""
-        work, out = self._room_for(places)
         packed, report, records = self._packed(state.motion), self._report, self._records
+        if places > len(self._load):
+            self._lay_out(places)
         moving = state.motion.attached, packed.table, packed.pull
         before = state.element, state.impact_velocity, state.loaded, state.load, state.slack, state.compensation
         records.begin()
         report[0] = 0
-        while answer := self.kernels.step(
-            self._book.entries, moving, before, strips, given, records.arrays, work, report, (force, point, *out)
-        ):
+        while answer := self.kernels.step(self._entries(), moving, before, strips, given, out):
             self._answer(answer)
         packed.moved = True
         _, _, loaded, slack, ahead = report.tolist()
         state.loaded, state.load = _NOWHERE, _NOTHING
         if loaded:
-            state.loaded, state.load = out[0][:loaded].copy(), out[1][:loaded].copy()
+            state.loaded, state.load = self._loaded[:loaded].copy(), self._load[:loaded].copy()
         state.slack, state.compensation = _NONE, _NO_FORCES
         if slack:
-            state.slack = np.flatnonzero(self._droppers[0])
-            state.compensation = self._droppers[1][state.slack]
+            state.slack = np.flatnonzero(self._slack)
+            state.compensation = self._lacks[state.slack]
         if ahead >= 0 and len(strips[0]):
             records.prepare(ahead)
 
@@ -154,22 +151,19 @@ class CompiledLineStep:
         else:
             raise not_settled(slack, contacts)
 
-    def _room_for(self, places: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Return arrays to work in and for results, long enough for so many points of wires."""
-        known, work, out = self._places
-        if places > known or not work:
-            known = max(places, 1)
-            work = (
-                self._local,
-                np.zeros((5, known), dtype=np.int64),
-                np.zeros((7, known)),
-                *(np.zeros((known, size)) for size in self._sizes),
-                np.zeros(known, dtype=np.int64),
-            )
-            loaded = np.zeros((known, 2), dtype=np.int64), np.zeros((known, 2))
-            out = (*loaded, np.zeros((known, 3)), *self._droppers)
-            self._places = known, work, out
-        return work, out
+    def _lay_out(self, places: int) -> None:
+        """Make room for so many points of wires, and for as many forces on them."""
+        self._loaded, self._load = np.zeros((places, 2), dtype=np.int64), np.zeros((places, 2))
+        points = *np.zeros((6, places), dtype=np.int64), *np.zeros((10, places))
+        work = *self._work, self._loaded, self._load, self._report
+        self._arrays = *self._line, *work, *points, *(np.zeros(places * size) for size in self._sizes)
+        self._book: ArrayBook | None = None
+
+    def _entries(self) -> IntArray:
+        """Return where all arrays are; those of the records move as they grow."""
+        if self._book is None or self._book.last is not self._records.arrays:
+            self._book = ArrayBook(self._arrays, self._records.arrays)
+        return self._book.entries
 
     def _packed(self, motion: LineMotion) -> PackedMotion:
         """Return the modal part of a motion in the kernels' order, which it is kept in from now on."""

@@ -10,7 +10,7 @@ from collections import namedtuple
 import numpy as np
 
 from models.catenary.step.mode_kernels import AMPLITUDE, HELD, INVERSE, RATE
-from models.catenary.step.vector_kernels import LANES, get, part, plus_product, put, spread
+from models.catenary.step.vector_kernels import LANES, get, part, plus_product, put, reader, spread
 
 #: What `find` returns where a strip crosses no wire; a number below says which interval's record is lacking.
 NOWHERE = -1
@@ -18,9 +18,11 @@ NOWHERE = -1
 #: the track, one more for each wire; ``period``; the ``interval`` of each element, counted over all wires; the element
 #: of its wire that each interval ``begins`` with.
 Wires = namedtuple("Wires", "first starts period interval begins")
+wires_of = reader(Wires, "iffii")
 #: What is known of intervals and droppers: ``data``, record after record; ``whole``, the same memory as whole numbers;
 #: where in it the record of each of the ``intervals`` and ``droppers`` begins, below 0 if it is not there.
 Records = namedtuple("Records", "data whole intervals droppers")
+records_of = reader(Records, "fiii")
 #: An interval's record: ``modes``, ``size`` (displacements of attachments), ``elements``, ``reach`` (displacements
 #: that loads at its attachments reach, from ``first`` on) and ``stretched`` (droppers); then where in the data its
 #: parts begin: ``slots``, where the amplitudes of its modes are in the table; ``ends``, the places of its attachments'
@@ -34,12 +36,16 @@ Interval = namedtuple(
 )
 #: A dropper's record: the same for a force in it.
 Dropper = namedtuple("Dropper", "reach first stretched droppers column stretch")
-#: Points of wires, and the strips above them, before any force: see `WirePoint` and `ContactCandidate`; ``record`` says
-#: where the interval's record is, ``place`` which element of the interval it is on.
+#: Points of wires, and the strips above them: see `WirePoint` and `ContactCandidate`. ``record`` says where the
+#: interval's record is, ``place`` which element of the interval it is on; ``force``, ``depth`` and ``rate`` come
+#: of the step, ``penetration`` and ``velocity`` were without forces. ``row`` and ``load``: as many numbers a point as
+#: the largest interval needs; ``contacts``: which points may be such.
 Points = namedtuple(
     "Points",
-    "pantograph section element record place xi engagement height compliance penetration velocity impact row load",
+    "pantograph section element record place contacts "
+    "xi engagement height compliance penetration velocity impact force depth rate row load",
 )
+points_of = reader(Points, "iiiiii" + 12 * "f")
 #: A strip farther than this from the ends of a wire does not meet it [m]; a guess farther off is replaced by a search.
 _FAR, _FAR_OFF = 1.0, 5.0
 #: Widths over which a contact sets in [m], see `models.catenary.contact_and_slack.crossing`.
@@ -77,6 +83,13 @@ def dropper_at(whole, at):
 
 
 @part
+def own(values, points, i):
+    """Return the part of ``row`` or ``load`` that belongs to a point."""
+    width = values.size // points.xi.size
+    return values[i * width : (i + 1) * width]
+
+
+@part
 def reached(first, count, place, size):
     """Return which of ``count`` rows from ``first`` on, round the end, a displacement is; -1 if none."""
     offset = place - first
@@ -95,7 +108,7 @@ def find(wires, records, section, strip, guess, motion, local, place):
         Ends A and B; position and velocity.
     motion : (float, ndarray, ndarray, ndarray)
         a1, table, change and motion of the attachments; see `models.catenary.step.step_kernels.step`.
-    local : ndarray, shape (2, m)
+    local : (ndarray, ndarray)
         Local coordinates of its interval at the end of the step and their rates, forces found inside it left out.
     place : ndarray, shape (3,)
         Shares of the way along the element and along the strip; how much of the contact acts.
@@ -168,10 +181,10 @@ def _crossing(strip, shift, records, record, element, local):
     static, plan = interval.plan_static + 2 * element, interval.plan + 2 * element * size
     x, y, x2, y2 = data[static], data[static + 1], data[static + 2], data[static + 3]
     for m in range(size):
-        x += data[plan + m] * local[0, m]
-        y += data[plan + size + m] * local[0, m]
-        x2 += data[plan + 2 * size + m] * local[0, m]
-        y2 += data[plan + 3 * size + m] * local[0, m]
+        x += data[plan + m] * local[0][m]
+        y += data[plan + size + m] * local[0][m]
+        x2 += data[plan + 2 * size + m] * local[0][m]
+        y2 += data[plan + 3 * size + m] * local[0][m]
     strip_x, strip_y = strip[1, 0, 0] - strip[0, 0, 0], strip[1, 0, 1] - strip[0, 0, 1]
     wire_x, wire_y = x2 - x, y2 - y
     determinant = strip_y * wire_x - strip_x * wire_y
@@ -189,17 +202,17 @@ def follow_ends(records, record, motion, local):
     count, size = interval.modes, interval.size
     for j in range(size):
         end = whole[interval.ends + j]
-        local[0, count + j] = change[end]
-        local[1, count + j] = a1 * change[end] - attached[1, end]
+        local[0][count + j] = change[end]
+        local[1][count + j] = a1 * change[end] - attached[1, end]
     for i in range(count):
         at, yielding = whole[interval.slots + i], interval.yielding + i * size
         moved = table[at + _TO_HELD]
         for j in range(size):
-            moved -= data[yielding + j] * local[0, count + j]
-        local[0, i] = table[at] + moved
-        local[1, i] = a1 * moved - table[at + _TO_RATE]
+            moved -= data[yielding + j] * local[0][count + j]
+        local[0][i] = table[at] + moved
+        local[1][i] = a1 * moved - table[at + _TO_RATE]
     for j in range(size):
-        local[0, count + j] += attached[0, whole[interval.ends + j]]
+        local[0][count + j] += attached[0, whole[interval.ends + j]]
 
 
 @part
@@ -247,28 +260,28 @@ def press(records, record, row, force, table):
 
 
 @part
-def bend(records, record, load, force, change):
-    """Add what a force on a point changes at the attachments in a step; ``load`` is that of the point."""
-    interval = interval_at(records.whole, record)
-    reach = np.uint64(interval.reach)
-    for j in range(interval.size):
-        if load[j] != 0.0:
-            column = np.uint64(interval.columns) + np.uint64(j) * reach
-            add_column(records.data, column, np.uint64(interval.first), reach, force * load[j], change)
+def bend(data, column, first, reach, load, force, change):
+    """Add what forces on attachments change in a step.
 
-
-@part
-def add_column(data, column, first, count, force, change):
-    """Add ``count`` values from ``data[column]``, times a force, to displacements from ``first`` on, round the end."""
-    here = min(count, np.uint64(change.size) - first)
+    Parameters
+    ----------
+    data, column
+        Responses to unit forces, ``reach`` displacements from ``first`` on, round the end, one after the other.
+    load : ndarray
+        The force of each, for a ``force`` of one.
+    """
+    begin, width, of = np.uint64(first), np.uint64(reach), np.uint64(column)
+    here = min(width, np.uint64(change.size) - begin)
     whole = here // _LANES * _LANES
-    forces = spread(force)
     for i in range(_0, whole, _LANES):
-        put(change, first + i, plus_product(get(change, first + i), get(data, column + i), forces))
-    for i in range(whole, here):
-        change[first + i] += force * data[column + i]
-    for i in range(here, count):
-        change[i - here] += force * data[column + i]
+        moved = get(change, begin + i)
+        for j in range(np.uint64(load.size)):
+            moved = plus_product(moved, get(data, of + j * width + i), spread(force * load[j]))
+        put(change, begin + i, moved)
+    for i in range(whole, width):
+        at = begin + i if i < here else i - here
+        for j in range(np.uint64(load.size)):
+            change[at] += force * load[j] * data[of + j * width + i]
 
 
 @part
@@ -276,17 +289,18 @@ def moved_by(records, points, i, j, size, table):
     """Return how far the wire is moved at one point by a unit force at another [m/N]; see `WirePoint.moved_by`."""
     if i == j:
         return points.compliance[i]
-    data, whole = records.data, records.whole
+    data, whole, moved = records.data, records.whole, 0.0
     here, there = interval_at(whole, points.record[i]), interval_at(whole, points.record[j])
-    moved = 0.0
+    load, row = own(points.load, points, i), own(points.row, points, i)
+    other_load, other_row = own(points.load, points, j), own(points.row, points, j)
     for k in range(here.size):
-        row = reached(there.first, there.reach, whole[here.ends + k], size)
-        if row >= 0:
+        at = reached(there.first, there.reach, whole[here.ends + k], size)
+        if at >= 0:
             for m in range(there.size):
-                moved += points.load[i, k] * data[there.columns + m * there.reach + row] * points.load[j, m]
+                moved += load[k] * data[there.columns + m * there.reach + at] * other_load[m]
     if points.record[i] == points.record[j]:
         for k in range(here.modes):
-            moved += points.row[i, k] * points.row[j, k] * table[whole[here.slots + k] + _TO_INVERSE]
+            moved += row[k] * other_row[k] * table[whole[here.slots + k] + _TO_INVERSE]
     return moved
 
 
@@ -294,7 +308,7 @@ def moved_by(records, points, i, j, size, table):
 def put_place(records, points, i, table, attached, out):
     """Put a point of a wire into ``out``, shape (3,) [m], as the motion stands."""
     interval, data, whole = interval_at(records.whole, points.record[i]), records.data, records.whole
-    size, xi = interval.modes + interval.size, points.xi[i]
+    size, xi, row = interval.modes + interval.size, points.xi[i], own(points.row, points, i)
     static, plan = interval.plan_static + 2 * points.place[i], interval.plan + 2 * points.place[i] * size
     x, y, z = data[static], data[static + 1], points.height[i]
     x += xi * (data[static + 2] - x)
@@ -304,5 +318,5 @@ def put_place(records, points, i, table, attached, out):
         value = table[at] if m < interval.modes else attached[0, at]
         x += ((1.0 - xi) * data[plan + m] + xi * data[plan + 2 * size + m]) * value
         y += ((1.0 - xi) * data[plan + size + m] + xi * data[plan + 3 * size + m]) * value
-        z += points.row[i, m] * value
+        z += row[m] * value
     out[0], out[1], out[2] = x, y, z

@@ -18,6 +18,7 @@ from models.catenary.step.vector_kernels import (
     plus_product,
     product,
     put,
+    reader,
     spread,
     total,
 )
@@ -34,6 +35,7 @@ INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
 #: shape (k, 2): units that move with further ends, and their group; ``more_coupling``, ``more_places`` and
 #: ``more_shares``, shape (k, 6, 8), (k, 12), (k, 12): mu G with six such, and these.
 Modes = namedtuple("Modes", "first rates places shares more more_coupling more_places more_shares")
+modes_of = reader(Modes, "ufwfufwf")
 _0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
 _LANES, _UNIT = np.uint64(LANES), np.uint64(ROWS * LANES)
 _R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (

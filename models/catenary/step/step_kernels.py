@@ -10,46 +10,51 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.attachment_kernels import Lanes, LanesWork, load, solve
+from models.catenary.step.attachment_kernels import lanes_of, lanes_work_of, load, solve
 from models.catenary.step.contact_kernels import (
     NOWHERE,
-    Points,
-    Records,
-    Wires,
-    add_column,
     bend,
     dropper_at,
     find,
     interval_at,
+    own,
     point,
+    points_of,
     press,
     put_place,
+    records_of,
+    wires_of,
 )
 from models.catenary.step.local_kernels import LACKING, SINGULAR, SOLVED, solve_local
-from models.catenary.step.mode_kernels import Modes, advance
-from models.catenary.step.vector_kernels import compiled, floats64, ints64, part, uints32, uints64
+from models.catenary.step.mode_kernels import advance, modes_of
+from models.catenary.step.vector_kernels import compiled, part, reader
 
 #: Answers of `step`.
 DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS, DROPPER_LACKS = range(5)
 #: Droppers: their elongation by the attachments, ``rows``, ``columns`` and ``values``; ``at_rest``, elastic force [N];
 #: ``stiffness``, ``delay`` and ``unilateral`` of the `DropperLaw`; ``known``, twice its rest_load, shape (n_attached,).
 Droppers = namedtuple("Droppers", "rows columns values at_rest stiffness delay unilateral known")
-#: What a step leaves in ``report``: how far it has come; what lacks; how many forces are on the wires, how many
-#: droppers slack; an interval before a strip whose record is lacking, or -1.
+droppers_of = reader(Droppers, "wwffffff")
+#: ``numbers``: a1, then ``contact`` of `law_of`. To work in: ``change`` of the attachments, ``pressed``, known forces
+#: on them, ``free`` pulls of the droppers and ``pull``, ``local`` coordinates of an interval and their ``rates``. What
+#: a step leaves: droppers that are ``slack`` (1), and what each ``lacks``; ``loaded`` and ``load`` on the wires, as in
+#: a `CatenaryState`; ``report``, see below.
+Work = namedtuple("Work", "numbers change pressed free pull local rates slack lacks loaded load report")
+work_of = reader(Work, "fffffffififi")
+#: ``report``: how far the step has come; what lacks; how many forces are on the wires, how many droppers slack; an
+#: interval before a strip whose record is lacking, or -1.
 STAGE, LACKS, LOADED, SLACK, AHEAD = range(5)
 _BEGUN = 1
-_1 = np.uint64(1)
 
 
 @compiled
-def step(book, moving, state, strips, given, records, work, report, out):
+def step(book, moving, state, strips, given, out):
     """Advance a line by one step, or as far as the records of intervals and droppers reach: then call again.
 
     Parameters
     ----------
     book : ndarray of int
-        Of the arrays of the line and those to work in, see `models.catenary.step.array_book` and `_opened`. The first:
-        a1, then ``contact`` of `law_of`.
+        Of Lanes, LanesWork, Modes, Droppers, Wires, Work, Points and Records, see `models.catenary.step.array_book`.
     moving : (attached, table, pull)
         attached : ndarray, shape (2, n_attached)
         table, pull
@@ -60,90 +65,60 @@ def step(book, moving, state, strips, given, records, work, report, out):
         As in a `StripMotion`.
     given : (loaded, load)
         Known forces on the wires at the end of the step.
-    records : Records
-    work : (local, whole, numbers, row, load, chosen), arrays to work in
-    report : ndarray of int, shape (5,)
-        See above; all zero at first.
-    out : (force, point, loaded, load, points, slack, lacks, pull)
-        force, point
-            As in a `ContactResult`.
-        loaded, load
-            Forces on the wires at the end of the step.
-        points, slack, lacks, pull
-            ``results`` of `solve_local`.
+    out : (force, point)
+        As in a `ContactResult`.
 
     Returns
     -------
     int
-        DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS or DROPPER_LACKS; ``report[LACKS]`` says which.
+        DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS or DROPPER_LACKS; ``work.report[LACKS]`` says which.
     """
-    constants, records = floats64(book, 0), Records(*records)
-    lanes, modes, droppers, wires, lanes_work, arrays = _opened(book)
-    change, pressed, free = arrays
-    attached, table, pull = moving
-    element, impact = state[0], state[1]
-    whole, numbers, chosen, size = work[1], work[2], work[5], attached.shape[1]
-    points = Points(
-        whole[0], whole[1], whole[2], whole[3], whole[4],
-        numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6],
-        work[3], work[4],
-    )  # fmt: skip
-    motion = constants[0], table, change, attached
+    lanes, lanes_work, modes, droppers = (
+        lanes_of(book, 0),
+        lanes_work_of(book, 12),
+        modes_of(book, 17),
+        droppers_of(book, 25),
+    )
+    wires, work, points, records = wires_of(book, 33), work_of(book, 38), points_of(book, 50), records_of(book, 68)
+    (attached, table, pull), report, a1 = moving, work.report, work.numbers[0]
+    motion = a1, table, work.change, attached
     if report[STAGE] < _BEGUN:
-        lacking = _unknown(wires, records, state[2], given[0])
-        if lacking >= 0:
-            report[LACKS] = lacking
+        report[LACKS] = _unknown(wires, records, state[2], given[0])
+        if report[LACKS] >= 0:
             return INTERVAL_LACKS
-        _begin(lanes, droppers, wires, records, moving, state, points, change, pressed, lanes_work)
-        _push(wires, records, given, points, motion)
-        _put_free(droppers, motion, free)
+        _press_known(droppers, wires, records, state, points, table, work.pressed)
+        load(lanes, attached, work.pressed, pull, lanes_work)
+        solve(lanes, lanes_work, work.change)
+        for k in range(given[0].shape[0]):
+            record, force = _known_force(wires, records, given[0], given[1], k, table, points)
+            _bend_at(records, record, points, 0, force, work.change)
+        _put_free(droppers, motion, work.free)
         report[STAGE] = _BEGUN
-    lacking, count = _meet(wires, records, element, impact, strips[0], constants[4], motion, work[0], points, report)
-    if lacking >= 0:
-        report[LACKS] = lacking
+    report[LACKS], count = _meet(wires, records, state, strips[0], motion, points, work)
+    if report[LACKS] >= 0:
         return INTERVAL_LACKS
     n = 0
     for i in range(count):
         # One that was closed stays among the contacts: other forces of the step may keep it so.
         if points.penetration[i] > 0.0 or points.impact[i] > 0.0:
-            chosen[n] = i
+            points.contacts[n] = i
             n += 1
-    contacts = chosen[:n]
-    answer = solve_local(
-        records, points, contacts, strips[1], free, droppers.unilateral, constants[0], constants[1:], size, table,
-        state[4], out[4:],
-    )  # fmt: skip
+    contacts = points.contacts[:n]
+    answer = solve_local(records, points, contacts, strips[1], droppers, work.numbers, table, state[4], work)
     if answer >= LACKING:
         report[LACKS] = answer - LACKING
         return DROPPER_LACKS
+    report[SLACK], report[LOADED] = work.slack.sum(), given[0].shape[0] + n
     if answer != SOLVED:
-        report[SLACK], report[LOADED] = _count(out[5]), n
         return NO_SOLUTION if answer == SINGULAR else NOT_SETTLED
-    _apply(records, points, contacts, out, motion)
-    _follow(modes, motion, pull)
-    _note(points, contacts, given, impact, out, report)
+    _apply(records, points, contacts, table, work)
+    for i in range(work.change.size):
+        attached[0, i] += work.change[i]
+        attached[1, i] = a1 * work.change[i] - attached[1, i]
+    advance(modes, a1, work.change, table, pull)
+    _note(points, contacts, given, state[1], work)
     _put_result(wires, records, points, contacts, count, strips[0], motion, out)
     return DONE
-
-
-@part
-def _opened(book):
-    """Return the arrays of a book: those of the line, and those to work in."""
-    lanes = Lanes(
-        uints32(book, 1), uints32(book, 2), uints32(book, 3), uints32(book, 4), floats64(book, 5), uints64(book, 6),
-        floats64(book, 7), floats64(book, 8), uints64(book, 9), uints64(book, 10), uints64(book, 11), uints64(book, 12),
-    )  # fmt: skip
-    modes = Modes(
-        uints64(book, 13), floats64(book, 14), uints32(book, 15), floats64(book, 16),
-        uints64(book, 17), floats64(book, 18), uints32(book, 19), floats64(book, 20),
-    )  # fmt: skip
-    droppers = Droppers(
-        uints32(book, 21), uints32(book, 22), floats64(book, 23), floats64(book, 24), floats64(book, 25),
-        floats64(book, 26), floats64(book, 27), floats64(book, 28),
-    )  # fmt: skip
-    wires = Wires(ints64(book, 29), floats64(book, 30), floats64(book, 31), ints64(book, 32), ints64(book, 33))
-    work = LanesWork(floats64(book, 34), floats64(book, 35), floats64(book, 36), floats64(book, 37), floats64(book, 38))
-    return lanes, modes, droppers, wires, work, (floats64(book, 39), floats64(book, 40), floats64(book, 41))
 
 
 @part
@@ -158,39 +133,37 @@ def _unknown(wires, records, loaded, given):
 
 
 @part
-def _begin(lanes, droppers, wires, records, moving, state, points, change, pressed, lanes_work):
-    """Find the change of the attachments under the forces at the beginning of the step, and known ones at its end."""
-    attached, table, pull = moving
-    loaded, force, slack, compensation = state[2], state[3], state[4], state[5]
+def _known_force(wires, records, loaded, force, k, table, points):
+    """Add the k-th of known forces on the wires to the modes under it; return its interval's record, and the force."""
+    number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
+    record, row = records.intervals[number], own(points.row, points, 0)
+    point(records, record, loaded[k, 1] - wires.begins[number], force[k, 0], table, row, own(points.load, points, 0))
+    press(records, record, row, force[k, 1], table)
+    return record, force[k, 1]
+
+
+@part
+def _press_known(droppers, wires, records, state, points, table, pressed):
+    """Put the known forces on the attachments, beginning plus end of the step, into ``pressed``."""
+    _, _, loaded, force, slack, compensation = state
     for i in range(pressed.size):
         pressed[i] = droppers.known[i]
     for k in range(slack.size):
         for i in range(droppers.rows[slack[k]], droppers.rows[slack[k] + 1]):
             pressed[droppers.columns[i]] -= compensation[k] * droppers.values[i]
     for k in range(loaded.shape[0]):
-        number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
-        record, place = records.intervals[number], loaded[k, 1] - wires.begins[number]
-        row, share = points.row[0], points.load[0]
-        point(records, record, place, force[k, 0], table, row, share)
-        press(records, record, row, force[k, 1], table)
+        record, of_wire = _known_force(wires, records, loaded, force, k, table, points)
         interval = interval_at(records.whole, record)
         for j in range(interval.size):
-            pressed[records.whole[interval.ends + j]] += force[k, 1] * share[j]
-    load(lanes, attached, pressed, pull, lanes_work)
-    solve(lanes, lanes_work, change)
+            pressed[records.whole[interval.ends + j]] += of_wire * points.load[j]
 
 
 @part
-def _push(wires, records, given, points, motion):
-    """Add what given forces at the end of the step change in it."""
-    _, table, change, _ = motion
-    places, force = given
-    for k in range(places.shape[0]):
-        number = wires.interval[wires.first[places[k, 0]] + places[k, 1]]
-        record, place = records.intervals[number], places[k, 1] - wires.begins[number]
-        point(records, record, place, force[k, 0], table, points.row[0], points.load[0])
-        press(records, record, points.row[0], force[k, 1], table)
-        bend(records, record, points.load[0], force[k, 1], change)
+def _bend_at(records, record, points, i, force, change):
+    """Add what a force on a point changes at the attachments in a step."""
+    interval = interval_at(records.whole, record)
+    share = own(points.load, points, i)[: interval.size]
+    bend(records.data, interval.columns, interval.first, interval.reach, share, force, change)
 
 
 @part
@@ -207,7 +180,7 @@ def _put_free(droppers, motion, free):
 
 
 @part
-def _meet(wires, records, element, impact, strips, gap, motion, local, points, report):
+def _meet(wires, records, state, strips, motion, points, work):
     """Find all strips that cross a wire at the end of the step, forces found inside it left out.
 
     Returns
@@ -215,13 +188,12 @@ def _meet(wires, records, element, impact, strips, gap, motion, local, points, r
     (int, int)
         An interval whose record is lacking, or -1; how many points there are.
     """
-    count = 0
-    place = np.empty(3)
-    report[AHEAD] = -1
+    element, impact, local = state[0], state[1], (work.local, work.rates)
+    count, place = 0, np.empty(3)
+    work.report[AHEAD] = -1
     for s in range(wires.period.size):
         for p in range(strips.shape[0]):
-            strip = strips[p]
-            found = find(wires, records, s, strip, element[p, s], motion, local, place)
+            found = find(wires, records, s, strips[p], element[p, s], motion, local, place)
             if found == NOWHERE:
                 continue
             if found < NOWHERE:
@@ -232,22 +204,22 @@ def _meet(wires, records, element, impact, strips, gap, motion, local, points, r
             points.pantograph[count], points.section[count], points.element[count] = p, s, found
             points.record[count], points.place[count] = record, found - wires.begins[number]
             points.xi[count], points.engagement[count], points.impact[count] = place[0], place[2], impact[p, s]
-            row = points.row[count]
+            row = own(points.row, points, count)
             height, points.compliance[count] = point(
-                records, record, points.place[count], place[0], motion[1], row, points.load[count]
+                records, record, points.place[count], place[0], motion[1], row, own(points.load, points, count)
             )
             points.height[count] = height
             rate = 0.0
             interval = interval_at(records.whole, record)
             for m in range(interval.modes + interval.size):
-                height += row[m] * local[0, m]
-                rate += row[m] * local[1, m]
-            a, b = strip[0, :, 2], strip[1, :, 2]
-            points.penetration[count] = a[0] + place[1] * (b[0] - a[0]) - (height - gap)
+                height += row[m] * work.local[m]
+                rate += row[m] * work.rates[m]
+            a, b = strips[p, 0, :, 2], strips[p, 1, :, 2]
+            points.penetration[count] = a[0] + place[1] * (b[0] - a[0]) - (height - work.numbers[4])
             points.velocity[count] = a[1] + place[1] * (b[1] - a[1]) - rate
             ahead = _next(wires, s, number)
             if records.intervals[ahead] < 0:
-                report[AHEAD] = ahead
+                work.report[AHEAD] = ahead
             count += 1
     return -1, count
 
@@ -262,84 +234,47 @@ def _next(wires, section, number):
 
 
 @part
-def _apply(records, points, contacts, out, motion):
+def _apply(records, points, contacts, table, work):
     """Add what contacts and slack droppers change within the step."""
-    _, table, change, _ = motion
-    of_points, is_slack, lacks = out[4], out[5], out[6]
     for i in contacts:
-        force = of_points[i, 0]
-        if force != 0.0:
-            press(records, points.record[i], points.row[i], force, table)
-            bend(records, points.record[i], points.load[i], force, change)
-    for j in range(is_slack.size):
-        if is_slack[j]:
-            dropper = dropper_at(records.whole, records.droppers[j])
-            add_column(
-                records.data,
-                np.uint64(dropper.column),
-                np.uint64(dropper.first),
-                np.uint64(dropper.reach),
-                -lacks[j],
-                change,
-            )
+        if points.force[i] != 0.0:
+            press(records, points.record[i], own(points.row, points, i), points.force[i], table)
+            _bend_at(records, points.record[i], points, i, points.force[i], work.change)
+    for j in range(work.slack.size):
+        if work.slack[j]:
+            of = dropper_at(records.whole, records.droppers[j])
+            bend(records.data, of.column, of.first, of.reach, work.lacks[j : j + 1], -1.0, work.change)
 
 
 @part
-def _follow(modes, motion, pull):
-    """Replace the motion by that at the end of the step."""
-    a1, table, change, attached = motion
-    for i in range(change.size):
-        attached[0, i] += change[i]
-        attached[1, i] = a1 * change[i] - attached[1, i]
-    advance(modes, a1, change, table, pull)
-
-
-@part
-def _note(points, contacts, given, impact, out, report):
+def _note(points, contacts, given, impact, work):
     """Record the forces at the end of the step; the next one begins with them."""
-    of_points, loaded, load = out[4], out[2], out[3]
-    count = given[0].shape[0]
-    for i in range(count):
-        for j in range(2):
-            loaded[i, j], load[i, j] = given[0][i, j], given[1][i, j]
-    for p in range(out[0].shape[0]):
-        for s in range(out[0].shape[1]):
-            impact[p, s] = 0.0
+    at = 0
+    for k in range(given[0].shape[0]):
+        work.loaded[at], work.loaded[at + 1] = given[0][k, 0], given[0][k, 1]
+        work.load[at], work.load[at + 1] = given[1][k, 0], given[1][k, 1]
+        at += 2
+    impact[:] = 0.0
     for i in contacts:
-        loaded[count, 0], loaded[count, 1] = points.section[i], points.element[i]
-        load[count, 0], load[count, 1] = points.xi[i], of_points[i, 0]
-        count += 1
-        if of_points[i, 1] > 0.0:
+        work.loaded[at], work.loaded[at + 1] = points.section[i], points.element[i]
+        work.load[at], work.load[at + 1] = points.xi[i], points.force[i]
+        at += 2
+        if points.depth[i] > 0.0:
             before = points.impact[i]
-            impact[points.pantograph[i], points.section[i]] = before if before > 0.0 else max(of_points[i, 2], 1e-6)
-    report[LOADED] = count
-    report[SLACK] = _count(out[5])
+            impact[points.pantograph[i], points.section[i]] = before if before > 0.0 else max(points.rate[i], 1e-6)
 
 
 @part
 def _put_result(wires, records, points, contacts, count, strips, motion, out):
     """Put the contacts into the result."""
     _, table, _, attached = motion
-    force, place, of_points = out[0], out[1], out[4]
-    for p in range(force.shape[0]):
-        for s in range(force.shape[1]):
-            force[p, s] = 0.0
-            for i in range(3):
-                place[p, s, i] = math.nan
+    force, place = out
+    force[:], place[:] = 0.0, math.nan
     for i in contacts:
-        force[points.pantograph[i], points.section[i]] = of_points[i, 0]
+        force[points.pantograph[i], points.section[i]] = points.force[i]
     for i in range(count):
         p, s = points.pantograph[i], points.section[i]
         put_place(records, points, i, table, attached, place[p, s])
         if wires.period[s] > 0.0:  # points travel on along with their strips
             laps = (0.5 * (strips[p, 0, 0, 0] + strips[p, 1, 0, 0]) - place[p, s, 0]) / wires.period[s]
             place[p, s, 0] += wires.period[s] * math.floor(laps + 0.5)
-
-
-@part
-def _count(is_slack):
-    """Return how many droppers are slack."""
-    count = 0
-    for j in range(is_slack.size):
-        count += is_slack[j]
-    return count

@@ -135,27 +135,40 @@ def total(typing, value):
     return types.float64(value), generate
 
 
-def _reader(element):
-    """Return a function that gives the array of a book, see `models.catenary.step.array_book`, with such elements."""
+#: What arrays of a book hold: numbers, whole numbers, such from 0, and such in 32 bits, where less to read counts.
+_ELEMENTS = {"f": types.float64, "i": types.int64, "u": types.uint64, "w": types.uint32}
+
+
+def reader(kind, elements):
+    """Return a function that gives arrays of a book as a named tuple, from the k-th on.
+
+    Parameters
+    ----------
+    kind : type
+        Named tuple.
+    elements : str
+        A letter of `_ELEMENTS` for each; the book, see `models.catenary.step.array_book`, does not say.
+    """
+    arrays = [types.Array(_ELEMENTS[letter], 1, "C") for letter in elements]
+    result = types.NamedTuple(arrays, kind)
 
     @intrinsic
     def read(typing, book, k):
-        result = types.Array(element, 1, "C")
-
         def generate(context, builder, signature, arguments):
             known = context.make_array(signature.args[0])(context, builder, arguments[0])
-            at = builder.mul(arguments[1], ir.Constant(arguments[1].type, 2))
-            address = builder.load(builder.gep(known.data, [at]))
-            size = builder.load(builder.gep(known.data, [builder.add(at, ir.Constant(at.type, 1))]))
-            array = context.make_array(result)(context, builder)
-            width = ir.Constant(ir.IntType(64), element.bitwidth // 8)
-            data = builder.inttoptr(address, array.data.type)
-            populate_array(array, data=data, shape=[size], strides=[width], itemsize=width, meminfo=None)
-            return array._getvalue()
+            here = builder.gep(known.data, [builder.mul(arguments[1], ir.Constant(arguments[1].type, 2))])
+            values = []
+            for i, of in enumerate(arrays):
+                address, size = (
+                    builder.load(builder.gep(here, [ir.Constant(ir.IntType(64), 2 * i + j)])) for j in (0, 1)
+                )
+                array = context.make_array(of)(context, builder)
+                width = ir.Constant(ir.IntType(64), of.dtype.bitwidth // 8)
+                data = builder.inttoptr(address, array.data.type)
+                populate_array(array, data=data, shape=[size], strides=[width], itemsize=width, meminfo=None)
+                values.append(array._getvalue())
+            return context.make_tuple(builder, result, values)
 
         return result(book, types.int64), generate
 
     return read
-
-
-floats64, uints64, uints32, ints64 = (_reader(t) for t in (types.float64, types.uint64, types.uint32, types.int64))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import pickle
 import subprocess
@@ -28,8 +29,9 @@ class Trap:
 
 
 @pytest.fixture
-def cache(tmp_path, monkeypatch):
+def cache(tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    caplog.set_level(logging.WARNING, "openpanto")  # a command may have asked for more
     monkeypatch.setattr(kernel_cache, "_named", set())
     return tmp_path
 
@@ -61,6 +63,35 @@ def test_the_second_process_compiles_nothing(cache, twice, caplog):
     assert sum(first.stats.cache_hits.values()) == 0
     assert sum(second.stats.cache_hits.values()) == 1
     assert not caplog.records
+
+
+def test_compiling_is_told_once_and_only_if_it_happens(cache, twice, caplog, monkeypatch):
+    caplog.set_level(logging.INFO, "openpanto")
+    first = twice()
+    assert first(21) == 42
+    assert first(0.5) == 1.0
+    assert [r.getMessage().split()[0] for r in caplog.records] == ["compiling"]
+    monkeypatch.setattr(kernel_cache, "_named", set())
+    caplog.clear()
+    assert twice()(21) == 42
+    assert not caplog.records
+
+
+def test_what_was_not_used_for_longest_makes_room(cache, monkeypatch):
+    monkeypatch.setattr(kernel_cache, "_MOST_VERSIONS", 3)
+
+    def kept(name, k):
+        copy = _kept_source(f"VALUE = {k}\n".encode(), f"{name}-{k:016x}")
+        os.utime(copy.parent, (k, k))
+        return copy.parent
+
+    other, old = kept("toy_of_another_kind", 1), kept("toy", 2)
+    rest = [kept("toy", k) for k in (3, 4)]
+    _kept_source(b"VALUE = 2\n", old.name)  # used again
+    newest = _kept_source(b"VALUE = 5\n", f"toy-{5:016x}").parent
+    assert sorted(f.name for f in (cache / "openpanto").iterdir()) == sorted(
+        f.name for f in (other, old, rest[1], newest)
+    )
 
 
 def test_a_changed_copy_of_the_source_is_not_used(cache):

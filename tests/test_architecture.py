@@ -26,7 +26,7 @@ TIERS: dict[str, list[set[str]]] = {
     "models": [
         {"arrays"},
         {"definition_files", "numerics", "contact_law"},
-        {"catenary", "pantograph"},
+        {"catenary", "pantograph", "signals"},
         {"library", "coupled"},
         {"interface"},
         {"commands"},

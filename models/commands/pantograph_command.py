@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.arrays import FloatArray
+from models.commands.force_over_speed import SPEEDS, print_over_speed, tabulated, write_over_speed
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
@@ -52,6 +53,8 @@ class Characteristics:
         [kg]
     up_and_down : ndarray, shape (h, 5)
         See `LOOP`.
+    over_speed : ndarray, shape (s, 5)
+        See `force_over_speed.tabulated`.
     """
 
     title: str
@@ -61,6 +64,7 @@ class Characteristics:
     frequency: FloatArray
     apparent_mass: npt.NDArray[np.complex128]
     up_and_down: FloatArray
+    over_speed: FloatArray
     freedom: int = 0
 
 
@@ -81,6 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         ([f"{v:.3f}" if i == 0 else f"{round(v, 2) + 0.0:.2f}" for i, v in enumerate(row)] for row in result.statics),
     )
     _print_loop(result.up_and_down, arguments.limit)
+    print_over_speed(result.over_speed)
     freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
     print_table(
         f"Modes, strip free{freedom}", ("frequency [Hz]", "damping [%]", "motion", "remark"), _mode_rows(result)
@@ -114,6 +119,7 @@ def write(folder: Path, result: Characteristics) -> None:
     write_csv(folder / "apparent_mass.csv", names, response, _DIGITS)
     write_figure(folder / "apparent_mass.png", _plot_response(result), 120)
     write_figure(folder / "statics.png", _plot_statics(result), 120)
+    write_over_speed(folder, result.title, result.over_speed, _DIGITS)
     if len(result.up_and_down):
         write_csv(folder / "static_force_up_down.csv", LOOP, list(result.up_and_down.T), _DIGITS)
         write_figure(folder / "static_force_up_down.png", _plot_loop(result), 120)
@@ -146,6 +152,7 @@ def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Char
         frequency,
         lumped.apparent_mass(definition, frequency),
         _loop(lumped.up_and_down(definition, heights, _SLOW)),
+        tabulated(*lumped.contact_force_over_speed(definition, SPEEDS / 3.6).T),
     )
 
 
@@ -173,6 +180,7 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         dynamics.frequency,
         dynamics.apparent_mass,
         _loop(rig.up_and_down(heights, _SLOW)),
+        tabulated(*rig.over_speed(SPEEDS / 3.6).T),
         rig.freedom,
     )
 

@@ -38,7 +38,7 @@ NO_NUMBERS = (
 )  # fmt: skip
 #: Tables whose tables have names of the user's choice.
 NAMED = ("body", "joint", "force")
-NO_UNITS = ("", "K", "furlong", "m/", "M", "kg.m3", "N m", "µm", "m" * 1000)
+NO_UNITS = ("", "degF", "furlong", "m/", "M", "kg.m3", "N m", "µm", "m" * 1000)
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,8 @@ def test_every_value_and_key(tmp_path, kind, maker):
 SIGNED = {"start", "end", "angle", "listed", "anchor", "strip_offset", "position", "pre_sag", "amplitude", "heights",
           "positions", "point_i", "point_j", "axis_i", "axis_j", "euler", "height", "start_position", "force", "moment",
           "static_force", "static_moment", "free_length", "shortest", "longest", "direction", "gravity", "rise",
-          "minimum", "maximum", "spans", "beta", "messenger_stagger", "arm_angle"}  # fmt: skip
+          "minimum", "maximum", "spans", "beta", "messenger_stagger", "arm_angle", "mast_side",
+          "fixed_point"}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", FILES)

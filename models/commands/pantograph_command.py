@@ -24,6 +24,7 @@ from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import CamCurves, Dynamics, Rig
 from models.pantograph.multibody.mechanism_advice import inertia_warning
 from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
+from models.pantograph.multibody.reduced.reduced_motion import reduced_if_possible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +48,8 @@ class Characteristics:
         Names with units, strip height first.
     statics : ndarray, shape (h, len(static_columns))
     modes : tuple of (frequency [Hz], damping ratio, motion, remark)
+    form : str
+        In which form the equations of motion are solved; empty of a lumped model.
     freedom : int
         Independent motions that the joints allow; 0 of a lumped model, whose masses say it.
     frequency : ndarray, shape (f,)
@@ -73,6 +76,7 @@ class Characteristics:
     freedom: int = 0
     alternative: tuple[str, npt.NDArray[np.complex128]] | None = None
     cam: CamCurves | None = None
+    form: str = ""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -93,6 +97,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     _print_loop(result.up_and_down, arguments.limit)
     print_over_speed(result.over_speed)
+    if result.form:
+        print(f"\n{result.form}")
     freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
     print_table(
         f"Modes, strip free{freedom}", ("frequency [Hz]", "damping [%]", "motion", "remark"), _mode_rows(result)
@@ -193,6 +199,7 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         tabulated(*rig.over_speed(SPEEDS / 3.6).T),
         rig.freedom,
         cam=None if arguments.out is None else rig.cam_curves(),
+        form=reduced_if_possible(rig.mechanism, rig.reference)[1],
     )
 
 

@@ -207,5 +207,5 @@ def test_a_pantograph_with_a_speed_of_its_own_is_told_before_anything_is_written
     (tmp_path / "mine.toml").write_text(f"{text}\n{profile}", encoding="utf-8")
     code, _, err = call("new demo --line EN50318_2002 --pantograph mine.toml --speed 250")
     assert code == 1
-    assert err.startswith("error: mine.toml has a [speed_profile], and a project begins with the speed that --speed says")
+    assert err.startswith("error: mine.toml has a [speed_profile], and a project begins with the speed that --speed")
     assert not (tmp_path / "demo").exists()

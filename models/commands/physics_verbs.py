@@ -113,6 +113,9 @@ def add_identify(verbs: Any) -> None:
         metavar="NAME=VALUE",
         help="known value: m3=7.75 (m, c, k; 1 is lowest)",
     )
+    parser.add_argument(
+        "--following", action="store_true", help="the lowest spring follows the height: find its time constant T, too"
+    )
     parser.add_argument("--plot", type=Path, default=None, help="PNG file for measured and fitted response")
     parser.set_defaults(run=_later("identify_command"))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import ComplexArray, FloatArray
+from models.pantograph.multibody.analysis.cam_design import fit_force, strip_height_where
 from models.pantograph.multibody.analysis.force_loop import moved_forces
 from models.pantograph.multibody.analysis.linearisation import (
     Mode,
@@ -79,6 +80,29 @@ class Dynamics:
     base_transmission: ComplexArray
 
 
+@dataclass(frozen=True)
+class CamCurves:
+    """A cam over its range, arrays of shape (k,).
+
+    Attributes
+    ----------
+    is_moment : bool
+        Whether the lifting element gives a moment, and its place is an angle.
+    place : ndarray
+        [rad or m]
+    height : ndarray
+        Of the strip above top of rail, with nothing on it [m]; NaN where it has no equilibrium.
+    for_weights, per_lift : ndarray
+        What it gives without any lift set, and besides for each unit of that [N.m or N].
+    """
+
+    is_moment: bool
+    place: FloatArray
+    height: FloatArray
+    for_weights: FloatArray
+    per_lift: FloatArray
+
+
 class Rig:
     """A pantograph on a rig, its base where it is in operation.
 
@@ -143,6 +167,20 @@ class Rig:
             y = idle.y
         return rows
 
+    def cam_curves(self, points: int = 41) -> CamCurves | None:
+        """Return the cam of the lifting element, None if it has none."""
+        cam = self.mechanism.forces.cam
+        if cam is None:
+            return None
+        places = np.linspace(*cam.per_lift.range, points)
+        heights = np.full(points, np.nan)
+        for k, place in enumerate(places.tolist()):
+            with suppress(MechanismError, np.linalg.LinAlgError):
+                heights[k] = self.base_height + strip_height_where(self.mechanism, self.reference, place)
+        own = [0.0 if cam.for_weights is None else cam.for_weights.at(place) for place in places.tolist()]
+        each = [cam.per_lift.at(place) for place in places.tolist()]
+        return CamCurves(self.definition.lifts_by_moment, places, heights, np.array(own), np.array(each))
+
     def up_and_down(self, heights: FloatArray, speed: float) -> FloatArray:
         """Return strip heights that can be reached [m] and the forces there as the strip goes up and down [N].
 
@@ -167,6 +205,45 @@ class Rig:
                     rows.append((height, found.up, found.down))
                     y = found.y
         return np.array(sorted(rows), dtype=np.float64).reshape(-1, 3)
+
+    def over_speed(self, speeds: FloatArray) -> FloatArray:
+        """Return the static contact force at the reference height over the speed, shape (s, 2) [N].
+
+        Parameters
+        ----------
+        speeds : ndarray, shape (s,)
+            Against the air [m/s].
+
+        Returns
+        -------
+        ndarray, shape (s, 2)
+            With the knuckle leading, and trailing.
+
+        Raises
+        ------
+        MechanismError
+            If there is no equilibrium.
+        """
+        definition, mechanism = self.definition, self.mechanism
+        above, has_air = mechanism.strip_height(self.reference), mechanism.forces.air.count > 0
+        if any(definition.aerodynamic_uplift):
+            fit_force(mechanism, self.reference)
+
+        def force(uplift: float, speed: float) -> float:
+            lift, besides = (definition.lift + uplift, 0.0) if definition.holds_force else (definition.lift, uplift)
+            against = speed if has_air else 0.0
+            found = contact_force_at(mechanism, above, lift, start=self.reference, uplift=besides, against=against)
+            return found.inputs.force
+
+        known: dict[tuple[float, float], float] = {}
+        rows = np.empty((len(speeds), 2))
+        for i, speed in enumerate(speeds.tolist()):
+            for k, coefficient in enumerate(definition.aerodynamic_uplift):
+                what = coefficient * speed * speed, speed if has_air else 0.0
+                if what not in known:
+                    known[what] = force(*what)
+                rows[i, k] = known[what]
+        return rows
 
     def _outwards(self, heights: FloatArray) -> tuple[list[float], list[float]]:
         """Return heights from the reference height up, and from there down."""

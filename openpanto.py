@@ -175,6 +175,15 @@ VERBS: Final[Mapping[str, Verb]] = {
         _FMUS,
         ("build Catenary_LN2 Pantograph_CX", "build demo/lines/demo_LN2.toml --out fmus --standalone"),
     ),
+    "signal": Verb(
+        "build an FMU that plays back a table of signals over time",
+        "fmus.__main__:add_signal",
+        _FMUS,
+        (
+            "signal roof.csv --rate base.z=base.vz",
+            "signal speed.csv --integral train.vx=train.x",
+        ),
+    ),
     "doctor": Verb(
         "report what this machine lacks, to run at all or to run an FMU",
         "openpanto:add_doctor",

@@ -1,4 +1,4 @@
-"""Command line: ``python -m fmus build | runtime | doctor | fingerprint | list``."""
+"""Command line: ``python -m fmus build | signal | runtime | doctor | fingerprint | list``."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Pantograph ports that a line may have, as in `fmus.builder.recipe`.
 _MAX_PORTS: Final = 16
+#: What may be between the rows of a table, as in `models.numerics.sampled_signal`.
+_INTERPOLATIONS: Final = ("held", "linear", "smooth")
 DEFAULT_FOLDER = Path("build/fmus")
 
 
@@ -67,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m fmus", description="Build FMUs and check whether they run here.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     add_build(verbs)
+    add_signal(verbs)
     verb = verbs.add_parser("runtime", help="write the Python that several FMUs share (OPENPANTO_RUNTIME)")
     verb.add_argument("--out", type=Path, default=Path("build/runtime"), metavar="DIR", help="folder (%(default)s)")
     verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to take it from (the present one)")
@@ -90,6 +93,35 @@ def add_build(verbs: Any) -> None:
     verb.add_argument("names", nargs="*", metavar="NAME", help="Catenary_LN2, Pantograph_CX, path/to/LINE.toml ...")
     verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
     _add_lookup(verb)
+    _add_runtime(verb)
+    verb.set_defaults(run=_build)
+
+
+def add_signal(verbs: Any) -> None:
+    """Declare ``signal`` and its options."""
+    text = "build an FMU that plays back a table of signals over time"
+    verb = verbs.add_parser("signal", help=text, description=text)
+    verb.add_argument("file", type=Path, metavar="FILE", help="CSV: 'time [s],name [unit],...', then rows")
+    verb.add_argument("--name", metavar="N", help="of the FMU, Signal_N.fmu (the file's)")
+    verb.add_argument("--out", type=Path, default=DEFAULT_FOLDER, metavar="DIR", help="folder (%(default)s)")
+    verb.add_argument("--time", metavar="COLUMN", help="column of the times (the first, named time)")
+    verb.add_argument(
+        "--interpolation", choices=_INTERPOLATIONS, default="linear", help="what is between the rows (%(default)s)"
+    )
+    for kind, example in (("rate", "base.z=base.vz"), ("integral", "train.vx=train.x")):
+        verb.add_argument(
+            f"--{kind}",
+            action="append",
+            default=[],
+            metavar="COLUMN=NAME",
+            help=f"an output more, the exact {kind} of a column, such as {example}; repeatable",
+        )
+    verb.add_argument("--repeat", action="store_true", help="begin again at the end of the table")
+    _add_runtime(verb)
+    verb.set_defaults(run=_build_signal)
+
+
+def _add_runtime(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--standalone",
         action=argparse.BooleanOptionalAction,
@@ -97,7 +129,6 @@ def add_build(verbs: Any) -> None:
         help="bring Python, numpy and scipy along (default: as the FMU that is replaced)",
     )
     verb.add_argument("--runtime", type=Path, metavar="DIR", help="the Python to bring along (the present one)")
-    verb.set_defaults(run=_build)
 
 
 def _add_lookup(verb: argparse.ArgumentParser) -> None:
@@ -129,12 +160,30 @@ def _count(text: str) -> int:
 
 
 def _build(options: argparse.Namespace) -> None:
+    from fmus.builder.recipe import known_names
+
+    _build_all(_recipes(options.names or known_names(), options), options)
+
+
+def _build_signal(options: argparse.Namespace) -> None:
+    from fmus.builder.signal_recipe import SignalRequest, end_doubt, signal_recipe
+
+    wanted = SignalRequest(
+        options.file, options.name, options.time, options.interpolation, options.rate, options.integral, options.repeat
+    )
+    found = signal_recipe(wanted)
+    if doubt := end_doubt(wanted):
+        print(f"note: {printable(doubt)}", file=sys.stderr)
+    _build_all([found], options)
+
+
+def _build_all(recipes: Sequence[Recipe], options: argparse.Namespace) -> None:
     from fmus.builder.fmu_build import build, why_no_loader
-    from fmus.builder.recipe import BuildError, known_names
+    from fmus.builder.recipe import BuildError
 
     if options.runtime is not None and options.standalone is False:
         raise BuildError("--runtime is for standalone FMUs, which --no-standalone excludes")
-    for wanted in _recipes(options.names or known_names(), options):
+    for wanted in recipes:
         runtime = _runtime(options, options.out / f"{wanted.name}.fmu")
         print(build(wanted, options.out, runtime=runtime.files if runtime else None))
     if why := why_no_loader():

@@ -17,18 +17,27 @@ TOGETHER: Final = {
     "robustness/": "inputs that are added up",
     "validation/test_cx_ln2.py": "whole runs",
     "validation/test_multibody_ln2.py": "whole runs",
+    "models/coupled/test_lanes.py": "lanes",  # whose kernels are compiled once, in a quarter of a minute
+    "master/batch/sweep/test_lanes_engine.py": "lanes",
 }
 #: Groups that take longest: they begin first, so that no process is still at one when the other has finished.
 LONGEST: Final = (
     "whole runs",
     "inputs that are added up",
+    "lanes",
     "interop/test_standalone.py",
-    "interop/test_tools.py",
-    "models/catenary/test_line_model.py",
-    "models/catenary/shape/test_pendulums.py",
-    "models/pantograph/multibody/test_generic.py",
-    "models/catenary/shape/test_nonlinear_truss.py",
+    "master/batch/sweep/test_dask_engine.py",
+    "test_projects.py",
     "fmus/slave/test_library_fmus.py",
+    "test_site.py",
+    "interop/test_paths.py",
+    "models/catenary/condition/test_line_condition.py",
+    "test_python_interface.py",
+    "interop/test_tools.py",
+    "interop/test_many_instances.py",
+    "hostile/test_hostile_fmus.py",
+    "models/catenary/test_line_model.py",
+    "models/pantograph/multibody/test_generic.py",
 )
 
 

@@ -26,7 +26,7 @@ TIERS: dict[str, list[set[str]]] = {
     "models": [
         {"arrays"},
         {"definition_files", "numerics", "contact_law"},
-        {"catenary", "pantograph"},
+        {"catenary", "pantograph", "signals"},
         {"library", "coupled"},
         {"interface"},
         {"commands"},
@@ -54,7 +54,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"mechanism"},
         {"mechanism_assembly", "mechanism_energy"},
         {"analysis", "mechanism_integrator"},
-        {"mechanism_advice", "step_memory", "range_watch"},
+        {"mechanism_advice", "step_memory", "range_watch", "reduced"},
         {"multibody_part"},
     ],
     "fmus": [{"slave", "loader"}, {"builder"}, {"__main__"}],
@@ -107,12 +107,19 @@ def modules() -> dict[str, Path]:
     return found
 
 
+@cache
+def import_statements(path: Path) -> list[ast.Import | ast.ImportFrom]:
+    """Return the imports of a file, wherever they stand."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def imported(path: Path) -> Iterator[str]:
     """Yield every module (or name in one) that a file imports, wherever the import stands."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in import_statements(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
+        elif node.module:
             assert node.level == 0, f"{path}: relative import"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 

@@ -155,7 +155,7 @@ def test_every_verb_is_in_the_command_reference():
     for call, verbs in {
         "python -m master": ("run", "validate", "pack", "calibrate", "study", "compare", "report", "verify"),
         "python -m models": ("statics", "pantograph", "identify", "couple"),
-        "python -m fmus": ("build", "doctor", "list"),
+        "python -m fmus": ("build", "signal", "doctor", "list"),
     }.items():
         found = command_pages.verbs(command_pages.parser_of(call))
         assert set(verbs) <= set(found)

@@ -40,7 +40,7 @@ from models import contact_law
 from models.catenary.definition.line_definition import Contact
 from models.commands import physics_main, physics_verbs
 from models.contact_law import CONTACT_LAWS, ContactLawError, NormalForce, continuous_contact, register_contact_law
-from models.definition_files.si_units import SI, to_si
+from models.definition_files.si_units import OFFSETS, SI, to_si
 from models.definition_files.toml_reader import DefinitionError
 from models.pantograph import identification
 from models.pantograph.multibody.elements import joints
@@ -319,11 +319,12 @@ def test_every_unit_of_a_definition_is_one_of_the_master_and_of_fmi(name):
     """The same factor on both sides of an FMU, and dimensions that its description can spell."""
     si, factor = SI[name]
     assert SI[si] == (si, 1.0)
-    assert to_si(3.0, name, si) == pytest.approx(3.0 * factor)
+    assert to_si(3.0, name, si) == pytest.approx(3.0 * factor + OFFSETS.get(name, 0.0))
     for part in si.replace("/", ".").split("."):
         assert part.rstrip("0123456789") in _DERIVED or part == "1"
     if name in COMMON:
         assert COMMON[name].factor == pytest.approx(factor)
+        assert COMMON[name].offset == OFFSETS.get(name, 0.0)
         assert si not in COMMON or COMMON[name].dimension == COMMON[si].dimension
 
 

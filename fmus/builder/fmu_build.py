@@ -165,6 +165,8 @@ def why_no_loader() -> str:
 
 def _origin(wanted: Recipe, folder: Path) -> dict[str, str]:
     """Return which definition it is, a user's relative to the FMU, which is stale once that changes."""
+    if wanted.text is not None:
+        return {"signal": wanted.definition.name}
     if not wanted.is_own:
         return {"library": f"{wanted.definition.parent.name}/{wanted.definition.name}"}
     path = wanted.definition.resolve()
@@ -187,6 +189,7 @@ def _contents(wanted: Recipe, sources: FmuSources) -> dict[str, bytes]:
         f"{script}.py": _script(wanted, sources).encode(),
         "definition.toml": sources.definition,
         "requirements.txt": _REQUIREMENTS,
+        **wanted.resources,
         f"{sources.package}/__init__.py": f'"""Sources of {wanted.name}."""\n'.encode(),
     }
     try:

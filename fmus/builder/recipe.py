@@ -42,6 +42,7 @@ _KEPT_CODE = "fmus.slave.kept_code"
 _BUILDERS = (
     "builder/fmu_build.py",
     "builder/recipe.py",
+    "builder/signal_recipe.py",
     "builder/fault_list.py",
     "builder/source_bundle.py",
     "builder/fmu_page.py",
@@ -85,6 +86,10 @@ class Recipe:
         Whether the definition is the user's file rather than one of the library: the FMU remembers where it lay.
     added : str
         What follows the file's text in ``resources/definition.toml``.
+    text : bytes or None
+        What stands there in place of the file's text, where the definition is no TOML.
+    resources : mapping
+        More files of the folder ``resources``, by name.
     """
 
     name: str
@@ -96,6 +101,8 @@ class Recipe:
     roots: Mapping[str, Path] = field(default_factory=lambda: ROOTS)
     is_own: bool = False
     added: str = ""
+    text: bytes | None = None
+    resources: Mapping[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -273,7 +280,8 @@ def gather(wanted: Recipe) -> FmuSources:
     """
     try:
         modules = {**collect(_KEPT_CODE, ROOTS, EMPTIED), **collect(wanted.module, wanted.roots, EMPTIED)}
-        definition = wanted.definition.read_bytes() + wanted.added.encode()
+        given = wanted.definition.read_bytes() if wanted.text is None else wanted.text
+        definition = given + wanted.added.encode()
     except (BundleError, SyntaxError) as error:
         raise BuildError(f"{wanted.name}: {error}") from error
     except OSError as error:
@@ -281,6 +289,7 @@ def gather(wanted: Recipe) -> FmuSources:
     icon, binaries, licenses = _icon(wanted.name), platform_libraries(wanted.name), _licenses()
     pieces = {f"module/{n}": m.source.encode() for n, m in modules.items()} | binaries | licenses
     pieces |= {"definition": definition, "icon": icon, "recipe": _recipe_bytes(wanted)}
+    pieces |= {f"resource/{name}": data for name, data in wanted.resources.items()}
     pieces |= _builders()  # the build itself decides about the bytes as well
     return FmuSources(modules, definition, icon, binaries, licenses, _guid(pieces))
 

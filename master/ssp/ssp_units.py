@@ -101,6 +101,8 @@ COMMON: Final = {
         _unit("rad", rad=1),
         _unit("deg", math.pi / 180, rad=1),
         _unit("rad/s", rad=1, s=-1),
+        _unit("1/m", m=-1),
+        _unit("1/K", K=-1),
         _unit("K", K=1),
         _unit("degC", 1.0, 273.15, K=1),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
         check_figure(arguments.plot)
     response = read_response(arguments.response, arguments.kind)
     try:
-        model = identify(response, arguments.stages, _all_fixed(arguments.fix))
+        model = identify(response, arguments.stages, _all_fixed(arguments.fix), following=arguments.following)
     except ValueError as error:
         raise ParameterError(str(error)) from error
     print_table("Identified stages, bottom to top", ("value", "found", "standard deviation"), _rows(model))
@@ -56,13 +57,17 @@ def _rows(model: IdentifiedModel) -> list[tuple[str, str, str]]:
         for i, value in enumerate(values, 1):
             spread = model.deviations.get(f"{letter}{i}")
             rows.append((f"{letter}{i} [{unit}]", f"{value:.6g}", "fixed" if spread is None else f"{spread:.2g}"))
+    if math.isfinite(model.reference_time):
+        spread = model.deviations.get("T")
+        rows.append(("T [s]", f"{model.reference_time:.6g}", "fixed" if spread is None else f"{spread:.2g}"))
     return rows
 
 
 def _plot(response: Response, model: IdentifiedModel) -> Figure:
     from matplotlib.figure import Figure
 
-    fitted = chain_stiffness(response.frequency, model.masses, model.dampings, model.stiffnesses)
+    stages = (model.masses, model.dampings, model.stiffnesses)
+    fitted = chain_stiffness(response.frequency, *stages, model.reference_time)
     figure = Figure(figsize=(8, 5), layout="constrained")
     axes = figure.subplots()
     axes.semilogy(response.frequency, np.abs(1.0 / response.stiffness), ".", label="given")

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.arrays import FloatArray
+from models.commands.force_over_speed import SPEEDS, print_over_speed, tabulated, write_over_speed
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
@@ -22,6 +23,7 @@ from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
 from models.pantograph.multibody.mechanism_advice import inertia_warning
 from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
+from models.pantograph.multibody.reduced.reduced_motion import reduced_if_possible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,6 +47,8 @@ class Characteristics:
         Names with units, strip height first.
     statics : ndarray, shape (h, len(static_columns))
     modes : tuple of (frequency [Hz], damping ratio, motion, remark)
+    form : str
+        In which form the equations of motion are solved; empty of a lumped model.
     freedom : int
         Independent motions that the joints allow; 0 of a lumped model, whose masses say it.
     frequency : ndarray, shape (f,)
@@ -52,6 +56,8 @@ class Characteristics:
         [kg]
     up_and_down : ndarray, shape (h, 5)
         See `LOOP`.
+    over_speed : ndarray, shape (s, 5)
+        See `force_over_speed.tabulated`.
     """
 
     title: str
@@ -61,7 +67,9 @@ class Characteristics:
     frequency: FloatArray
     apparent_mass: npt.NDArray[np.complex128]
     up_and_down: FloatArray
+    over_speed: FloatArray
     freedom: int = 0
+    form: str = ""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -81,6 +89,9 @@ def run(arguments: argparse.Namespace) -> int:
         ([f"{v:.3f}" if i == 0 else f"{round(v, 2) + 0.0:.2f}" for i, v in enumerate(row)] for row in result.statics),
     )
     _print_loop(result.up_and_down, arguments.limit)
+    print_over_speed(result.over_speed)
+    if result.form:
+        print(f"\n{result.form}")
     freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
     print_table(
         f"Modes, strip free{freedom}", ("frequency [Hz]", "damping [%]", "motion", "remark"), _mode_rows(result)
@@ -114,6 +125,7 @@ def write(folder: Path, result: Characteristics) -> None:
     write_csv(folder / "apparent_mass.csv", names, response, _DIGITS)
     write_figure(folder / "apparent_mass.png", _plot_response(result), 120)
     write_figure(folder / "statics.png", _plot_statics(result), 120)
+    write_over_speed(folder, result.title, result.over_speed, _DIGITS)
     if len(result.up_and_down):
         write_csv(folder / "static_force_up_down.csv", LOOP, list(result.up_and_down.T), _DIGITS)
         write_figure(folder / "static_force_up_down.png", _plot_loop(result), 120)
@@ -146,6 +158,7 @@ def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Char
         frequency,
         lumped.apparent_mass(definition, frequency),
         _loop(lumped.up_and_down(definition, heights, _SLOW)),
+        tabulated(*lumped.contact_force_over_speed(definition, SPEEDS / 3.6).T),
     )
 
 
@@ -173,7 +186,9 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         dynamics.frequency,
         dynamics.apparent_mass,
         _loop(rig.up_and_down(heights, _SLOW)),
+        tabulated(*rig.over_speed(SPEEDS / 3.6).T),
         rig.freedom,
+        reduced_if_possible(rig.mechanism, rig.reference)[1],
     )
 
 

@@ -31,6 +31,10 @@ def add_statics(verbs: Any) -> None:
     parser.add_argument("--section", type=int, default=1, help="section of a line with overlaps, from 1 (default 1)")
     parser.add_argument("--speed", type=positive, default=300.0, help="speed of the wave figures, km/h (default 300)")
     parser.add_argument("--force", type=positive, default=100.0, help="force of the elasticity [N] (default 100)")
+    parser.add_argument(
+        "--temperature", type=finite, nargs="+", default=[], metavar="T",
+        help="temperatures [degC] for a table of tensions, movements and sags, of a line with a table [tensioning]",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
     add_settings(parser)
     parser.set_defaults(run=_later("statics_command"))
@@ -66,6 +70,9 @@ def add_identify(verbs: Any) -> None:
         type=_fixed,
         metavar="NAME=VALUE",
         help="known value: m3=7.75 (m, c, k; 1 is lowest)",
+    )
+    parser.add_argument(
+        "--following", action="store_true", help="the lowest spring follows the height: find its time constant T, too"
     )
     parser.add_argument("--plot", type=Path, default=None, help="PNG file for measured and fitted response")
     parser.set_defaults(run=_later("identify_command"))

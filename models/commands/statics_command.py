@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from models.catenary.statics import rest_profile
-from models.commands import route_plots, statics_plots
+from models.catenary.statics.temperature_table import LineAtTemperature, ruling, temperature_table
+from models.commands import route_plots, statics_plots, temperature_report
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import (
     check_folder,
@@ -26,11 +27,17 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
     check_folder(arguments.out)
     result = analyse(arguments)
+    asked = [value + temperature_report.ZERO for value in arguments.temperature]
+    states = temperature_table(result.model.definition, asked, result.section) if asked else ()
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
     print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
+    if states:
+        _print_temperatures(result, states)
     if arguments.out is not None:
         folder = new_folder(arguments.out)
         write(folder, result)
+        if states:
+            temperature_report.write(folder, states)
         print(f"tables and plots: {folder}")
     return 0
 
@@ -49,6 +56,16 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
     warn(found.warnings)
     return found
+
+
+def _print_temperatures(result: LineStatics, states: Sequence[LineAtTemperature]) -> None:
+    wanted, span = ruling(result.model.definition.sections[result.section])
+    print_table(
+        f"Temperatures; sag in the span {span.start:g} ... {span.end:g} m, the ruling span is {wanted:.2f} m",
+        temperature_report.COLUMNS,
+        temperature_report.rows(states),
+    )
+    print_table("Movements", ("quantity", "value"), temperature_report.swings(states))
 
 
 def summary(result: LineStatics) -> list[tuple[str, str]]:

@@ -290,10 +290,28 @@ def read(cls: type[T], table: Table, **given: Any) -> T:
         if spec is not None and field.name not in values:
             values[field.name] = spec.read(table, field.name, field.default)
     result = cls(**values)
-    if isinstance(result, Checked):
+    if isinstance(result, Checked) and not unread(cls, table):
         for key, problem in result.problems():
             table.problem(key, problem)
     return result
+
+
+def unread(cls: type[Any], table: Table) -> set[str]:
+    """Return the names of elements whose kind is unknown: what seems to be missing may be one of these."""
+    named_fields = [f.metadata.get(_META) for f in dataclasses.fields(cls)]
+    return {
+        name
+        for spec in named_fields
+        if isinstance(spec, _Named) and not isinstance(spec.kinds, type)
+        for name, inner in _tables(table, spec.key)
+        if not isinstance(kind := inner.get("kind"), str) or kind not in spec.kinds
+    }
+
+
+def _tables(table: Table, key: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    given = table.data.get(key)
+    if isinstance(given, dict):
+        yield from ((name, inner) for name, inner in given.items() if isinstance(inner, dict))
 
 
 def parameters(obj: Any, provenance: Mapping[str, Quantity], prefix: str = "") -> Iterator[Parameter]:

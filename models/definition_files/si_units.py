@@ -22,6 +22,9 @@ SI: Final[dict[str, tuple[str, float]]] = {
     "s": ("s", 1.0),
     "ms": ("s", 1e-3),
     "1/s": ("1/s", 1.0),
+    "K": ("K", 1.0),
+    "degC": ("K", 1.0),
+    "1/K": ("1/K", 1.0),
     "Hz": ("Hz", 1.0),
     "m/s": ("m/s", 1.0),
     "km/h": ("m/s", 1.0 / 3.6),
@@ -50,6 +53,9 @@ SI: Final[dict[str, tuple[str, float]]] = {
     "rad/s": ("rad/s", 1.0),
 }
 
+#: Unit -> what is added after the factor, where the unit's zero is not that of SI.
+OFFSETS: Final[dict[str, float]] = {"degC": 273.15}
+
 
 def to_si(value: float, unit: str, wanted: str) -> float:
     """Convert ``value`` in ``unit`` to the SI unit ``wanted``.
@@ -63,6 +69,8 @@ def to_si(value: float, unit: str, wanted: str) -> float:
     --------
     >>> to_si(20.0, "kN", "N")
     20000.0
+    >>> to_si(-10.0, "degC", "K")
+    263.15
     """
     if unit not in SI:
         known = units_of(wanted)
@@ -70,7 +78,7 @@ def to_si(value: float, unit: str, wanted: str) -> float:
     si, factor = SI[unit]
     if si != wanted:
         raise ValueError(f"unit '{unit}' where a unit of '{wanted}' is needed ({units_of(wanted)})")
-    return value * factor
+    return value * factor + OFFSETS[unit] if unit in OFFSETS else value * factor
 
 
 def units_of(wanted: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from dataclasses import dataclass
 
@@ -41,8 +40,9 @@ class SupportLimits:
 
     largest_lateral: float = quantity("N", "lateral load of a standard arm", positive=True)
     largest_with_proof: float = quantity("N", "lateral load of an arm with a proof", positive=True)
-    smallest_lateral: float = quantity("N", "lateral load below which an arm comes loose", default=math.nan)
+    smallest_lateral: float = quantity("N", "lateral load below which an arm comes loose", positive=True)
     shortest_dropper: float = quantity("m", "length of a dropper", positive=True)
+    largest_loss: float = quantity("1", "loss of tension over that of the design", positive=True)
 
 
 def gradient_limits() -> tuple[GradientLimits, ...]:

@@ -32,13 +32,15 @@ RESPONSE_KINDS: Final = ("receptance", "apparent_mass", "dynamic_stiffness")
 #: Most stages of a chain that a response at its top can distinguish.
 MAX_STAGES: Final = 6
 _HIGHEST_FREQUENCY: Final = 1e5
-_KINDS: Final = {"m": "mass", "c": "damping", "k": "stiffness"}
+_KINDS: Final = {"m": "mass", "c": "damping", "k": "stiffness", "T": "time constant"}
 _STARTS: Final = 40
 _SEED: Final = 20120
-#: Range of the starts: masses [kg], dampings [N.s/m], stiffnesses [N/m].
-_RANGES: Final = {"m": (1.0, 30.0), "c": (1.0, 300.0), "k": (30.0, 30000.0)}
+#: Name of the time constant of a lowest spring that hangs on a reference following the height.
+_TIME: Final = "T"
+#: Range of the starts: masses [kg], dampings [N.s/m], stiffnesses [N/m], that time constant [s].
+_RANGES: Final = {"m": (1.0, 30.0), "c": (1.0, 300.0), "k": (30.0, 30000.0), "T": (0.1, 3.0)}
 #: Smallest value that a search may reach: below it a damper or spring is as good as none.
-_FLOOR: Final = {"m": 1e-3, "c": 1e-4, "k": 1e-3}
+_FLOOR: Final = {"m": 1e-3, "c": 1e-4, "k": 1e-3, "T": 0.05}
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,8 @@ class IdentifiedModel:
         Standard deviation of every value found, by name (``m1`` ...), from the residual and the fit's curvature.
     misfit : float
         Root mean square of the relative deviation from the response [1].
+    reference_time : float
+        Time constant of a lowest spring that hangs on a reference following the height [s]; infinite: on the roof.
     """
 
     masses: FloatArray
@@ -76,6 +80,7 @@ class IdentifiedModel:
     stiffnesses: FloatArray
     deviations: dict[str, float]
     misfit: float
+    reference_time: float = math.inf
 
 
 def read_response(path: Path, kind: str = "receptance") -> Response:
@@ -133,7 +138,9 @@ def _data_lines(lines: list[list[str]]) -> list[tuple[int, list[str]]]:
     return kept[1:] if has_titles else kept
 
 
-def identify(response: Response, stages: int = 3, fixed: Mapping[str, float] | None = None) -> IdentifiedModel:
+def identify(
+    response: Response, stages: int = 3, fixed: Mapping[str, float] | None = None, *, following: bool = False
+) -> IdentifiedModel:
     """Fit a lumped model to a response.
 
     Parameters
@@ -143,7 +150,9 @@ def identify(response: Response, stages: int = 3, fixed: Mapping[str, float] | N
         Number of masses.
     fixed : mapping, optional
         Values known beforehand, by name: ``m1`` is the lowest mass, ``k3`` the third spring. The source takes the top
-        stage from the real pan-head.
+        stage from the real pan-head. ``T`` is the time constant of a reference that follows.
+    following : bool
+        Whether the lowest spring hangs on a reference that follows the height, whose time constant is found too.
 
     Returns
     -------
@@ -158,6 +167,7 @@ def identify(response: Response, stages: int = 3, fixed: Mapping[str, float] | N
         raise ValueError(f"{stages} stages: 1 to {MAX_STAGES} can be found")
     given = dict(fixed or {})
     names = [f"{letter}{stage}" for letter in "mck" for stage in range(1, stages + 1)]
+    names += [_TIME] if following else []
     unknown = sorted(set(given) - set(names))
     if unknown:
         raise ValueError(
@@ -179,7 +189,9 @@ class _Fit:
     """One identification: which values are free, their logarithms x, the deviation at x."""
 
     def __init__(self, response: Response, names: list[str], free: list[str], given: dict[str, float]) -> None:
-        self._response, self._names, self._free, self._given = response, names, free, given
+        self._response, self._free, self._given = response, free, given
+        self._names = [name for name in names if name != _TIME]
+        self._follows = _TIME in names
         self._low = np.log([_FLOOR[name[0]] for name in free])
         self._high = np.log([1e3 * _RANGES[name[0]][1] for name in free])
 
@@ -190,12 +202,12 @@ class _Fit:
         high = np.log([_RANGES[name[0]][1] for name in self._free])
         return [low + random.random(len(low)) * (high - low) for _ in range(_STARTS)]
 
-    def values(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return masses, dampings and stiffnesses."""
+    def values(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Return masses, dampings, stiffnesses, and the time constant of the reference."""
         known = self._given | dict(zip(self._free, np.exp(x).tolist(), strict=True))
         flat = np.array([known[name] for name in self._names])
         m, c, k = flat.reshape(3, -1)
-        return m, c, k
+        return m, c, k, float(known[_TIME]) if self._follows else math.inf
 
     def deviation(self, x: FloatArray) -> FloatArray:
         """Return the relative deviation, real and imaginary part, shape (2 f,)."""
@@ -213,18 +225,18 @@ class _Fit:
         result = least_squares(
             self.deviation, x, bounds=(self._low, self._high), xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=500
         )
-        m, c, k = self.values(result.x)
+        m, c, k, time = self.values(result.x)
         points = len(self._response.frequency)
         variance = 2.0 * result.cost / max(2 * points - len(x), 1)
         spread = np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(result.jac.T @ result.jac)), 0.0))
         deviations = dict(zip(self._free, (spread * np.exp(result.x)).tolist(), strict=True))
-        return IdentifiedModel(m, c, k, deviations, math.sqrt(2.0 * result.cost / points))
+        return IdentifiedModel(m, c, k, deviations, math.sqrt(2.0 * result.cost / points), time)
 
 
 def _check_fixed(name: str, value: float) -> None:
-    lowest = SMALLEST if name[0] == "m" else 0.0
+    lowest = SMALLEST if name[0] == "m" else _FLOOR[_TIME] if name == _TIME else 0.0
     if not lowest <= value <= LARGEST:
-        rule = "greater than 0" if name[0] == "m" else "0 or greater"
+        rule = "greater than 0" if name[0] == "m" else f"{lowest:g} or greater"
         raise ValueError(f"{name} = {value:g} cannot be: a {_KINDS[name[0]]} must be {rule}, and finite")
 
 

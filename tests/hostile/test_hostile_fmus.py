@@ -81,7 +81,7 @@ def summary(folder):
 @pytest.mark.parametrize(("function", "kind"), CASES)
 def test_isolated_it_is_told_by_name(pair, tmp_path, capsys, function, kind):
     scenario, folder = pair(function, kind, due(function)), tmp_path / "out"
-    limits = ["--isolate", *(["--init-timeout", "5", "--step-timeout", "2"] if kind == "hang" else [])]
+    limits = ["--isolate", *(["--init-timeout", "3", "--step-timeout", "2"] if kind == "hang" else [])]
     code = main([str(scenario), *options(folder), *limits])
     lines = capsys.readouterr().err.splitlines()
     said, found = " ".join(" ".join(lines).split()), summary(folder)

@@ -17,7 +17,8 @@ from pathlib import Path
 import pytest
 
 from master.recording.recording import load
-from tests.effort import count
+from tests import forked_commands
+from tests.effort import IS_LONG, count
 from tests.master.conftest import SSV, ssd_text, toy_fmus  # noqa: F401 (a fixture)
 
 ROOT = Path(__file__).parents[2]
@@ -49,7 +50,7 @@ class Command:
     check: Callable[[], None]
 
 
-def _kill_one(process: subprocess.Popen[str], chance: random.Random) -> None:
+def _kill_one(process: forked_commands.Process | subprocess.Popen[str], chance: random.Random) -> None:
     """Kill the command's process, or one of those that it has started."""
     family = [process.pid, *_descendants(process.pid)]
     try:
@@ -69,7 +70,10 @@ def _descendants(pid: int) -> list[int]:
     return found
 
 
-def _start(command: Command) -> subprocess.Popen[str]:
+def _start(command: Command) -> forked_commands.Process | subprocess.Popen[str]:
+    """Begin a command; the long checks may kill it while Python itself starts."""
+    if not IS_LONG:
+        return forked_commands.start(*command.arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     return subprocess.Popen(
         [sys.executable, "-m", *command.arguments], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

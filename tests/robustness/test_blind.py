@@ -42,6 +42,12 @@ def verdict(scenario, *place, warned=lambda: ()):
     return True
 
 
+def unread(data):
+    """What must be warned of: annotations that are of other tools, as a letter more makes those of ours."""
+    types = {n.get("type") for n in ElementTree.fromstring(data).iter() if n.tag.endswith("}Annotation")}
+    return ("are not read",) if types - {"com.opensimulationplatform", "urn:openpanto:ssp"} else ()
+
+
 def reported(data):
     """What a description says, read by another parser and in another way than the master's."""
     root = ElementTree.fromstring(data)
@@ -79,7 +85,7 @@ def test_descriptions(scenario, change):
     TRIED["description, blindly"] += 1
     data = change(ssd_text().encode())
     rewrite(scenario, SystemStructure__ssd=data)
-    if verdict(scenario, SSD):
+    if verdict(scenario, SSD, warned=lambda: unread(data)):
         assert read(scenario) == reported(data)
 
 

@@ -60,9 +60,12 @@ WRONG = [
     ("models", ["pantograph", "CX", "--heights", "nan", "5"]), ("models", ["pantograph", "CX", "--heights", "5"]),
     ("models", ["couple", "LN2"]), ("models", ["identify"]), ("fmus", []), ("fmus", ["nothing"]),
     ("fmus", ["fingerprint"]), ("fmus", ["doctor"]), ("fmus", ["build", "Catenary_LN2", "--pantographs", "17"]),
+    ("fmus", ["signal"]), ("fmus", ["signal", "x.csv", "--interpolation", "cubic"]),
+    ("fmus", ["signal", "x.csv", "--rate"]),
 ]  # fmt: skip
 IN_VAIN = [
     ("master", ["study", "none"]), ("models", ["statics", "none"]), ("models", ["statics", ""]),
+    ("fmus", ["signal", "none.csv"]), ("fmus", ["signal", "none.csv", "--name", "a-b"]),
     ("models", ["statics", "../LN2"]), ("models", ["statics", "none.toml"]),
     ("models", ["statics", "LN2", "--span", "0"]), ("models", ["statics", "LN2", "--span", "1000"]),
     ("models", ["statics", "LN2", "--section", "0"]), ("models", ["statics", "LN2", "--section", "2"]),

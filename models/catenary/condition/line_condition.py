@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.condition.faults import active_faults, broken_droppers, slips
 from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
+from models.catenary.condition.tensioning import WireTension, mast_sides, swing, tension_factors, wire_tensions
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_rest
 from models.catenary.shape.line_mesh import CatenaryMesh
@@ -26,19 +28,22 @@ def find_condition(design: StaticState) -> StaticState:
     if not _differs(definition):
         return design
     raised = support_height_errors(definition.irregularity, mesh)
+    wires = () if definition.tensioning is None or definition.tensioning.is_design else wire_tensions(design)
     changed = replace(
         mesh,
+        tension_factor=tension_factors(design, wires),
         given_length=_lengths(design),
         broken=broken_droppers(definition, mesh),
         seat=mesh.seat + raised,
     )
-    return find_rest(design, changed, _held(design, raised))
+    return find_rest(design, changed, _held(design, raised, wires))
 
 
 def _differs(definition: CatenaryDefinition) -> bool:
-    """Return whether a line has errors or faults at all."""
-    errors = definition.irregularity
-    return bool(errors.dropper_length_sigma or errors.support_height_sigma or active_faults(definition))
+    """Return whether a line has errors, faults or another temperature at all."""
+    errors, tensioning = definition.irregularity, definition.tensioning
+    changed = tensioning is not None and not tensioning.is_design
+    return bool(changed or errors.dropper_length_sigma or errors.support_height_sigma or active_faults(definition))
 
 
 def _lengths(design: StaticState) -> FloatArray:
@@ -55,14 +60,33 @@ def _lengths(design: StaticState) -> FloatArray:
     return lengths
 
 
-def _held(design: StaticState, raised: FloatArray) -> FloatArray:
-    """Return the design's points with the supports raised: messenger wire and registration ends, shape (n, 3) [m]."""
+def _held(design: StaticState, raised: FloatArray, wires: Sequence[WireTension]) -> FloatArray:
+    """Return the design's points with the supports as they stand: messenger wire and registration ends, (n, 3) [m].
+
+    Cantilevers that the contact wire has swung along the track bring the registration ends nearer to the masts.
+    """
     mesh, points = design.shape.mesh, design.shape.points.copy()
     rise = np.zeros(len(points))
     rise[mesh.sprung] = raised
     rise[mesh.arms[:, 0]] = _at_arms(mesh, raised)
     points[:, 2] += rise[mesh.owner]
+    for wire in wires:
+        if wire.component == "contact_wire":
+            points[:, 1] += _towards_masts(design, wire)
     return points
+
+
+def _towards_masts(design: StaticState, wire: WireTension) -> FloatArray:
+    """Return how far registration ends of a section have come towards their masts, left positive, shape (n,) [m]."""
+    definition, mesh = design.shape.definition, design.shape.mesh
+    assert definition.tensioning is not None
+    x = wire.ends[1:-1]
+    sides = mast_sides(definition.tensioning, len(x))
+    moved = swing(wire.strain * (x - wire.fixed_point), definition.tensioning.cantilever_length)
+    result = np.zeros(len(mesh.points))
+    end, node = mesh.arms[mesh.section[mesh.arms[:, 1]] == wire.section].T
+    result[end] = np.interp(mesh.points[node, 0], x, sides * moved)
+    return result
 
 
 def _at_arms(mesh: CatenaryMesh, raised: FloatArray) -> FloatArray:

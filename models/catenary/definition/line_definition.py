@@ -11,7 +11,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from models.catenary.definition.calculation_definition import Dynamics, Mesh
 from models.catenary.definition.condition_definition import Fault, Irregularity
+from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.definition.track_definition import Track
 from models.contact_law import CONTACT_LAWS
 from models.definition_files import field_schema
@@ -172,30 +174,6 @@ class Contact:
     strip_radius: float = quantity("m", "radius of the collector strip", default=0.0, minimum=0.0, maximum=0.5)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Mesh:
-    """Fineness of the mesh."""
-
-    elements_between_droppers: int = count(
-        "elements of contact and messenger wire between neighbouring droppers", default=6, minimum=1, maximum=64
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Dynamics:
-    """How much of the motion about the static shape is computed."""
-
-    highest_frequency: float = quantity(
-        "Hz", "natural frequency above which modes of the wires between attachments are left out; 0: none are",
-        default=0.0, minimum=0.0, maximum=1e9,
-    )  # fmt: skip
-    geometric_stiffness: int = count(
-        "whether the tension of droppers and steady arms holds them back as pendulums, by N/L across them: 1 yes, "
-        "0 no, as in the 2012 thesis",
-        default=1, minimum=0, maximum=1,
-    )  # fmt: skip
-
-
 @dataclass(frozen=True)
 class Span:
     """A span: its ends, its droppers, and in a compound line the hangers of its auxiliary wire.
@@ -354,6 +332,7 @@ class CatenaryDefinition:
     messenger_support: MessengerSupport | None = part(MessengerSupport, default=None)
     dynamics: Dynamics = part(Dynamics, default=Dynamics())
     track: Track | None = part(Track, default=None)
+    tensioning: Tensioning | None = part(Tensioning, default=None)
     irregularity: Irregularity = part(Irregularity, default=Irregularity())
     fault: tuple[Fault, ...] = ()
     extrapolation_order: int = count(

@@ -35,7 +35,7 @@ def read(table: Table) -> CatenaryDefinition:
     faults = table.tables("fault")
     listed = tuple(field_schema.read(Fault, t) for t in faults)
     definition = dataclasses.replace(line, sections=sections, fault=listed)
-    for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track):
+    for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track, _check_tensioning):
         check(table, definition)
     _check_faults(faults, definition)
     table.finish()
@@ -95,6 +95,34 @@ def _check_track(table: Table, definition: CatenaryDefinition) -> None:
     if any(section.periodic for section in definition.sections) and track.positions and not track.is_constant:
         text = "a line that closes on itself takes a constant track only: the same values at every position"
         table.problem("track.positions", text)
+
+
+def _check_tensioning(table: Table, definition: CatenaryDefinition) -> None:
+    """Check that wires have ends that devices can hold, and that places and sides belong to the one section."""
+    tensioning, sections = definition.tensioning, definition.sections
+    if tensioning is None:
+        return
+    if any(section.periodic for section in sections):
+        table.problem(
+            "tensioning", "a line that closes on itself has no ends that devices could hold: remove the table"
+        )
+        return
+    if tensioning.auxiliary_wire is not None and definition.auxiliary_wire is None:
+        table.problem("tensioning.auxiliary_wire", "the line has no auxiliary wire: remove this table")
+    supports = [len(section.inner_supports) for section in sections]
+    given = len(tensioning.mast_side)
+    if given != 1 and (len(sections) > 1 or given != supports[0]):
+        count = "one, for all sections" if len(sections) > 1 else f"one, or one for each of the {supports[0]} supports"
+        table.problem("tensioning.mast_side", f"gives {given} values: give {count}")
+    fixed = tensioning.fixed_point
+    if fixed is None:
+        return
+    start, end = sections[0].spans[0].start, sections[0].spans[-1].end
+    if len(sections) > 1:
+        text = "of several sections each has its own: leave it out, it is the middle of each"
+        table.problem("tensioning.fixed_point", text)
+    elif not start <= fixed <= end:
+        table.problem("tensioning.fixed_point", f"{fixed:g} m lies outside the line, {start:g} ... {end:g} m")
 
 
 def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:

@@ -64,6 +64,7 @@ def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamP
     """Return the properties of every beam element by its component type."""
     table = np.array([_component(definition, name) for name in COMPONENTS])
     properties = BeamProperties(*table[mesh.component].T.copy())
+    properties.tension[:] *= mesh.tension_factor
     if definition.stitch_wire is not None:
         # Balance along the track at the clamps: the messenger wire between them lacks what the stitch wire pulls.
         properties.tension[mesh.beside_stitch] -= definition.stitch_wire.tension

@@ -65,6 +65,8 @@ class CatenaryMesh:
         Nodes of the messenger wire on supports, elastic ones if the line has a ``MessengerSupport``.
     seat : ndarray, shape (n_supports,)
         Height of the supports' seats, where an elastic one is unloaded [m].
+    tension_factor : ndarray, shape (n_beams,)
+        Tension of a beam element over that of the definition.
     clamp_mass : ndarray, shape (n,)
         Lumped mass [kg].
     support_nodes : ndarray, shape (n_supports,)
@@ -93,6 +95,7 @@ class CatenaryMesh:
     fixed: BoolArray
     sprung: IntArray
     seat: FloatArray
+    tension_factor: FloatArray
     clamp_mass: FloatArray
     support_nodes: IntArray
     arms: IntArray
@@ -403,6 +406,7 @@ def _numbered(draft: _Draft) -> CatenaryMesh:
         fixed=np.array(draft.fixed)[order],
         sprung=new[np.array(draft.sprung, dtype=np.int64)],
         seat=points[np.array(draft.sprung, dtype=np.int64), 2],
+        tension_factor=np.ones(len(draft.beams)),
         clamp_mass=np.array(draft.mass)[order],
         support_nodes=new[np.array(draft.supports, dtype=np.int64)],
         arms=new[np.array(draft.arms, dtype=np.int64).reshape(-1, 2)],

@@ -8,18 +8,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.vector_kernels import (
-    LANES,
-    compiled,
-    get,
-    minus_product,
-    nothing,
-    part,
-    plus_product,
-    product,
-    put,
-    reader,
-)
+from models.catenary.step.vector_kernels import LANES, compiled, get, nothing, part, put, reader
 
 #: Attachments in lanes. ``order``, ``slot``: displacements in the order of their slots, and these, so that arrays in
 #: lanes are read and written from end to end. ``rows``, ``targets``, ``values``: -2 K and a2 M, of each row of vectors
@@ -75,14 +64,13 @@ def multiply(lanes, x, v, right):
     for j in range(_0, np.uint64(rows.size - 1)):
         here = j * _LANES
         own_x, own_v = get(x, here), get(v, here)
-        force = plus_product(get(right, here), get(values, entry), own_x)
-        force = plus_product(force, get(values, entry + _LANES), own_v)
+        force = get(right, here) + get(values, entry) * own_x + get(values, entry + _LANES) * own_v
         entry += _2 * _LANES
         for k in range(rows[j] + _1, rows[j + _1]):
             there, stiff, heavy = targets[k], get(values, entry), get(values, entry + _LANES)
             entry += _2 * _LANES
-            force = plus_product(plus_product(force, stiff, get(x, there)), heavy, get(v, there))
-            put(right, there, plus_product(plus_product(get(right, there), stiff, own_x), heavy, own_v))
+            force += stiff * get(x, there) + heavy * get(v, there)
+            put(right, there, get(right, there) + stiff * own_x + heavy * own_v)
         put(right, here, force)
     for at in range(beyond):
         right[at // _LANES * _LANES + lanes.after[at % _LANES]] += right[first + at]
@@ -107,13 +95,13 @@ def solve(lanes, work, change):
     begin = _0
     for row in range(inner):
         here, to_left = row * _LANES, (_1 + lanes.widths[row]) * _LANES
-        value = product(get(solution, here), get(factor, begin))
+        value = get(solution, here) * get(factor, begin)
         put(solution, here, value)
         for k in range(_LANES, to_left, _LANES):
-            put(solution, here + k, minus_product(get(solution, here + k), get(factor, begin + k), value))
+            put(solution, here + k, get(solution, here + k) - get(factor, begin + k) * value)
         begin += to_left
         for at in range(_0, border * _LANES, _LANES):
-            put(left, at, plus_product(get(left, at), get(factor, begin), value))
+            put(left, at, get(left, at) + get(factor, begin) * value)
             begin += _LANES
     separate(lanes, work)
     for back in range(inner):
@@ -122,10 +110,10 @@ def solve(lanes, work, change):
         begin -= to_left + border * _LANES
         value = get(solution, here)
         for at in range(_0, border * _LANES, _LANES):
-            value = minus_product(value, get(factor, begin + to_left + at), get(left, at))
+            value -= get(factor, begin + to_left + at) * get(left, at)
         for k in range(to_left - _LANES, _0, -_LANES):
-            value = minus_product(value, get(factor, begin + k), get(solution, here + k))
-        put(solution, here, product(value, get(factor, begin)))
+            value -= get(factor, begin + k) * get(solution, here + k)
+        put(solution, here, value * get(factor, begin))
     for k in range(np.uint64(change.size)):
         change[lanes.order[k]] = solution[lanes.slot[k]]
 
@@ -159,7 +147,7 @@ def separate(lanes, work):
         for column in range(border):
             force = get(separators, _2 * column * _LANES + shift)
             for at in range(inner, inner + border * _LANES, _LANES):
-                put(solution, at, plus_product(get(solution, at), get(lanes.middle, block), force))
+                put(solution, at, get(solution, at) + get(lanes.middle, block) * force)
                 block += _LANES
     for row in range(border):
         for lane in range(_LANES):

@@ -171,10 +171,7 @@ class CompiledLineStep:
         if isinstance(found, PackedMotion) and found.units is self.units:
             return found
         prepared = motion.prepared
-        packed = PackedMotion(self.units, *motion.plain(), prepared)
-        if not prepared.size or prepared[0] != self.units.step:
-            self.kernels.prepare(self.units.arrays, packed.table, packed.pull)
-        motion.packed = packed
+        motion.packed = packed = PackedMotion(self.units, *motion.plain(), prepared)
         return packed
 
 

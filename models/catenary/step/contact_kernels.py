@@ -10,7 +10,7 @@ from collections import namedtuple
 import numpy as np
 
 from models.catenary.step.mode_kernels import AMPLITUDE, HELD, INVERSE, RATE
-from models.catenary.step.vector_kernels import LANES, get, part, plus_product, put, reader, spread
+from models.catenary.step.vector_kernels import LANES, get, part, put, reader
 
 #: What `find` returns where a strip crosses no wire; a number below says which interval's record is lacking.
 NOWHERE = -1
@@ -276,7 +276,7 @@ def bend(data, column, first, reach, load, force, change):
     for i in range(_0, whole, _LANES):
         moved = get(change, begin + i)
         for j in range(np.uint64(load.size)):
-            moved = plus_product(moved, get(data, of + j * width + i), spread(force * load[j]))
+            moved += get(data, of + j * width + i) * (force * load[j])
         put(change, begin + i, moved)
     for i in range(whole, width):
         at = begin + i if i < here else i - here

@@ -17,17 +17,8 @@ from models.catenary.step.step_engine import StepEngine, SteppedLine
 from models.numerics.kernel_cache import SWITCH, KernelError, joined, load_kernels, wanted_kernels
 from models.numerics.newmark import Newmark
 
-if TYPE_CHECKING:  # an FMU carries what is imported, and these are never imported by their names
-    from models.catenary.step import (
-        attachment_kernels,
-        contact_kernels,
-        local_kernels,
-        mode_kernels,
-        step_kernels,
-        vector_kernels,
-    )
-
-    _ = (attachment_kernels, contact_kernels, local_kernels, mode_kernels, step_kernels, vector_kernels)
+if TYPE_CHECKING:  # an FMU carries what is imported, and this and what it imports are never imported by their names
+    from models.catenary.step import step_kernels as _  # noqa: F401
 
 #: The kernels, each after those that it calls.
 KERNEL_FILES = tuple(

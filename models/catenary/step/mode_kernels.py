@@ -8,20 +8,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.vector_kernels import (
-    LANES,
-    compiled,
-    get,
-    minus_product,
-    nothing,
-    part,
-    plus_product,
-    product,
-    put,
-    reader,
-    spread,
-    total,
-)
+from models.catenary.step.vector_kernels import LANES, get, nothing, part, put, reader, total
 
 #: Ends that the modes of a unit move with.
 ENDS = 6
@@ -37,7 +24,7 @@ INVERSE, AMPLITUDE, RATE, MOMENTUM, HELD, ROWS = 6, 7, 8, 9, 10, 11
 Modes = namedtuple("Modes", "first rates places shares more more_coupling more_places more_shares")
 modes_of = reader(Modes, "ufwfufwf")
 _0, _1, _2, _3, _4, _5 = (np.uint64(i) for i in range(6))
-_LANES, _UNIT = np.uint64(LANES), np.uint64(ROWS * LANES)
+_ENDS, _LANES, _UNIT = np.uint64(ENDS), np.uint64(LANES), np.uint64(ROWS * LANES)
 _R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
     np.uint64(LANES * row) for row in range(ROWS)
 )
@@ -46,41 +33,16 @@ _R0, _R1, _R2, _R3, _R4, _R5, _INVERSE, _AMPLITUDE, _RATE, _MOMENTUM, _HELD = (
 @part
 def end(places, shares, of, k, change):
     """Return how an end of a group's intervals moves."""
-    at = _2 * (np.uint64(ENDS) * of + k)
+    at = _2 * (_ENDS * of + k)
     return shares[at] * change[places[at]] + shares[at + _1] * change[places[at + _1]]
 
 
 @part
 def draw(places, shares, of, k, force, pull):
     """Add a force on an end of a group's intervals to ``pull``."""
-    at = _2 * (np.uint64(ENDS) * of + k)
+    at = _2 * (_ENDS * of + k)
     pull[places[at]] += shares[at] * force
     pull[places[at + _1]] += shares[at + _1] * force
-
-
-@compiled
-def prepare(modes, table, pull):
-    """Find what modes do in the next step, were the attachments held, and what they do to these.
-
-    Parameters
-    ----------
-    modes, table, pull
-        See `advance`.
-    """
-    for i in range(pull.size):
-        pull[i] = 0.0
-    for group in range(np.uint64(modes.rates.size) // _5):
-        rates = _5 * group
-        for begin in range(modes.first[group] * _UNIT, modes.first[group + _1] * _UNIT, _UNIT):
-            for k in range(begin, begin + _LANES):
-                inverse = table[k + _INVERSE]
-                held = (modes.rates[rates + _3] + modes.rates[rates + _4] * inverse) * table[k + _AMPLITUDE]
-                held += modes.rates[rates + _1] * inverse * table[k + _MOMENTUM]
-                table[k + _HELD] = held
-                value = modes.rates[rates + _2] * table[k + _RATE] - held
-                for j in range(_0, np.uint64(ENDS)):
-                    draw(modes.places, modes.shares, group, j, table[k + j * _LANES] * value, pull)
-    draw_more(modes, table, pull)
 
 
 @part
@@ -102,36 +64,31 @@ def advance(modes, a1, change, table, pull):
     for i in range(pull.size):
         pull[i] = 0.0
     follow_more(modes, change, table)
-    fast, places, shares = spread(a1), modes.places, modes.shares
+    places, shares = modes.places, modes.shares
     for group in range(np.uint64(modes.rates.size) // _5):
         rates = _5 * group
-        to_momentum, a2 = spread(modes.rates[rates]), spread(modes.rates[rates + _1])
-        from_rate = spread(modes.rates[rates + _2])
-        stiff, less = spread(modes.rates[rates + _3]), spread(modes.rates[rates + _4])
-        e0, e1 = spread(end(places, shares, group, _0, change)), spread(end(places, shares, group, _1, change))
-        e2, e3 = spread(end(places, shares, group, _2, change)), spread(end(places, shares, group, _3, change))
-        e4, e5 = spread(end(places, shares, group, _4, change)), spread(end(places, shares, group, _5, change))
+        to_momentum, a2, from_rate = modes.rates[rates], modes.rates[rates + _1], modes.rates[rates + _2]
+        stiff, less = modes.rates[rates + _3], modes.rates[rates + _4]
+        e0, e1 = end(places, shares, group, _0, change), end(places, shares, group, _1, change)
+        e2, e3 = end(places, shares, group, _2, change), end(places, shares, group, _3, change)
+        e4, e5 = end(places, shares, group, _4, change), end(places, shares, group, _5, change)
         t0, t1, t2, t3, t4, t5 = nothing(), nothing(), nothing(), nothing(), nothing(), nothing()
         for k in range(modes.first[group] * _UNIT, modes.first[group + _1] * _UNIT, _UNIT):
             g0, g1, g2 = get(table, k), get(table, k + _R1), get(table, k + _R2)
             g3, g4, g5 = get(table, k + _R3), get(table, k + _R4), get(table, k + _R5)
-            moved = plus_product(plus_product(product(g0, e0), g1, e1), g2, e2)
-            moved = plus_product(plus_product(plus_product(moved, g3, e3), g4, e4), g5, e5)
-            inverse = get(table, k + _INVERSE)
-            further = minus_product(get(table, k + _HELD), moved, inverse)
-            quick = product(fast, further)
-            amplitude = plus_product(get(table, k + _AMPLITUDE), further, spread(1.0))
-            rate = minus_product(quick, get(table, k + _RATE), spread(1.0))
-            momentum = minus_product(plus_product(quick, to_momentum, moved), get(table, k + _MOMENTUM), spread(1.0))
-            held = product(product(a2, inverse), momentum)
-            held = plus_product(held, plus_product(stiff, less, inverse), amplitude)
+            moved, inverse = g0 * e0 + g1 * e1 + g2 * e2 + g3 * e3 + g4 * e4 + g5 * e5, get(table, k + _INVERSE)
+            further = get(table, k + _HELD) - moved * inverse
+            quick, amplitude = further * a1, get(table, k + _AMPLITUDE) + further
+            rate = quick - get(table, k + _RATE)
+            momentum = quick + moved * to_momentum - get(table, k + _MOMENTUM)
+            held = inverse * a2 * momentum + (inverse * less + stiff) * amplitude
             put(table, k + _AMPLITUDE, amplitude)
             put(table, k + _RATE, rate)
             put(table, k + _MOMENTUM, momentum)
             put(table, k + _HELD, held)
-            value = minus_product(product(from_rate, rate), held, spread(1.0))
-            t0, t1, t2 = plus_product(t0, g0, value), plus_product(t1, g1, value), plus_product(t2, g2, value)
-            t3, t4, t5 = plus_product(t3, g3, value), plus_product(t4, g4, value), plus_product(t5, g5, value)
+            value = rate * from_rate - held
+            t0, t1, t2 = t0 + g0 * value, t1 + g1 * value, t2 + g2 * value
+            t3, t4, t5 = t3 + g3 * value, t4 + g4 * value, t5 + g5 * value
         draw(places, shares, group, _0, total(t0), pull)
         draw(places, shares, group, _1, total(t1), pull)
         draw(places, shares, group, _2, total(t2), pull)
@@ -147,12 +104,12 @@ def follow_more(modes, change, table):
     for i in range(np.uint64(modes.more.size) // _2):
         begin, group = modes.more[_2 * i] * _UNIT, modes.more[_2 * i + _1]
         moved = nothing()
-        for j in range(_0, np.uint64(ENDS)):
-            coupling = get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES)
-            moved = plus_product(moved, coupling, spread(end(modes.more_places, modes.more_shares, i, j, change)))
-        held, momentum = get(table, begin + _HELD), get(table, begin + _MOMENTUM)
-        put(table, begin + _HELD, minus_product(held, moved, get(table, begin + _INVERSE)))
-        put(table, begin + _MOMENTUM, minus_product(momentum, spread(modes.rates[_5 * group]), moved))
+        for j in range(_0, _ENDS):
+            moved += get(modes.more_coupling, (i * _ENDS + j) * _LANES) * end(
+                modes.more_places, modes.more_shares, i, j, change
+            )
+        put(table, begin + _HELD, get(table, begin + _HELD) - moved * get(table, begin + _INVERSE))
+        put(table, begin + _MOMENTUM, get(table, begin + _MOMENTUM) - moved * modes.rates[_5 * group])
 
 
 @part
@@ -160,8 +117,7 @@ def draw_more(modes, table, pull):
     """Add what modes do to further ends to ``pull``."""
     for i in range(np.uint64(modes.more.size) // _2):
         begin, group = modes.more[_2 * i] * _UNIT, modes.more[_2 * i + _1]
-        value = product(spread(modes.rates[_5 * group + _2]), get(table, begin + _RATE))
-        value = minus_product(value, spread(1.0), get(table, begin + _HELD))
-        for j in range(_0, np.uint64(ENDS)):
-            force = total(product(value, get(modes.more_coupling, (i * np.uint64(ENDS) + j) * _LANES)))
+        value = get(table, begin + _RATE) * modes.rates[_5 * group + _2] - get(table, begin + _HELD)
+        for j in range(_0, _ENDS):
+            force = total(value * get(modes.more_coupling, (i * _ENDS + j) * _LANES))
             draw(modes.more_places, modes.more_shares, i, j, force, pull)

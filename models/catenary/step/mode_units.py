@@ -74,7 +74,14 @@ class ModeUnits:
         )
         self.table = table.ravel()
         self.table[begin + kernels.INVERSE * lanes] = matrices.inverse
-        self.step, self.n_attached = newmark.step, modes.turn.shape[1]
+        self.step, self._matrices = newmark.step, matrices
+
+    def prepared(self, modal: FloatArray, momentum: FloatArray) -> FloatArray:
+        """Return what a motion does in the next step, were the attachments held; see `PackedMotion.prepared`."""
+        of, a2 = self._matrices, self._matrices.newmark.a2
+        held = of.inverse * (a2 * momentum - 2.0 * of.modes.eigenvalue * modal[0])
+        pull = of.modes.turn.T @ (of.coupling.T @ (a2 / of.mu * modal[1] - held))
+        return np.concatenate(([self.step], held, pull))
 
 
 def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:
@@ -117,9 +124,9 @@ class PackedMotion:
         self.table = aligned(units.table)
         self.table[units.slots], self.table[units.rate] = modal
         self.table[units.momentum] = momentum
-        self.pull = np.zeros(units.n_attached)
-        if prepared.size:
-            self.table[units.held], self.pull[:] = np.split(prepared[1:], [len(momentum)])
+        if not prepared.size or prepared[0] != units.step:
+            prepared = units.prepared(modal, momentum)
+        self.table[units.held], self.pull = np.split(prepared[1:], [len(momentum)])
 
     def unpack(self, modal: FloatArray, momentum: FloatArray) -> None:
         """Put it into the arrays of a `LineMotion`."""

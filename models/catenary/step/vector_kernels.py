@@ -3,13 +3,18 @@
 On a processor that takes fewer at a time the compiler splits them.
 """
 
+import operator
+
 from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
+from numba.core.imputils import lower_builtin
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import populate_array
 
 #: Numbers taken at once.
 LANES = 8
+_EIGHT = ir.VectorType(ir.DoubleType(), LANES)
 #: Sums may be reordered and fused, not more: infinities and NaN stay what they are.
 SUMS = ("reassoc", "contract", "nsz")
 #: What is called from Python; its machine code is kept.
@@ -30,16 +35,16 @@ class Vector(types.Type):
 @register_model(Vector)
 class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager, numba_type):
-        super().__init__(manager, numba_type, ir.VectorType(ir.DoubleType(), LANES))
+        super().__init__(manager, numba_type, _EIGHT)
 
 
 vector = Vector()
 
 
 def _place(context, builder, signature, arguments):
-    """Return the address of ``array[index]``."""
+    """Return the address of eight numbers from ``array[index]`` on."""
     array = context.make_array(signature.args[0])(context, builder, arguments[0])
-    return builder.gep(array.data, [arguments[1]])
+    return builder.bitcast(builder.gep(array.data, [arguments[1]]), _EIGHT.as_pointer())
 
 
 @intrinsic
@@ -47,9 +52,7 @@ def get(typing, array, index):
     """Return ``array[index : index + 8]`` of a contiguous array."""
 
     def generate(context, builder, signature, arguments):
-        address = _place(context, builder, signature, arguments)
-        at = builder.bitcast(address, ir.VectorType(ir.DoubleType(), LANES).as_pointer())
-        return builder.load(at, align=8)
+        return builder.load(_place(context, builder, signature, arguments), align=8)
 
     return vector(array, index), generate
 
@@ -59,52 +62,65 @@ def put(typing, array, index, value):
     """Write ``array[index : index + 8]``."""
 
     def generate(context, builder, signature, arguments):
-        address = _place(context, builder, signature, arguments)
-        at = builder.bitcast(address, ir.VectorType(ir.DoubleType(), LANES).as_pointer())
-        builder.store(arguments[2], at, align=8)
+        builder.store(arguments[2], _place(context, builder, signature, arguments), align=8)
         return context.get_dummy_value()
 
     return types.void(array, index, value), generate
 
 
-@intrinsic
-def plus_product(typing, start, one, other):
+def _arithmetic(operation, of_lanes):
+    """Let the compiler know what an operation does to eight numbers, and to eight and one.
+
+    Parameters
+    ----------
+    operation : function
+        Of `operator`.
+    of_lanes : str
+        Of the compiler's builder.
+    """
+
+    def both(context, builder, of, arguments):
+        return getattr(builder, of_lanes)(*arguments, SUMS)
+
+    def with_one(context, builder, of, arguments):
+        return getattr(builder, of_lanes)(arguments[0], _eight(builder, arguments[1]), SUMS)
+
+    lower_builtin(operation, vector, vector)(both)
+    lower_builtin(operation, vector, types.float64)(with_one)
+    cases = [signature(vector, vector, other) for other in (vector, types.float64)]
+    infer_global(operation)(type("Arithmetic", (ConcreteTemplate,), {"cases": cases}))
+
+
+for _operation in (operator.add, operator.iadd):
+    _arithmetic(_operation, "fadd")
+for _operation in (operator.sub, operator.isub):
+    _arithmetic(_operation, "fsub")
+_arithmetic(operator.mul, "fmul")
+
+
+def _eight(builder, number):
+    """Return a number eight times."""
+    first = builder.insert_element(ir.Constant(_EIGHT, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
+    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
+    return builder.shuffle_vector(first, ir.Constant(_EIGHT, ir.Undefined), places)
+
+
+@part
+def plus_product(start, one, other):
     """Return ``start + one * other``."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.fadd(arguments[0], builder.fmul(arguments[1], arguments[2], SUMS), SUMS)
-
-    return vector(start, one, other), generate
+    return start + one * other
 
 
-@intrinsic
-def minus_product(typing, start, one, other):
+@part
+def minus_product(start, one, other):
     """Return ``start - one * other``."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.fsub(arguments[0], builder.fmul(arguments[1], arguments[2], SUMS), SUMS)
-
-    return vector(start, one, other), generate
+    return start - one * other
 
 
-@intrinsic
-def product(typing, one, other):
+@part
+def product(one, other):
     """Return ``one * other``."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.fmul(arguments[0], arguments[1], SUMS)
-
-    return vector(one, other), generate
-
-
-@intrinsic
-def nothing(typing):
-    """Return eight zeros."""
-
-    def generate(context, builder, signature, arguments):
-        return ir.Constant(ir.VectorType(ir.DoubleType(), LANES), None)
-
-    return vector(), generate
+    return one * other
 
 
 @intrinsic
@@ -112,24 +128,28 @@ def spread(typing, number):
     """Return a number eight times."""
 
     def generate(context, builder, signature, arguments):
-        whole = ir.VectorType(ir.DoubleType(), LANES)
-        first = builder.insert_element(ir.Constant(whole, ir.Undefined), arguments[0], ir.Constant(ir.IntType(32), 0))
-        places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
-        return builder.shuffle_vector(first, ir.Constant(whole, ir.Undefined), places)
+        return _eight(builder, arguments[0])
 
     return vector(types.float64), generate
 
 
 @intrinsic
-def total(typing, value):
-    """Return the sum of the eight numbers."""
+def nothing(typing):
+    """Return eight zeros."""
 
     def generate(context, builder, signature, arguments):
-        whole = ir.VectorType(ir.DoubleType(), LANES)
-        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), whole])
-        reduce = builder.module.globals.get("llvm.vector.reduce.fadd.v8f64") or ir.Function(
-            builder.module, kind, "llvm.vector.reduce.fadd.v8f64"
-        )
+        return ir.Constant(_EIGHT, None)
+
+    return vector(), generate
+
+
+@intrinsic
+def total(typing, value):
+    """Return the sum of the eight numbers."""
+    name, kind = "llvm.vector.reduce.fadd.v8f64", ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), _EIGHT])
+
+    def generate(context, builder, signature, arguments):
+        reduce = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
         return builder.call(reduce, [ir.Constant(ir.DoubleType(), -0.0), arguments[0]], fastmath=SUMS)
 
     return types.float64(value), generate

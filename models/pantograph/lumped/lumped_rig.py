@@ -85,6 +85,29 @@ def contact_force_over_height(definition: LumpedDefinition, heights: FloatArray)
     return result
 
 
+def contact_force_over_speed(definition: LumpedDefinition, speeds: FloatArray) -> FloatArray:
+    """Return the static contact force at the reference height over the speed against the air [N].
+
+    Parameters
+    ----------
+    speeds : ndarray, shape (s,)
+        [m/s]
+
+    Returns
+    -------
+    ndarray, shape (s, 2)
+        With the knuckle leading, and trailing.
+    """
+    squares, shares = np.abs(speeds) * speeds, np.array(definition.air_shares)
+    reaching = np.ones(len(shares))  # what comes of a force on each mass at the strip
+    if not definition.follow_height:
+        flexibility = np.linalg.inv(LumpedModel(definition).K)
+        reaching = flexibility[-1] / flexibility[-1, -1]
+    uplift = np.outer(squares, np.array(definition.aerodynamic_uplift)) * float(reaching @ shares)
+    result: FloatArray = reaching[0] * definition.static_force + uplift
+    return result
+
+
 def up_and_down(definition: LumpedDefinition, heights: FloatArray, speed: float) -> FloatArray:
     """Return strip heights [m] and the forces with which the strip presses as it goes up and down through them [N].
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 from models.definition_files import field_schema
@@ -34,10 +35,13 @@ def read_mechanism(table: Table) -> MechanismDefinition:
     table.text("type", choices=("multibody",))
     definition = field_schema.read(MechanismDefinition, table, provenance=table.provenance)
     definition.check_speed(table)
+    unread = field_schema.unread(MechanismDefinition, table)
     _check_references(table, definition)
+    if not definition.driven and not unread:
+        table.problem("joint", "no body has a prescribed_motion (the base needs one)")
     _check_pairs(table, definition)
     _check_lift(table, definition)
-    _check_friction(table, definition)
+    _check_friction(table, definition, unread)
     table.finish()
     return definition
 
@@ -61,8 +65,6 @@ def _check_references(table: Table, d: MechanismDefinition) -> None:
     if d.strip is not None and d.strip.body in d.driven:
         text = f"body '{d.strip.body}' has a prescribed motion; put the strip on one that the contact can move"
         table.problem("strip.body", text)
-    if not d.driven:
-        table.problem("joint", "no body has a prescribed_motion (the base needs one)")
 
 
 def _check_pairs(table: Table, d: MechanismDefinition) -> None:
@@ -78,9 +80,9 @@ def _check_lift(table: Table, d: MechanismDefinition) -> None:
         table.problem("force", f"only one element can have lift = true ({', '.join(lifting)})")
 
 
-def _check_friction(table: Table, d: MechanismDefinition) -> None:
+def _check_friction(table: Table, d: MechanismDefinition, unread: Collection[str]) -> None:
     joints = {j.name: j for j in d.joints}
-    for f in (f for f in d.forces if isinstance(f, JointFriction)):
+    for f in (f for f in d.forces if isinstance(f, JointFriction) and f.joint not in unread):
         joint = joints.get(f.joint)
         if joint is None:
             table.problem(

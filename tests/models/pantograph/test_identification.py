@@ -87,3 +87,15 @@ def test_wrong_requests_are_refused():
         identify(Response(FREQUENCY, noisy(0.0)), fixed={"m7": 1.0})
     with pytest.raises(ValueError, match="too few"):
         identify(Response(FREQUENCY[:3], noisy(0.0)[:3]))
+
+
+def test_a_reference_that_follows_gives_its_time_constant_back():
+    stiffness = chain_stiffness(FREQUENCY, *CX, 0.5)
+    found = identify(Response(FREQUENCY, stiffness), following=True)
+    assert found.reference_time == pytest.approx(0.5, rel=1e-3)
+    np.testing.assert_allclose(found.stiffnesses, CX[2], rtol=1e-3)
+    held = identify(Response(FREQUENCY, stiffness), fixed={"T": 0.5}, following=True)
+    assert held.reference_time == 0.5
+    assert "T" not in held.deviations
+    with pytest.raises(ValueError, match="there is no value T to fix"):
+        identify(Response(FREQUENCY, stiffness), fixed={"T": 0.5})

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import ComplexArray, FloatArray
+from models.pantograph.multibody.analysis.cam_design import fit_force
 from models.pantograph.multibody.analysis.force_loop import moved_forces
 from models.pantograph.multibody.analysis.linearisation import (
     Mode,
@@ -167,6 +168,45 @@ class Rig:
                     rows.append((height, found.up, found.down))
                     y = found.y
         return np.array(sorted(rows), dtype=np.float64).reshape(-1, 3)
+
+    def over_speed(self, speeds: FloatArray) -> FloatArray:
+        """Return the static contact force at the reference height over the speed, shape (s, 2) [N].
+
+        Parameters
+        ----------
+        speeds : ndarray, shape (s,)
+            Against the air [m/s].
+
+        Returns
+        -------
+        ndarray, shape (s, 2)
+            With the knuckle leading, and trailing.
+
+        Raises
+        ------
+        MechanismError
+            If there is no equilibrium.
+        """
+        definition, mechanism = self.definition, self.mechanism
+        above, has_air = mechanism.strip_height(self.reference), mechanism.forces.air.count > 0
+        if any(definition.aerodynamic_uplift):
+            fit_force(mechanism, self.reference)
+
+        def force(uplift: float, speed: float) -> float:
+            lift, besides = (definition.lift + uplift, 0.0) if definition.holds_force else (definition.lift, uplift)
+            against = speed if has_air else 0.0
+            found = contact_force_at(mechanism, above, lift, start=self.reference, uplift=besides, against=against)
+            return found.inputs.force
+
+        known: dict[tuple[float, float], float] = {}
+        rows = np.empty((len(speeds), 2))
+        for i, speed in enumerate(speeds.tolist()):
+            for k, coefficient in enumerate(definition.aerodynamic_uplift):
+                what = coefficient * speed * speed, speed if has_air else 0.0
+                if what not in known:
+                    known[what] = force(*what)
+                rows[i, k] = known[what]
+        return rows
 
     def _outwards(self, heights: FloatArray) -> tuple[list[float], list[float]]:
         """Return heights from the reference height up, and from there down."""

@@ -117,13 +117,22 @@ def equilibrium_where(
 
 
 def contact_force_at(
-    mechanism: Mechanism, strip_height: float, lift: float, *, start: FloatArray | None = None
-) -> Equilibrium:
-    """Find the contact force that holds the strip's middle at a height [m] against a given lifting value."""
+    mechanism: Mechanism, strip_height: float, lift: float, *, start: FloatArray | None = None,
+    uplift: float = 0.0, against: float = 0.0,
+) -> Equilibrium:  # fmt: skip
+    """Find the contact force that holds the strip's middle at a height [m] against a given lifting value.
+
+    Parameters
+    ----------
+    uplift : float
+        Force that the lifting element brings to the strip besides [N].
+    against : float
+        Speed against the air [m/s].
+    """
     y = assemble(mechanism) if start is None else start
 
     def inputs(force: float) -> Inputs:
-        return Inputs(lift=lift, force=force)
+        return Inputs(lift=lift, force=force, uplift=uplift, against=against)
 
     y, force = _approach(mechanism, y, inputs, 1e-6, strip_height)
     return Equilibrium(y, inputs(force), mechanism.strip_height(y))

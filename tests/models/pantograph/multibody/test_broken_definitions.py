@@ -133,3 +133,17 @@ def test_the_air_pushes_a_body_that_there_is():
     data["force"]["wind"] = {"kind": "aerodynamic", "body": "hed", "coefficient": q(0.01, "N.s2/m2")}
     with pytest.raises(DefinitionError, match=r"force\.wind\.body: there is no body 'hed'"):
         mechanism_from(data)
+
+
+@pytest.mark.parametrize("element", ["joint.roof", "joint.joint_1", "joint.joint_8", "force.lift", "force.arm_stops"])
+def test_a_wrong_kind_is_one_mistake_and_not_what_follows_from_it(element):
+    data = library_data("generic_multibody_cam")
+    data["force"]["rub"] = {
+        "kind": "joint_friction", "joint": "joint_1", "moment": q(20.0, "N.m"), "transition": q(0.001, "rad/s"),
+    }  # fmt: skip
+    section, name = element.split(".")
+    data[section][name]["kind"] = "revolut"
+    with pytest.raises(DefinitionError) as error:
+        mechanism_from(data)
+    (problem,) = error.value.problems
+    assert str(problem).startswith(f"definition: {element}.kind: 'revolut' is none of")

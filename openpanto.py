@@ -151,6 +151,12 @@ VERBS: Final[Mapping[str, Verb]] = {
         _MODELS,
         ("statics LN2", "statics demo/lines/demo_LN2.toml --speed 250 --out statics"),
     ),
+    "spans": Verb(
+        "smallest radius for a span, largest span for a radius, in the wind",
+        "models.commands.physics_verbs:add_spans",
+        _MODELS,
+        ("spans LN2 --wind 29 --limit 0.4", "spans CA160 --pressure 961 --head 1950 --stagger 0.2 0.2 --out spans"),
+    ),
     "pantograph": Verb(
         "statics over height, modes, apparent mass of a pantograph",
         "models.commands.physics_verbs:add_pantograph",

@@ -130,4 +130,9 @@ def test_saved_state_continues_bit_for_bit_here_and_elsewhere(begun):
 
 def test_outputs_at_the_end_of_initialization_are_those_before(begun):
     assert begun.after == begun.before
-    assert not begun.said
+    assert not [text for status, text in begun.said if status != 0]
+
+
+def test_a_mechanism_says_in_which_form_it_moves(begun):
+    form = "reduced form of the equations of motion, in coordinates of the arm"
+    assert [text.startswith(form) for _, text in begun.said] == ([True] if "multibody" in begun.fmu.name else [])

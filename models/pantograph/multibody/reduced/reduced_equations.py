@@ -499,23 +499,21 @@ def continued(
     """Predict by the parabola through the last three rates, correct by Simpson's rule; see `Integrator`."""
     n = len(y) // 2
     a, b, c = h / 24.0, h / 48.0, h / 6.0
-    half = [x + a * (23.0 * f - 16.0 * m + 5.0 * k) for x, f, m, k in zip(y, first, before, begun)]  # noqa: B905 - numba
-    for i in range(n):
-        half[i] = y[i] + b * (begun[i] - 5.0 * before[i] + 19.0 * first[i] + 9.0 * half[n + i])
-    acceleration, _ = evaluate(half, inputs_at(given, now + 0.5 * h), model, False)
-    middle = half[n:] + acceleration
-    guess = [x + c * (m - 2.0 * f + 7.0 * k) for x, f, m, k in zip(y, first, before, middle)]  # noqa: B905
-    for i in range(n):
-        guess[i] = y[i] + c * (first[i] + 4.0 * middle[i] + guess[n + i])
+    v, f, m, k = y[n:], first[n:], before[n:], begun[n:]
+    speeds = [x + a * (23.0 * q - 16.0 * r + 5.0 * s) for x, q, r, s in zip(v, f, m, k)]  # noqa: B905 - numba
+    terms = zip(y, begun, before, first, speeds)  # noqa: B905
+    places = [x + b * (s - 5.0 * r + 19.0 * q + 9.0 * u) for x, s, r, q, u in terms]
+    acceleration, _ = evaluate(places + speeds, inputs_at(given, now + 0.5 * h), model, False)
+    middle = speeds + acceleration
+    guess = [x + c * (r - 2.0 * q + 7.0 * s) for x, r, q, s in zip(v, m, f, acceleration)]  # noqa: B905
+    places = [x + c * (q + 4.0 * s + u) for x, q, s, u in zip(y, first, speeds, guess)]  # noqa: B905
     acting = inputs_at(given, now + h)
-    acceleration, response = evaluate(guess, acting, model, True)
-    last = guess[n:] + acceleration
-    new = [x + c * (f + 4.0 * k + e) for x, f, k, e in zip(y, first, middle, last)]  # noqa: B905
-    error = error_of(new, guess, settings)
-    for i in range(n):
-        speed = y[n + i] + a * (5.0 * first[n + i] + 8.0 * middle[n + i] - last[n + i])
-        new[i] = y[i] + c * (first[i] + 4.0 * speed + new[n + i])
-    return new, last, response, middle, acting, error
+    latest, response = evaluate(places + guess, acting, model, True)
+    speeds = [x + c * (q + 4.0 * s + u) for x, q, s, u in zip(v, f, acceleration, latest)]  # noqa: B905
+    error = error_of(speeds, guess, settings[2][n:], settings[0])  # of places it is 0 by construction
+    halves = [x + a * (5.0 * q + 8.0 * s - u) for x, q, s, u in zip(v, f, acceleration, latest)]  # noqa: B905
+    places = [x + c * (q + 4.0 * s + u) for x, q, s, u in zip(y, first, halves, speeds)]  # noqa: B905
+    return places + speeds, guess + latest, response, middle, acting, error
 
 
 def started(y: Any, first: Any, given: Any, now: Any, h: Any, model: Any, settings: Any) -> Any:
@@ -535,18 +533,18 @@ def started(y: Any, first: Any, given: Any, now: Any, h: Any, model: Any, settin
     new = [y[i] + c * (first[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) for i in range(2 * n)]
     acceleration, response = evaluate(new, at_end, model, True)
     last = new[n:] + acceleration
-    error = error_of([c * k for k in k4], [c * k for k in last], settings)
+    error = error_of([c * k for k in k4], [c * k for k in last], settings[2], settings[0])
     return new, last, response, k3, at_end, error
 
 
-def error_of(a: Any, b: Any, settings: Any) -> Any:
+def error_of(a: Any, b: Any, weights: Any, tolerance: Any) -> Any:
     """Return the largest difference in units of the tolerance."""
     largest = 0.0
-    for x, y, weight in zip(a, b, settings[2]):  # noqa: B905
+    for x, y, weight in zip(a, b, weights):  # noqa: B905
         difference = abs(x - y) * weight
         if not difference <= largest:
             largest = difference
-    return largest / settings[0]
+    return largest / tolerance
 
 
 def factor(error: Any) -> Any:
@@ -573,22 +571,26 @@ def place_strip(memory: Any, model: Any, moved: Any, ends: Any) -> None:
     on = int(strip[0])
     if on >= 0:
         px, py, pz, _, _, _, _, _, _, wx, wy, wz, _, _, _ = motion_of(bodies[on], y, n, sin_p, cos_p)
-    rate = y[n + 1] if strip[21] > 0.0 else 0.0
-    ux, uy, uz = model[1][2] * rate, model[1][3] * rate, model[1][4] * rate
+    roll = y[n + 1] if strip[21] > 0.0 else 0.0
+    ux, uy, uz = model[1][2] * roll, model[1][3] * roll, model[1][4] * roll
     dx, dy, dz = vector_at(strip, 10, sin_p, cos_p)
     lx, ly, lz = vector_at(strip, 1, sin_p, cos_p)
-    for k in range(2):
-        side = strip[20] if k == 0 else -strip[20]
-        ax, ay, az = lx + side * dx, ly + side * dy, lz + side * dz
-        x, z = px + ax, pz + az
-        vx = t[VX] * y[n] + turn * z + wx + uy * az - uz * ay
-        vy = wy + uz * ax - ux * az
-        vz = t[VZ] * y[n] - turn * x + wz + ux * ay - uy * ax
-        ends[6 * k] = t[CARRIER_X] + cosine * x + sine * z + moved[0]
-        ends[6 * k + 1] = strip[19] + py + ay
-        ends[6 * k + 2] = t[CARRIER_Z] - sine * x + cosine * z + moved[1]
-        ends[6 * k + 3], ends[6 * k + 4] = cosine * vx + sine * vz + moved[2], vy
-        ends[6 * k + 5] = -sine * vx + cosine * vz + moved[3]
+    x, z = px + lx, pz + lz
+    vx = t[VX] * y[n] + turn * z + wx + uy * lz - uz * ly
+    vz = t[VZ] * y[n] - turn * x + wz + ux * ly - uy * lx
+    vy, py = wy + uz * lx - ux * lz, strip[19] + py + ly
+    # From the middle to end A, and how that turns.
+    half = strip[20]
+    dx, dy, dz = half * dx, half * dy, half * dz
+    qx, qy, qz = turn * dz + uy * dz - uz * dy, uz * dx - ux * dz, ux * dy - uy * dx - turn * dx
+    middle = t[CARRIER_X] + cosine * x + sine * z + moved[0], t[CARRIER_Z] - sine * x + cosine * z + moved[1]
+    speed = cosine * vx + sine * vz + moved[2], cosine * vz - sine * vx + moved[3]
+    away = cosine * dx + sine * dz, cosine * dz - sine * dx
+    rate = cosine * qx + sine * qz, cosine * qz - sine * qx
+    ends[0], ends[1], ends[2] = middle[0] + away[0], py + dy, middle[1] + away[1]
+    ends[3], ends[4], ends[5] = speed[0] + rate[0], vy + qy, speed[1] + rate[1]
+    ends[6], ends[7], ends[8] = middle[0] - away[0], py - dy, middle[1] - away[1]
+    ends[9], ends[10], ends[11] = speed[0] - rate[0], vy - qy, speed[1] - rate[1]
 
 
 def place_bodies(memory: Any, model: Any, outline: Any, moved: Any, out: Any) -> None:

@@ -178,6 +178,7 @@ def test_accelerations_are_those_of_the_general_form(case):
         assert other == pytest.approx(acceleration + change, rel=1e-9, abs=1e-9 * scale)
 
 
+@pytest.mark.filterwarnings("ignore:.*reflected list")
 def test_kernels_give_the_plain_numbers(case, monkeypatch):
     pytest.importorskip("numba")
     definition, model, balance = case
@@ -244,9 +245,11 @@ def run_beside(definition, seconds, force_at, base_at):
 def test_trajectories_are_those_of_the_general_form(name, seconds):
     """At a step so small that neither integration errs by as much as the forms may differ."""
     definition = load_pantograph(name)
+    mean = 157.5 if name != "CX_multibody" else 168.0
 
     def force_at(t):
-        return 160.0 + 30.0 * np.sin(9.0 * t) + 20.0 * np.sin(37.0 * t)
+        # It grows as the lift does: a constant-force cam brings nothing back, and a hit on a stop is no smooth motion.
+        return min(1.0, t / 0.1) * (mean + 30.0 * np.cos(9.0 * t) + 20.0 * np.cos(37.0 * t))
 
     worst, (auto, general) = run_beside(
         replace(definition, time_step=5e-4), seconds, force_at,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from models.arrays import FloatArray, Snapshot
 from models.numerics.cubic_curve import CubicCurve
+from models.numerics.kernel_cache import kernels_if_wanted
 from models.pantograph.multibody.elements.rotations import cross
 from models.pantograph.multibody.mechanism import Mechanism
 from models.pantograph.multibody.mechanism_assembly import project
@@ -18,6 +20,13 @@ from models.pantograph.multibody.reduced.head_chain import HeadChain, HeadRows
 from models.pantograph.multibody.reduced.quintic_table import QuinticTable
 from models.pantograph.multibody.reduced.reduction import NotReducibleError, reduction_of
 
+if TYPE_CHECKING:  # an FMU carries what is imported, and this is never imported by its name
+    from models.pantograph.multibody.reduced import reduced_kernels as _  # noqa: F401
+
+#: Read now: an FMU's folder may be gone when a second instance asks for the kernels.
+_SOURCE: Final = b"\n".join(
+    Path(__file__).with_name(f"{name}.py").read_bytes() for name in ("reduced_equations", "reduced_kernels")
+)
 #: Why a step could not be made.
 _REASONS: Final = {
     reduced_equations.TOO_SMALL: "the error control wants steps too small for the reduced form",
@@ -188,7 +197,7 @@ def reduced_if_possible(mechanism: Mechanism, standing: FloatArray) -> tuple[Red
 
 
 class ReducedMotion:
-    """The motion of a pantograph in reduced coordinates.
+    """The motion of a pantograph in reduced coordinates, with compiled kernels where there are any.
 
     Parameters
     ----------
@@ -196,22 +205,38 @@ class ReducedMotion:
 
     Attributes
     ----------
-    memory : tuple of lists
+    memory : tuple of lists, or of arrays with kernels
         State and what the next step continues; see `reduced_equations`.
+
+    Raises
+    ------
+    KernelError
+        If the environment asks for kernels that cannot be had, or for ones that do not exist.
     """
 
     def __init__(self, model: ReducedModel) -> None:
         self.model = model
+        kernels = kernels_if_wanted("reduced", _SOURCE)
+        self._equations: Any = reduced_equations if kernels is None else kernels
+        self._plain = kernels is None
         n = model.size
-        self.memory: Any = tuple([0.0] * k for k in (2 * n, n, 3 * n, 2 * n, 2 * n, reduced_equations.SINGLE))
-        self._settings = model.settings
-        self._equations: Any = reduced_equations
+        self.memory: Any = tuple(
+            self._rows(np.zeros(k)) for k in (2 * n, n, 3 * n, 2 * n, 2 * n, reduced_equations.SINGLE)
+        )
+        self._settings = (*model.settings[:2], self._rows(np.array(model.settings[2])))
         self.refresh()
+
+    def _rows(self, values: FloatArray) -> Any:
+        return values.tolist() if self._plain else np.ascontiguousarray(values)
 
     def refresh(self) -> None:
         """Take the curves of the lifting element again: one was fitted."""
         self._fitted = self.model.mechanism.forces.per_force
-        self._numbers, self._outline = self.model.numbers(_plain_table, lambda a: a.tolist(), lambda a: a.tolist())
+        self._numbers, self._outline = self.model.numbers(self._table, self._rows, self._rows)
+
+    def _table(self, table: QuinticTable) -> Any:
+        count = len(table.cells)
+        return table.start, count / (table.end - table.start), count, list(table.cells) if self._plain else table.cells
 
     @property
     def base_acceleration(self) -> float:
@@ -240,8 +265,22 @@ class ReducedMotion:
     def begin(self, given: list[float]) -> None:
         """Begin at rest where all coordinates are 0; ``given`` as in ``step``."""
         for part in self.memory:
-            part[:] = [0.0] * len(part)
-        self._equations.begin(self.memory, given, self._numbers, self._settings)
+            part[:] = self._rows(np.zeros(len(part)))
+        self._equations.begin(self.memory, self._inputs(given), self._numbers, self._settings)
+        if not self._plain:
+            self._rehearse(given)
+
+    def _rehearse(self, given: list[float]) -> None:
+        """Take a trial step, so that the first real one finds everything compiled: a paced run must not wait for it."""
+        memory, self.memory = self.memory, tuple(part.copy() for part in self.memory)
+        self.step(given, self._settings[1])
+        self.place_strip((0.0, 0.0, 0.0, 0.0), np.zeros((2, 2, 3)))
+        self.bodies((0.0, 0.0, 0.0))
+        self.lift_value()
+        self.memory = memory
+
+    def _inputs(self, given: list[float]) -> Any:
+        return given if self._plain else np.array(given, dtype=np.float64)
 
     def step(self, given: list[float], duration: float) -> str:
         """Advance by ``duration`` [s]; say so if nothing has changed because the general form has to take over.
@@ -256,7 +295,7 @@ class ReducedMotion:
         """
         if self._fitted is not self.model.mechanism.forces.per_force:
             self.refresh()
-        done = self._equations.step(self.memory, given, duration, self._numbers, self._settings)
+        done = self._equations.step(self.memory, self._inputs(given), duration, self._numbers, self._settings)
         return _REASONS[done] if done else ""
 
     def snapshot(self) -> Snapshot:
@@ -267,18 +306,20 @@ class ReducedMotion:
         """Take over a snapshot."""
         ends = np.cumsum([len(part) for part in self.memory])
         for part, values in zip(self.memory, np.split(snapshot["reduced"], ends[:-1]), strict=True):
-            part[:] = values.tolist()
+            part[:] = self._rows(values.astype(np.float64))
 
     def place_strip(self, moved: tuple[float, float, float, float], strip: FloatArray) -> None:
         """Write the ends of the strip, shape (2, 2, 3); see `reduced_equations.place_strip`."""
-        ends = [0.0] * 12
+        flat = strip.reshape(12)
+        ends: Any = [0.0] * 12 if self._plain else flat
         self._equations.place_strip(self.memory, self._numbers, moved, ends)
-        strip.ravel()[:] = ends
+        if self._plain:
+            flat[:] = ends
 
     def bodies(self, base: tuple[float, float, float]) -> FloatArray:
         """Return height, velocity and acceleration of the bodies, shape (bodies, 3), for those of the base."""
         order = self.model.order
-        found = [0.0] * (3 * len(order))
+        found = self._rows(np.zeros(3 * len(order)))
         self._equations.place_bodies(self.memory, self._numbers, self._outline, base, found)
         return np.array(found).reshape(-1, 3)[order]
 
@@ -289,11 +330,6 @@ class ReducedMotion:
     def posture(self, base: FloatArray) -> FloatArray:
         """Return nearly the same at rest, for those who only look where bodies are."""
         return self.model.posture(np.array(self.memory[0]), base)
-
-
-def _plain_table(table: QuinticTable) -> tuple[float, float, int, list[FloatArray]]:
-    count = len(table.cells)
-    return table.start, count / (table.end - table.start), count, list(table.cells)
 
 
 def _rows_of(curve: CubicCurve | None) -> FloatArray:

@@ -32,7 +32,14 @@ from models.pantograph.multibody.reduced.reduced_motion import ReducedModel, Red
 from models.pantograph.operation import Drive
 from tests.effort import count
 
+#: The motion is plain here, but where kernels are compared with it.
+KERNEL = "OPENPANTO_KERNEL"
 LIBRARY = ("CX_multibody", "generic_multibody", "generic_multibody_cam")
+
+
+@pytest.fixture(autouse=True)
+def plain(monkeypatch):
+    monkeypatch.setenv(KERNEL, "numpy")
 
 
 def unit(*vector):
@@ -169,6 +176,34 @@ def test_accelerations_are_those_of_the_general_form(case):
         moment = (force + 30.0) * (lateral + 0.1) - force * lateral
         change = np.array([30.0, moment, 0.5]) @ response.reshape(3, -1)
         assert other == pytest.approx(acceleration + change, rel=1e-9, abs=1e-9 * scale)
+
+
+def test_kernels_give_the_plain_numbers(case, monkeypatch):
+    pytest.importorskip("numba")
+    definition, model, balance = case
+    plain = ReducedMotion(model)
+    monkeypatch.setenv(KERNEL, "numba")
+    compiled = ReducedMotion(model)
+    for y in random_states(model, np.random.default_rng(11), 20):
+        for acting in ((120.0, 0.3, 1.0, balance, 20.0), (0.0, 0.0, 0.0, 0.5 * balance, 0.0)):
+            for mine, theirs in zip(compiled.evaluate(y, acting), plain.evaluate(y, acting), strict=True):
+                assert mine == pytest.approx(theirs, rel=1e-12, abs=1e-12 * np.abs(theirs).max())
+    given = [0.0, 0.0, 3, 0.0, -1e-3, -2e-3, 150.0, 149.0, 147.0, 2, 0.1, 0.2, 0.0, 0.0, 0.01, 0.2, 5.0]
+    given += [balance, definition.lift, 0.0025, 0.02, 3.0, float(definition.holds_force)]
+    strips = np.zeros((2, 2, 2, 3))
+    for motion in (plain, compiled):
+        motion.begin(given)
+    for k in range(40):
+        given[0] = 1e-3 * k
+        for motion, strip in zip((plain, compiled), strips, strict=True):
+            assert motion.step(given, 1e-3) == ""
+            motion.place_strip((0.0, 0.0, 80.0, 0.0), strip)
+        assert np.abs(strips[0] - strips[1]).max() < 1e-12
+    assert np.abs(plain.bodies((0.0, 0.0, 0.0)) - compiled.bodies((0.0, 0.0, 0.0))).max() < 1e-9
+    assert compiled.lift_value() == pytest.approx(plain.lift_value(), rel=1e-12)
+    # What one leaves the other continues.
+    compiled.restore(plain.snapshot())
+    assert compiled.snapshot()["reduced"].tobytes() == plain.snapshot()["reduced"].tobytes()
 
 
 def test_the_strip_is_where_its_body_is(case):

@@ -30,7 +30,8 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         '(and with formulation = "general" in the definition) for all bodies; the log says which when a run starts.'
     )
     limits: ClassVar[tuple[str, ...]] = (
-        "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops).",
+        "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops). Dry friction "
+        "goes with the hyperbolic tangent of the speed, so that it creeps at rest.",
         "Aerodynamic uplift is a coefficient times the square of the speed, as on open track, brought to the strip by "
         "the lifting element; an element that has a cam holds its force ideally, real cams deviate by their tolerance.",
         "Straight track; the roof's motion is an input (base.z, base.y, base.roll, base.yaw and "

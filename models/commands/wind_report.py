@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.arrays import FloatArray
+from models.arrays import BoolArray, FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.wind_definition import DesignWind, Wind
 from models.catenary.shape.support_places import SupportPlaces
@@ -39,6 +39,8 @@ class InTheWind:
     found : BlowOff
     start, end, limit : ndarray, shape (n_spans,)
         Of every span [m]; the limit is NaN where none is known, or no strip runs.
+    works : ndarray, shape (n_spans,)
+        Whether the wire is at its working height.
     """
 
     pressure: float
@@ -46,6 +48,7 @@ class InTheWind:
     start: FloatArray
     end: FloatArray
     limit: FloatArray
+    works: BoolArray
 
 
 def asked_wind(definition: CatenaryDefinition, arguments: argparse.Namespace) -> tuple[DesignWind, float]:
@@ -71,9 +74,10 @@ def in_the_wind(result: LineStatics, arguments: argparse.Namespace) -> InTheWind
     start, end = np.array([s.start for s in spans]), np.array([s.end for s in spans])
     first, last = (start[0], end[-1]) if section.periodic else section.ends.working
     limit = np.full(len(spans), math.nan)
-    for k in np.flatnonzero((start >= first) & (end <= last)).tolist():
+    works = (start >= first) & (end <= last)
+    for k in np.flatnonzero(works).tolist():
         limit[k] = _limit(definition, result.section, float(start[k]), float(end[k]), arguments)
-    return InTheWind(pressure, blow_off(result.model, pressure, result.section), start, end, limit)
+    return InTheWind(pressure, blow_off(result.model, pressure, result.section), start, end, limit, works)
 
 
 def rows(wind: InTheWind) -> list[Sequence[str]]:
@@ -94,10 +98,10 @@ def rows(wind: InTheWind) -> list[Sequence[str]]:
 def summary(wind: InTheWind) -> list[tuple[str, str]]:
     """Return the rows of figures: what, value with unit."""
     found = wind.found
-    worst = int(found.offset.argmax())
+    worst = int(np.where(wind.works, found.offset, 0.0).argmax())
     result = [
         ("pressure of the wind [Pa]", f"{wind.pressure:.2f}"),
-        ("largest offset [mm]", f"{1e3 * found.offset[worst]:.0f} in span {worst + 1}"),
+        ("largest offset at the working height [mm]", f"{1e3 * found.offset[worst]:.0f} in span {worst + 1}"),
     ]
     if found.lift.size:
         arm = int(np.abs(found.lift).max(axis=1).argmax())

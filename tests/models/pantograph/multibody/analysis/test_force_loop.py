@@ -82,6 +82,19 @@ def test_a_head_rubs_as_it_slides_and_as_it_rolls(friction, force, moment):
     assert loads[0, [2, 3]] == pytest.approx(-loads[1, [2, 3]])
 
 
+def test_a_head_that_has_rolled_rubs_along_its_own_axis():
+    m = head(**SLIDE)
+    s = m.split(m.written_state())
+    p, v = s.p.copy(), np.zeros((2, 3))
+    p[1] = [np.cos(0.2), np.sin(0.2), 0.0, 0.0]  # 0.4 rad about x
+    along = np.array([0.0, -np.sin(0.4), np.cos(0.4)])
+    v[1] = 0.008 * along
+    moving = m.join(s.r, p, v, np.zeros((2, 3)))
+    loads = m.loads(moving, m.kinematics(moving), Inputs())
+    assert loads[1, :3] == pytest.approx(-12.0 * np.tanh(0.8) * along)
+    assert loads[0, :3] == pytest.approx(-loads[1, :3])
+
+
 @pytest.mark.parametrize(
     ("friction", "told"),
     [

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from models.commands.physics_main import main
 from models.library.catalogue import load_pantograph
 from models.pantograph.multibody.analysis.mechanism_statics import settle_springs
 from models.pantograph.multibody.mechanism import Mechanism
@@ -115,3 +116,9 @@ def test_a_head_on_a_crooked_arm_is_no_plane_one():
     model, text = form_of(replace(d, joints=joints, assembly=replace(d.assembly, largest_gap=0.2)))
     assert model is None
     assert text.endswith("body 'm1' does not stay in the plane of the track")
+
+
+def test_the_command_prints_the_form(capsys):
+    assert main(["pantograph", "CX_multibody"]) == 0
+    said = "reduced form of the equations of motion, in coordinates of the arm and 2 displacements"
+    assert said in capsys.readouterr().out

@@ -151,6 +151,12 @@ VERBS: Final[Mapping[str, Verb]] = {
         _MODELS,
         ("statics LN2", "statics demo/lines/demo_LN2.toml --speed 250 --out statics"),
     ),
+    "spans": Verb(
+        "smallest radius for a span, largest span for a radius, in the wind",
+        "models.commands.physics_verbs:add_spans",
+        _MODELS,
+        ("spans LN2 --wind 29 --limit 0.4", "spans CA160 --pressure 961 --head 1950 --stagger 0.2 0.2 --out spans"),
+    ),
     "pantograph": Verb(
         "statics over height, modes, apparent mass of a pantograph",
         "models.commands.physics_verbs:add_pantograph",
@@ -406,6 +412,7 @@ def _add_copy(verbs: Any, verb: str, kind: str) -> None:
 
 def _new(options: argparse.Namespace) -> int:
     """Write a project."""
+    from master.errors import RequestError
     from master.evaluation.en50367_limits import SUPPLIES, LimitChoice, limits_at
     from master.scenario.project import new_project as projects
     from master.scenario.project.stretch import Wire, check_speed
@@ -424,6 +431,11 @@ def _new(options: argparse.Namespace) -> int:
         pantograph, definition = _source("pantographs", given, name, load_pantograph)
         train.append(pantograph)
         if definition is not None:
+            if definition.speed_profile is not None:
+                raise RequestError(
+                    f"{given} has a [speed_profile], and a project begins with the speed that --speed says: leave it "
+                    "out, and write it into the copy afterwards in place of the scenario's parameter 'speed'"
+                )
             raised = raised if len(train) > 1 else facts.raised_after(definition)
             lifts[pantograph.name] = projects.Lift(*facts.lift_facts(definition))
     target = limits_at(speed, LimitChoice(options.supply)).mean_upper.value

@@ -1,12 +1,14 @@
 """What a step of each pantograph costs: ``python benchmarks/pantograph_step.py``.
 
-Lumped and multibody parts at 1 ms under a contact force that changes, times real time and against the lumped CX; and
-the multibody ones as FMUs, called by fmpy.
+Lumped and multibody parts at 1 ms under a contact force that changes, times real time and against the lumped CX;
+multibody ones with and without kernels and in the general form of their equations, and as FMUs, called by fmpy.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from fmu_calls import stepped
@@ -21,13 +23,18 @@ STEP = 1e-3
 STEPS = 500
 
 
-def steps(name: str) -> Callable[[], None]:
+def steps(name: str, formulation: str = "auto", kernel: str = "auto") -> Callable[[], None]:
     """Return a function that steps a pantograph under a swinging force."""
+    os.environ["OPENPANTO_KERNEL"] = kernel
     definition = load_pantograph(name)
-    multibody = isinstance(definition, MechanismDefinition)
-    part = MultibodyPantographPart(definition) if multibody else LumpedPantographPart(definition)
+    part: LumpedPantographPart | MultibodyPantographPart
+    if isinstance(definition, MechanismDefinition):
+        part = MultibodyPantographPart(replace(definition, formulation=formulation))
+    else:
+        part = LumpedPantographPart(definition)
     base = np.zeros(2)
     part.initialise(0.0, 0.0, np.zeros(3), base)
+    os.environ["OPENPANTO_KERNEL"] = "auto"
     clock = {"n": 0}
 
     def run() -> None:
@@ -54,6 +61,9 @@ def fmu_steps(name: str) -> Callable[[], None]:
 def main() -> None:
     on_one_thread()
     jobs = {name: steps(name) for name in pantograph_names()}
+    for name in (n for n in pantograph_names() if "multibody" in n):
+        jobs[f"{name}, plain"] = steps(name, kernel="numpy")
+        jobs[f"{name}, general form"] = steps(name, "general")
     jobs |= {f"{name} as FMU": fmu_steps(name) for name in pantograph_names() if name.endswith("multibody")}
     best = by_turns(jobs, rounds=5)
     rows = [

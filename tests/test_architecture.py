@@ -54,7 +54,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"mechanism"},
         {"mechanism_assembly", "mechanism_energy"},
         {"analysis", "mechanism_integrator"},
-        {"mechanism_advice", "step_memory", "range_watch"},
+        {"mechanism_advice", "step_memory", "range_watch", "reduced"},
         {"multibody_part"},
     ],
     "fmus": [{"slave", "loader"}, {"builder"}, {"__main__"}],

@@ -73,6 +73,8 @@ COMMANDS: Final = (
     "verify wave_speeds --out {dir}",
     "statics {in:toml}",
     "statics EN50318_2002 --out {dir}",
+    "spans {in:toml} --wind 29 --limit 0.5",
+    "spans EN50318_2002 --wind 29 --limit 0.5 --out {dir}",
     "pantograph {in:toml}",
     "pantograph CX --out {dir}",
     "identify {in:csv}",

@@ -199,3 +199,13 @@ def test_a_line_with_an_overlap_is_judged_over_it_and_an_early_interval_is_told(
     code, _, said = call("new early --line LN2 --pantograph CX --speed 250 --interval 100 600")
     assert code == 0
     assert re.fullmatch(r"note: figures are taken from 100 m and .* begin at \d+ m or later, with --interval\n", said)
+
+
+def test_a_pantograph_with_a_speed_of_its_own_is_told_before_anything_is_written(call, tmp_path):
+    text = (LIBRARY / "pantographs" / "CX.toml").read_text(encoding="utf-8").replace('name = "CX"', 'name = "mine"')
+    profile = '[speed_profile]\ntime = [[0, 5], "s", "choice: t"]\nspeed = [[70, 75], "m/s", "choice: t"]\n'
+    (tmp_path / "mine.toml").write_text(f"{text}\n{profile}", encoding="utf-8")
+    code, _, err = call("new demo --line EN50318_2002 --pantograph mine.toml --speed 250")
+    assert code == 1
+    assert err.startswith("error: mine.toml has a [speed_profile], and a project begins with the speed that --speed")
+    assert not (tmp_path / "demo").exists()

@@ -12,12 +12,10 @@ import numpy as np
 from fmus.builder.recipe import BuildError, Recipe
 from models.definition_files.message_text import hint
 from models.numerics.sampled_signal import HELD, LINEAR
-from models.signals.signal_definition import NUMBERS, TABLE_FILE, Kind, Output, definition_text
-from models.signals.signal_reading import SignalFileError, SignalTable, read_signals
+from models.signals.signal_definition import NUMBERS, SHIFT, TABLE_FILE, Kind, Output, definition_text
+from models.signals.signal_reading import VARIABLE, SignalFileError, SignalTable, read_signals
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
-#: Of an output that is made of a column: its name.
-_MADE = re.compile(r"[A-Za-z_][\w.\[\]]*")
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def _outputs(wanted: SignalRequest, table: SignalTable) -> tuple[Output, ...]:
     asked: list[tuple[str, Kind]] = [*((t, "rate") for t in wanted.rates), *((t, "integral") for t in wanted.integrals)]
     for text, kind in asked:
         column, _, name = text.partition("=")
-        if not _MADE.fullmatch(name):
+        if not VARIABLE.fullmatch(name):
             raise BuildError(f"--{kind} {text}: write COLUMN=NAME, such as base.z=base.vz")
         if column not in table.names:
             raise BuildError(f"--{kind} {text}: {wanted.file} has no column '{column}'{hint(column, table.names)}")
@@ -105,6 +103,11 @@ def _outputs(wanted: SignalRequest, table: SignalTable) -> tuple[Output, ...]:
         place = table.names.index(column)
         unit = table.units[place]
         outputs.append(Output(name, rate_unit(unit) if kind == "rate" else integral_unit(unit), place, kind))
+    parameters = {SHIFT, *(f"{column}.{key}" for column in table.names for key in ("gain", "offset"))}
+    if taken := [o.name for o in outputs if o.name in parameters]:
+        raise BuildError(
+            f"{wanted.file}: '{taken[0]}' is the name of a parameter of the FMU; give the output another one"
+        )
     return tuple(outputs)
 
 

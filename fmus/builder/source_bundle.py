@@ -11,7 +11,7 @@ import ast
 import functools
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,8 @@ REQUIREMENTS = ("numpy", "scipy")
 #: What makes an FMU faster where it is installed: numba, and the compiler below it, which numba brings.
 OPTIONAL = ("numba", "llvmlite")
 _DYNAMIC_IMPORTS = {"import_module", "__import__"}
+#: Stands for the private package's name until that is known.
+_PACKAGE = "openpanto_private_package"
 
 
 class BundleError(ValueError):
@@ -104,16 +106,22 @@ def rewrite(module: Module, package: str, roots: Mapping[str, Path]) -> str:
     >>> rewrite(Module("m", Path("m.py"), "from models.numerics import newmark"), "private", {"models": Path()})
     'from private.models.numerics import newmark'
     """
+    return _rewritten(module, frozenset(roots)).replace(_PACKAGE, package)
+
+
+@functools.lru_cache(maxsize=1024)  # many FMUs carry the same modules, each in a package of its own name
+def _rewritten(module: Module, roots: frozenset[str]) -> str:
+    """Return the source as `rewrite` does, moved below `_PACKAGE`."""
     lines = module.source.encode().splitlines(keepends=True)
     for node in sorted(_imports(module), key=lambda n: (n.lineno, n.col_offset), reverse=True):
         if any(_root(name) in roots for name in _imported_names(node)):
-            _replace(lines, node, package, roots)
+            _replace(lines, node, _PACKAGE, roots)
     text = b"".join(lines).decode()
     check_rewritten(text, str(module.path), roots)
     return text
 
 
-def check_rewritten(source: str, where: str, roots: Mapping[str, Path]) -> None:
+def check_rewritten(source: str, where: str, roots: Collection[str]) -> None:
     """Raise ``BundleError`` if a source still imports from ``roots`` under their public names."""
     tree = ast.parse(source)
     for node in statements(tree):
@@ -199,7 +207,7 @@ def _absolute_names(node: ast.Import | ast.ImportFrom, module: Module) -> list[s
     return [".".join([*parts, node.module] if node.module else parts)]
 
 
-def _replace(lines: list[bytes], node: ast.Import | ast.ImportFrom, package: str, roots: Mapping[str, Path]) -> None:
+def _replace(lines: list[bytes], node: ast.Import | ast.ImportFrom, package: str, roots: Collection[str]) -> None:
     first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
     start, end = node.col_offset, node.end_col_offset
     if isinstance(node, ast.ImportFrom):
@@ -213,7 +221,7 @@ def _replace(lines: list[bytes], node: ast.Import | ast.ImportFrom, package: str
     lines[first : last + 1] = [lines[first][:start] + moved + tail]
 
 
-def _moved_import(alias: ast.alias, package: str, roots: Mapping[str, Path]) -> str:
+def _moved_import(alias: ast.alias, package: str, roots: Collection[str]) -> str:
     named = f" as {alias.asname}" if alias.asname else ""
     if _root(alias.name) not in roots:
         return f"import {alias.name}{named}"

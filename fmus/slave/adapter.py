@@ -144,6 +144,10 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         """Return what deserves a second look in a part that has just been initialised."""
         return ()
 
+    def _start_remark(self, part: PartT) -> str:
+        """Return what the log may say about a part that has just been initialised, as no warning."""
+        return ""
+
     def _step_warning(self, part: PartT, step: float) -> str:
         """Return what is wrong with steps of a length that the part can make nevertheless."""
         return ""
@@ -370,6 +374,8 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
         try:
             for text in self._start_warnings(self._part, self._variables.inputs.copy()):
                 self._warn(text)
+            if remark := self._start_remark(self._part):
+                self.log(clean(remark), Fmi2Status.ok)
         except BaseException as error:
             self._break_down(error)
 

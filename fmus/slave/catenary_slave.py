@@ -34,8 +34,9 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "An overhead contact line of several spans in three dimensions: contact wire and messenger wire (and stitch "
         "wires, where the definition has them) as tensioned Euler-Bernoulli beams, droppers that carry tension only, "
         "steady arms, stagger, clamps as lumped masses, proportional damping. The static shape is found first (given "
-        "contact-wire height and pre-sag, the dropper lengths follow), then, with errors of assembly or active faults, "
-        "where the line comes to rest with the lengths and supports that these leave it; the dynamics are linear about "
+        "contact-wire height and pre-sag, the dropper lengths follow), then, with errors of assembly, active faults or "
+        "another temperature, where the line comes to rest with the lengths and supports that these leave it; the "
+        "dynamics are linear about "
         "it, except for slackening droppers and the contact, and are integrated with constant steps. The pantograph "
         "gives the ends of its collector strip; the line finds where the wire crosses the strip, the contact force "
         "from the interpenetration, and its point of application. Between communication points the strip is continued "
@@ -50,9 +51,13 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "the form of the 2012 thesis, its damper goes on acting. dropper[...].force is all that a dropper carries, the "
         "damper's part included; dropper[...].slack says whether it is slack.",
         "The contact is unilateral, without friction along the strip.",
-        "Errors of assembly and faults are there from the start of a run, under the tensions of the design; uplift "
+        "Errors of assembly and faults are there from the start of a run; uplift "
         "counts from where they have left the line, not from the design.",
-        "No wind, no temperature, no wear, no aerodynamic forces; no electrical model.",
+        "On a curved or canted track x is the length of the track's axis, y and z lie in the rail plane. Curves act as "
+        "loads on the wires at rest: offsets between supports are wrong by about (L/2R)^2/6 of themselves, lengths by "
+        "y/R; no crossing of two tracks, no inertia of the curve along the track, radii of 150 m and more.",
+        "Temperature and tensioning devices act on the line at rest, before the run; in it tensions stay.",
+        "No wind in a run, no wear, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
         "definition.",
         "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: a strip meets the "

@@ -25,10 +25,13 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         "track at its speed, by its speed profile or as train.x and train.vx say. "
         "It starts at rest with the strip at reference_height, the actuator just carrying "
         "the weights; from raise_start the actuator grows to its value over raise_duration. The contact force acts "
-        "on the head where the line says, so that a staggered wire makes the head roll, and the strip's ends follow."
+        "on the head where the line says, so that a staggered wire makes the head roll, and the strip's ends follow. "
+        "Where the mechanism allows it, the equations of motion are solved in as few coordinates as it has, otherwise "
+        '(and with formulation = "general" in the definition) for all bodies; the log says which when a run starts.'
     )
     limits: ClassVar[tuple[str, ...]] = (
-        "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops).",
+        "Rigid bodies and ideal joints, unless the definition says otherwise (bushings, friction, stops). Dry friction "
+        "goes with the hyperbolic tangent of the speed, so that it creeps at rest.",
         "Aerodynamic uplift is a coefficient times the square of the speed, as on open track, brought to the strip by "
         "the lifting element; an element that has a cam holds its force ideally, real cams deviate by their tolerance.",
         "Straight track; the roof's motion is an input (base.z, base.y, base.roll, base.yaw and "
@@ -46,6 +49,9 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         text = "what the lifting element gives, in place of all else, if lift_input is 1"
         lift = Signal("lift.value", unit, text, 0.0)
         return pantograph_ports(part, (*DRIVE_SIGNALS[1:], lift, *SWAY_SIGNALS, *TRAIN_SIGNALS))
+
+    def _start_remark(self, part: MultibodyPantographPart) -> str:
+        return part.form()
 
     def _start_warnings(self, part: MultibodyPantographPart, inputs: FloatArray) -> Iterable[str]:
         yield part.working_height_warning(float(inputs[1]), float(inputs[3]))

@@ -45,7 +45,7 @@ class SignalSlave(Adapter[SignalDefinition, SignalPart]):
         part.initialise(time)
 
     def _advance(self, part: SignalPart, inputs: FloatArray, step: float) -> None:
-        part.step(step)
+        part.move(self._time + step)  # the host's own time: sums of steps would drift
 
 
 def _signal(definition: SignalDefinition, output: Output) -> Signal:

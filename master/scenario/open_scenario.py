@@ -13,7 +13,7 @@ from pathlib import Path
 from master.errors import Problem, RequestError, ScenarioError
 from master.fmu import fmu_provision
 from master.fmu.fmu_description import lacking_binary, read_fmu
-from master.scenario import value_checks
+from master.scenario import switched_inputs, value_checks
 from master.scenario.overrides import Overrides, effective_settings, with_energy, with_values
 from master.scenario.scenario_checks import ScenarioChecks
 from master.scenario.scenario_place import fmu_cache, located
@@ -116,6 +116,7 @@ def load_system(
     if text := text or value_checks.half_empty_rows(system, overrides.empty, overrides.absent):
         raise RequestError(text)
     system = without(system, overrides.absent)
+    system = replace(system, warnings=(*system.warnings, *switched_inputs.doubts(system)))
     if overrides.stop is None and _ends_with_interval(structure):
         system = _until_end(system)
     found = list(value_checks.problems(system, system.may_stop_early))

@@ -80,6 +80,7 @@ COMMON: Final = {
         _unit("m/s2", m=1, s=-2),
         _unit("kg", kg=1),
         _unit("kg/m", kg=1, m=-1),
+        _unit("kg/m3", kg=1, m=-3),
         _unit("N", kg=1, m=1, s=-2),
         _unit("daN", 10.0, kg=1, m=1, s=-2),
         _unit("kN", 1e3, kg=1, m=1, s=-2),

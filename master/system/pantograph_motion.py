@@ -25,14 +25,23 @@ def parameter_value(component: Component, name: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def is_switched_on(component: Component, name: str) -> bool:
+    """Return whether a parameter that is 0 or 1 is not 0; False if there is none."""
+    variable = component.fmu.variables.get(name)
+    if variable is None or variable.causality != "parameter":
+        return False
+    try:
+        return float(component.parameters.get(name, variable.start or 0.0)) != 0.0
+    except ValueError:
+        return False
+
+
 def constant_speed(component: Component) -> float | None:
     """Return the speed that a pantograph keeps, None if its FMU does not say one or inputs say how it moves.
 
     A pantograph with a speed profile has no parameter ``speed``.
     """
-    switch = component.fmu.variables.get(USE_TRAIN)
-    is_moved = switch is not None and component.parameters.get(USE_TRAIN, switch.start) not in (None, "0")
-    return None if is_moved else parameter_value(component, "speed")
+    return None if is_switched_on(component, USE_TRAIN) else parameter_value(component, "speed")
 
 
 def pantographs(system: System) -> tuple[Component, ...]:

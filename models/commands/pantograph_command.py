@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.arrays import FloatArray
+from models.commands.cam_curves import write_cam
 from models.commands.force_over_speed import SPEEDS, print_over_speed, tabulated, write_over_speed
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
@@ -20,9 +21,10 @@ from models.library.catalogue import doubts, load_pantograph
 from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_advice import idle_values
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
-from models.pantograph.multibody.analysis.mechanism_rig import Dynamics, Rig
+from models.pantograph.multibody.analysis.mechanism_rig import CamCurves, Dynamics, Rig
 from models.pantograph.multibody.mechanism_advice import inertia_warning
 from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
+from models.pantograph.multibody.reduced.reduced_motion import reduced_if_possible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,6 +48,8 @@ class Characteristics:
         Names with units, strip height first.
     statics : ndarray, shape (h, len(static_columns))
     modes : tuple of (frequency [Hz], damping ratio, motion, remark)
+    form : str
+        In which form the equations of motion are solved; empty of a lumped model.
     freedom : int
         Independent motions that the joints allow; 0 of a lumped model, whose masses say it.
     frequency : ndarray, shape (f,)
@@ -55,6 +59,10 @@ class Characteristics:
         See `LOOP`.
     over_speed : ndarray, shape (s, 5)
         See `force_over_speed.tabulated`.
+    alternative : (str, ndarray of complex, shape (f,)) or None
+        What the apparent mass would be otherwise [kg], and when.
+    cam : CamCurves or None
+        Worked out if it is written.
     """
 
     title: str
@@ -66,6 +74,9 @@ class Characteristics:
     up_and_down: FloatArray
     over_speed: FloatArray
     freedom: int = 0
+    alternative: tuple[str, npt.NDArray[np.complex128]] | None = None
+    cam: CamCurves | None = None
+    form: str = ""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -86,6 +97,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     _print_loop(result.up_and_down, arguments.limit)
     print_over_speed(result.over_speed)
+    if result.form:
+        print(f"\n{result.form}")
     freedom = f", {result.freedom} degrees of freedom" if result.freedom else ""
     print_table(
         f"Modes, strip free{freedom}", ("frequency [Hz]", "damping [%]", "motion", "remark"), _mode_rows(result)
@@ -120,6 +133,8 @@ def write(folder: Path, result: Characteristics) -> None:
     write_figure(folder / "apparent_mass.png", _plot_response(result), 120)
     write_figure(folder / "statics.png", _plot_statics(result), 120)
     write_over_speed(folder, result.title, result.over_speed, _DIGITS)
+    if result.cam is not None:
+        write_cam(folder, result.title, result.cam, _DIGITS)
     if len(result.up_and_down):
         write_csv(folder / "static_force_up_down.csv", LOOP, list(result.up_and_down.T), _DIGITS)
         write_figure(folder / "static_force_up_down.png", _plot_loop(result), 120)
@@ -153,6 +168,7 @@ def _lumped(definition: LumpedDefinition, arguments: argparse.Namespace) -> Char
         lumped.apparent_mass(definition, frequency),
         _loop(lumped.up_and_down(definition, heights, _SLOW)),
         tabulated(*lumped.contact_force_over_speed(definition, SPEEDS / 3.6).T),
+        alternative=_on_the_roof(definition, frequency),
     )
 
 
@@ -182,7 +198,17 @@ def _multibody(definition: MechanismDefinition, arguments: argparse.Namespace) -
         _loop(rig.up_and_down(heights, _SLOW)),
         tabulated(*rig.over_speed(SPEEDS / 3.6).T),
         rig.freedom,
+        cam=None if arguments.out is None else rig.cam_curves(),
+        form=reduced_if_possible(rig.mechanism, rig.reference)[1],
     )
+
+
+def _on_the_roof(definition: LumpedDefinition, frequency: FloatArray) -> tuple[str, npt.NDArray[np.complex128]] | None:
+    """Return the apparent mass with the lowest spring on the roof, None where it is there anyway."""
+    if not definition.follow_height:
+        return None
+    fixed = definition.with_values({"follow_height": 0})
+    return "follow_height = 0", lumped.apparent_mass(fixed, frequency)
 
 
 def _loop(moved: FloatArray) -> FloatArray:
@@ -248,6 +274,11 @@ def _plot_response(result: Characteristics) -> Figure:
     upper.semilogy(result.frequency, np.abs(result.apparent_mass))
     upper.set_ylabel("apparent mass [kg]")
     lower.plot(result.frequency, np.degrees(np.angle(result.apparent_mass)))
+    if result.alternative is not None:
+        label, other = result.alternative
+        upper.semilogy(result.frequency, np.abs(other), "--", label=label)
+        lower.plot(result.frequency, np.degrees(np.angle(other)), "--")
+        upper.legend()
     lower.set_ylabel("phase [deg]")
     lower.set_xlabel("frequency [Hz]")
     for axes in (upper, lower):

@@ -35,9 +35,51 @@ def add_statics(verbs: Any) -> None:
         "--temperature", type=finite, nargs="+", default=[], metavar="T",
         help="temperatures [degC] for a table of tensions, movements and sags, of a line with a table [tensioning]",
     )  # fmt: skip
+    add_wind(parser)
     parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
     add_settings(parser)
     parser.set_defaults(run=_later("statics_command"))
+
+
+def add_spans(verbs: Any) -> None:
+    """Declare ``spans``."""
+    parser = verbs.add_parser("spans", help="smallest radius for a span, largest span for a radius, in the wind")
+    parser.add_argument("line", help="name in the library, or a definition file")
+    add_wind(parser)
+    parser.add_argument(
+        "--radius", type=positive, nargs="+", default=None, metavar="R", help="radii for the largest span [m]"
+    )
+    parser.add_argument(
+        "--stagger", type=finite, nargs=2, action="append", default=[], metavar=("B1", "B2"),
+        help="staggers at both ends of a span, positive to the outside of the curve [m]; may be given several times "
+        "(default: the line's, alternating and not)",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and the plot (PNG)")
+    add_settings(parser)
+    parser.set_defaults(run=_later("spans_command"))
+
+
+def add_wind(parser: argparse.ArgumentParser) -> None:
+    """Declare what wind is meant, and how far the wire may be blown by it."""
+    strength = parser.add_mutually_exclusive_group()
+    strength.add_argument(
+        "--wind", type=positive, default=None, metavar="V",
+        help="speed of a steady wind across the line [m/s], in place of that of [wind.design]",
+    )  # fmt: skip
+    strength.add_argument(
+        "--pressure", type=positive, default=None, metavar="PA", help="or its pressure, 1/2 rho V^2 G_q [Pa]"
+    )
+    allowed = parser.add_mutually_exclusive_group()
+    allowed.add_argument(
+        "--limit",
+        type=positive,
+        default=None,
+        metavar="M",
+        help="how far the wire may be from the middle of the track [m]",
+    )
+    allowed.add_argument(
+        "--head", choices=("1600", "1950"), default=None, help="or by the pantograph head [mm], EN 50367 and EN 15273"
+    )
 
 
 def add_pantograph(verbs: Any) -> None:

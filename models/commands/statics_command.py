@@ -10,7 +10,7 @@ import numpy as np
 
 from models.catenary.statics import rest_profile
 from models.catenary.statics.temperature_table import LineAtTemperature, ruling, temperature_table
-from models.commands import route_plots, statics_plots, temperature_report
+from models.commands import route_plots, statics_plots, temperature_report, wind_report
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import (
     check_folder,
@@ -19,6 +19,7 @@ from models.commands.physics_options import (
     settings,
     warn,
 )
+from models.definition_files.parameter import ParameterError
 from models.interface.line_statics import LineStatics, at_rest
 from models.library.catalogue import doubts, load_line
 
@@ -27,15 +28,24 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
     check_folder(arguments.out)
     result = analyse(arguments)
+    blows = arguments.wind is not None or arguments.pressure is not None
+    if not blows and (arguments.limit is not None or arguments.head is not None):
+        raise ParameterError("--limit and --head are limits in the wind: give --wind, in m/s, or --pressure, in Pa")
+    wind = wind_report.in_the_wind(result, arguments) if blows else None
     asked = [value + temperature_report.ZERO for value in arguments.temperature]
     states = temperature_table(result.model.definition, asked, result.section) if asked else ()
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
     print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
     if states:
         _print_temperatures(result, states)
+    if wind is not None:
+        print_table("In the wind", ("quantity", "value"), wind_report.summary(wind))
+        print_table("Offsets of the contact wire", wind_report.COLUMNS, wind_report.rows(wind))
     if arguments.out is not None:
         folder = new_folder(arguments.out)
         write(folder, result)
+        if wind is not None:
+            wind_report.write(folder, wind)
         if states:
             temperature_report.write(folder, states)
         print(f"tables and plots: {folder}")

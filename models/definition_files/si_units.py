@@ -31,6 +31,7 @@ SI: Final[dict[str, tuple[str, float]]] = {
     "m/s2": ("m/s2", 1.0),
     "kg": ("kg", 1.0),
     "kg/m": ("kg/m", 1.0),
+    "kg/m3": ("kg/m3", 1.0),
     "kg.m2": ("kg.m2", 1.0),
     "N": ("N", 1.0),
     "daN": ("N", 10.0),

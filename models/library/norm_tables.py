@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from dataclasses import dataclass
 
+from models.catenary.statics.lateral_limits import LateralNorm
 from models.definition_files.field_schema import quantity, read, series, text
 from models.definition_files.toml_reader import Table
 from models.library.search_path import LIBRARY
@@ -49,6 +50,14 @@ def gradient_limits() -> tuple[GradientLimits, ...]:
     """Return the limits of gradients of every norm."""
     whole = Table.load(LIBRARY / "norms" / "gradient.toml")
     found = tuple(read(GradientLimits, table) for table in whole.tables("table"))
+    whole.finish()
+    return found
+
+
+def lateral_norm() -> LateralNorm:
+    """Return the numbers of the permissible lateral deviation."""
+    whole = Table.load(LIBRARY / "norms" / "lateral.toml")
+    found = read(LateralNorm, whole)
     whole.finish()
     return found
 

@@ -39,6 +39,12 @@ class CubicCurve:
         """First and last place."""
         return self._places[0], self._places[-1]
 
+    @property
+    def rows(self) -> FloatArray:
+        """Place and coefficients of every piece, highest power first, shape (n, 5); the last one is a constant."""
+        pieces = [[x, *piece] for x, piece in zip(self._places, self._pieces, strict=False)]
+        return np.array([*pieces, [self._places[-1], 0.0, 0.0, 0.0, self._ends[1]]])
+
     def at(self, x: float) -> float:
         """Return the value at ``x``."""
         places = self._places

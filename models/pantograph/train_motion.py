@@ -80,6 +80,7 @@ class TrainMotion:
 
     Attributes
     ----------
+    by_inputs : bool
     told : str
         What the user should know of the motion received last; empty if nothing.
     """
@@ -88,8 +89,10 @@ class TrainMotion:
         self._start = start
         self._segments = ((0.0, 0.0, speed, 0.0),) if profile is None else profile.segments()
         self._begins = [s[0] for s in self._segments]
-        self._is_steady = len(self._segments) == 1
-        self._by_inputs = by_inputs
+        self._is_one_piece = len(self._segments) == 1
+        # Of one piece without acceleration: the speed.
+        self._steady = self._segments[0][2] if self._is_one_piece and not by_inputs else None
+        self.by_inputs = by_inputs
         self._began = 0.0
         # Of inputs: when the last ones held, position and speed then, the trend of the speed.
         self._last = (0.0, 0.0, 0.0, 0.0)
@@ -104,7 +107,7 @@ class TrainMotion:
 
     def receive(self, time: float, train: tuple[float, float], step: float) -> None:
         """Take position and speed for a step [s] that begins at ``time``, or for its end if the position says so."""
-        if not self._by_inputs:
+        if not self.by_inputs:
             return
         x, speed = train
         then, _, before, trend = self._last
@@ -123,17 +126,33 @@ class TrainMotion:
 
     def at(self, time: float) -> Travel:
         """Return the motion at a time [s]."""
-        if self._by_inputs:
+        if self.by_inputs:
             holds, x, speed, trend = self._last
             tau = time - holds
             return Travel(self._start + (x + tau * (speed + 0.5 * trend * tau)), speed + trend * tau, trend)
         elapsed = time - self._began
-        k = 0 if self._is_steady else max(0, bisect.bisect_right(self._begins, elapsed) - 1)
+        k = 0 if self._is_one_piece else max(0, bisect.bisect_right(self._begins, elapsed) - 1)
         begin, distance, speed, slope = self._segments[k]
         if slope == 0.0 and distance == 0.0 and begin == 0.0:
             return Travel(self._start + speed * elapsed, speed, 0.0)
         tau = elapsed - begin
         return Travel(self._start + (distance + tau * (speed + 0.5 * slope * tau)), speed + slope * tau, slope)
+
+    def way(self, begin: float, step: float) -> tuple[float, float, float, float]:
+        """Return where a step from a time begins, the speed at its middle, where it ends and the speed there.
+
+        Parameters
+        ----------
+        begin, step : float
+            [s]
+        """
+        end, speed = begin + step, self._steady
+        if speed is not None:  # as `at` says, in one go
+            start, began = self._start, self._began
+            return start + speed * (begin - began), speed, start + speed * (end - began), speed
+        x, _, _ = self.at(begin)
+        last = self.at(end)
+        return x, self.at(begin + 0.5 * step).speed, last.x, last.speed
 
     def kinks(self, time: float) -> tuple[float, ...]:
         """Return how long after a time the acceleration changes [s], negative ones among them."""

@@ -20,7 +20,8 @@ from models.numerics.sampled_signal import INTERPOLATIONS, SampledSignal
 TABLE_FILE: Final = "signal.f64"
 NUMBERS: Final = "<f8"
 _CHOICE: Final = "choice: as in the file"
-_SHIFT: Final = "time_shift"
+#: Name of the parameter that moves everything in time.
+SHIFT: Final = "time_shift"
 _LARGEST: Final = 1e9
 Kind = Literal["value", "rate", "integral"]
 
@@ -82,7 +83,7 @@ class SignalDefinition:
             text = f"added to {name} after the gain"
             found.append(Parameter(f"{name}.offset", offset, unit, text, -_LARGEST, _LARGEST, _CHOICE))
         text = "how much later everything happens than the table says"
-        return *found, Parameter(_SHIFT, self.time_shift, "s", text, -_LARGEST, _LARGEST, _CHOICE)
+        return *found, Parameter(SHIFT, self.time_shift, "s", text, -_LARGEST, _LARGEST, _CHOICE)
 
     def with_values(self, values: Mapping[str, float]) -> SignalDefinition:
         """Return a copy with some parameters changed; raises ``ParameterError``."""
@@ -95,7 +96,7 @@ class SignalDefinition:
         wanted = {**known, **values}
         names = [name for name, _ in self.columns]
         gain, offset = (np.array([wanted[f"{n}.{key}"] for n in names]) for key in ("gain", "offset"))
-        return replace(self, gain=gain, offset=offset, time_shift=wanted[_SHIFT])
+        return replace(self, gain=gain, offset=offset, time_shift=wanted[SHIFT])
 
 
 def definition_text(

@@ -45,9 +45,9 @@ class SignalPart:
         self._has_told = [False, False]
         self._show()
 
-    def step(self, step: float) -> None:
-        """Advance by ``step`` [s]."""
-        self.time += step
+    def move(self, time: float) -> None:
+        """Go on to a time [s]."""
+        self.time = time
         self._show()
 
     def snapshot(self) -> Snapshot:

@@ -18,7 +18,9 @@ from models.definition_files.message_text import hint, said
 from models.definition_files.si_units import SI
 
 _HEAD: Final = re.compile(r"\s*(.*?)\s*\[\s*(.*?)\s*\]\s*")
-_NAME: Final = re.compile(r"[A-Za-z_][\w.\[\]]*")
+_WORD: Final = r"[A-Za-z_]\w*(\[\d+\])?"
+#: Names of variables: words with dots between them, each with an index if there are several.
+VARIABLE: Final = re.compile(rf"{_WORD}(\.{_WORD})*", re.ASCII)
 #: The column of the times, unless another is named.
 TIME: Final = "time"
 _FEWEST_ROWS: Final = 2
@@ -104,8 +106,8 @@ def _column(path: Path, number: int, cell: str) -> _Column:
     if match is None:
         _fail(path, 1, number, cell.strip(), "has no unit: write 'name [unit]', '[1]' for a plain number")
     name, unit = match[1], match[2]
-    if not _NAME.fullmatch(name):
-        _fail(path, 1, number, name, "is no name: letters, digits, '_' and '.' are, a letter first")
+    if not VARIABLE.fullmatch(name):
+        _fail(path, 1, number, name, "is no name such as base.z or mass[1].z: letters, digits and '_', a letter first")
     if unit not in SI:
         _fail(path, 1, number, name, f"has the unknown unit '{unit}'{hint(unit, SI)}; known are {', '.join(SI)}")
     return _Column(name, *SI[unit])

@@ -24,9 +24,12 @@ LINES = ("LN2", "Re330", "Shinkansen", "LN2_overlap", "LN2_ring")
 PANTOGRAPHS = ("CX", "CX_multibody", "generic_multibody")
 #: A line with the tables that no line of the library has.
 ROUTE = Path(__file__).parents[2] / "docs" / "build_site" / "probes" / "line_route.toml"
+#: A lumped pantograph with the keys that none of the library has.
+HELD = Path(__file__).parent / "pantograph_held.toml"
 FILES = {
     **{f"line {n}": line_path(n) for n in LINES},
     "line route": ROUTE,
+    "pantograph held": HELD,
     **{f"pantograph {n}": pantograph_path(n) for n in PANTOGRAPHS},
 }
 #: One value with unit and source on a line of its own.

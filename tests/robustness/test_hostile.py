@@ -333,9 +333,11 @@ DANGEROUS_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "mars
 DANGEROUS_ATTRIBUTES = {("np", "load"), ("numpy", "load"), ("os", "system"), ("os", "popen"), ("torch", "load")}
 #: What is looked at before it is read: numba keeps machine code as pickles. Owner, rights and checksum of a file come
 #: first (`tests/models/numerics/test_kernel_cache.py`, `tests/robustness/test_caches.py`).
+#: What Python compiled of an FMU's sources is kept there too, under the same rules (`models/numerics/user_cache.py`).
 #: A runtime compiles modules of the Python, numpy and scipy that it is made of, which the builder runs anyway.
 GUARDED = {
     "models/numerics/kernel_cache.py": ["pickle"],
+    "fmus/slave/kept_code.py": ["marshal"],
     "fmus/loader/runtime.py": ["marshal", "compile"],
     # Over pipes between a command and the process that it has started itself; no file is read so.
     "master/batch/sweep/child_engine.py": ["pickle"],

@@ -22,6 +22,9 @@ DENSITY: Final = Axis("power spectral density", "N\u00b2/Hz", is_logarithmic=Tru
 SHARE: Final = Axis("share of time", "%")
 _LATERAL_BIN: Final = 0.010  # [m]
 _HIGHEST: Final = 100.0  # [Hz]
+#: Pieces of a run whose ways are compared, and the share by which they differ at one speed.
+_PIECES: Final = 5
+_SAME_WAY: Final = 0.01
 
 
 def force_charts(results: Results, signals: Sequence[Signals]) -> list[Chart]:
@@ -52,6 +55,22 @@ def _force_chart(results: Results, s: Signals) -> Chart:
         height=440,
         group="track",
     )
+
+
+def force_over_time(signals: Sequence[Signals]) -> list[Chart]:
+    """Return the low-passed forces over time if the speed of a contact changes: track and time then tell two things."""
+    if not any(_changes_speed(s) for s in signals):
+        return []
+    parts = tuple(Curve(s.contact.pantograph, s.time, s.shown, stroke(i, 1.7)) for i, s in enumerate(signals))
+    x, note = Axis("time", "s"), "The speed changes; figures are those of the interval's own mean speed."
+    return [Chart("force_over_time", "Contact force over time", x, force_axis(signals), parts, note, 360)]
+
+
+def _changes_speed(s: Signals) -> bool:
+    """Return whether the ways of equal pieces of the time differ by more than 1 %."""
+    marks = np.interp(np.linspace(s.time[0], s.time[-1], _PIECES + 1), s.time, s.position)
+    ways = np.abs(np.diff(marks))
+    return bool(np.ptp(ways) > _SAME_WAY * ways.max())
 
 
 def extent(signals: Sequence[Signals]) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from master.report.charts.chart import Chart
 from master.report.charts.dropper_charts import dropper_charts
 from master.report.charts.force_charts import (
     force_charts,
+    force_over_time,
     forces_together,
     height_chart,
     histogram,
@@ -26,6 +27,7 @@ def run_charts(results: Results, signals: Sequence[Signals]) -> list[Chart]:
     found = [
         *force_charts(results, signals),
         *forces_together(results, signals),
+        *force_over_time(signals),
         histogram(signals),
         spectrum(results, signals),
         uplift_bars(results),
@@ -48,6 +50,7 @@ def file_charts(results: Results) -> dict[str, list[Chart]]:
     }
     found = {
         "contact_force": force_charts(results, results.signals),
+        "contact_force_over_time": force_over_time(results.signals),
         **{name: [chart] for name, chart in single.items() if chart is not None},
         **{f"line_{name}": geometry_charts(name, values) for name, values in results.geometry.items()},
     }

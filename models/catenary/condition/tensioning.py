@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq
 
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition, Section, Wire
@@ -112,10 +111,15 @@ def anchored_tension(nominal: float, stiffness: float, load: float, span: float,
     def excess(tension: float) -> float:
         return tension - sagging / tension**2 - wanted
 
-    low = _LEAST * nominal
-    if excess(low) > 0.0:
+    tension = _LEAST * nominal
+    if excess(tension) > 0.0:
         return math.nan
-    return float(brentq(excess, low, max(nominal, wanted) + sagging / low**2, xtol=1e-9 * nominal, rtol=1e-13))
+    # It rises, ever less steeply: from below, Newton's method goes up to the root and never beyond.
+    rise = math.inf
+    while rise > 1e-13 * tension:
+        rise = -excess(tension) / (1.0 + 2.0 * sagging / tension**3)
+        tension += rise
+    return tension
 
 
 def cantilever_losses(force: FloatArray, movement: FloatArray, cantilever: float) -> FloatArray:

@@ -15,6 +15,7 @@ from models.catenary.definition.calculation_definition import Dynamics, Mesh
 from models.catenary.definition.condition_definition import Fault, Irregularity
 from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.definition.track_definition import Track
+from models.catenary.definition.wind_definition import Wind
 from models.contact_law import CONTACT_LAWS
 from models.definition_files import field_schema
 from models.definition_files.field_schema import count, monitoring, part, quantity, text
@@ -53,6 +54,14 @@ class Wire:
     youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e7, maximum=1e12)
     tension: float = quantity("N", "tension", positive=True, minimum=500.0, maximum=1e5)
     bending_stiffness: float | None = quantity("N.m2", "bending stiffness EI", default=None, minimum=0.0, maximum=1e5)
+    diameter: float | None = quantity(
+        "m", "diameter that the wind meets", default=None, minimum=1e-3, maximum=0.1, tunable=False
+    )
+
+    @property
+    def width(self) -> float:
+        """Return the diameter that the wind meets, as given or of a solid round section [m]."""
+        return self.diameter or math.sqrt(4.0 * self.area / math.pi)
 
     @property
     def EI(self) -> float:
@@ -333,6 +342,7 @@ class CatenaryDefinition:
     dynamics: Dynamics = part(Dynamics, default=Dynamics())
     track: Track | None = part(Track, default=None)
     tensioning: Tensioning | None = part(Tensioning, default=None)
+    wind: Wind | None = part(Wind, default=None)
     irregularity: Irregularity = part(Irregularity, default=Irregularity())
     fault: tuple[Fault, ...] = ()
     extrapolation_order: int = count(

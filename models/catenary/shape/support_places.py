@@ -130,8 +130,9 @@ class SupportPlaces:
         if track is None:
             return 0.0
         hat = np.interp(track.positions, [before, x, after], [0.0, 1.0, 0.0])
-        heights = np.array([self.height(knot) for knot in track.positions])
-        return float(self.definition.contact_wire.tension * (hat * heights) @ twist_jumps(track))
+        near = np.flatnonzero(hat)
+        heights = np.array([self.height(track.positions[knot]) for knot in near])
+        return float(self.definition.contact_wire.tension * (hat[near] * heights) @ twist_jumps(track)[near])
 
     def _own(self, value: Callable[[Support], float | None], line_wide: float) -> FloatArray | None:
         """Return values of all supports, None if every one has the line-wide value."""

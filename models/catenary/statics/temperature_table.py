@@ -83,11 +83,16 @@ def temperature_table(
 
 
 def ruling(section: Section) -> tuple[float, Span]:
-    """Return the ruling span of a section [m], and of the spans of nearest length the one nearest to its middle."""
+    """Return the ruling span of a section [m], and a span to look at: of nearest length, nearest to the middle.
+
+    It is one at the working height, if there is any.
+    """
     wanted = ruling_span([span.length for span in section.spans])
     middle = 0.5 * (section.spans[0].start + section.spans[-1].end)
-    nearest = min(abs(span.length - wanted) for span in section.spans)
-    alike = [span for span in section.spans if abs(span.length - wanted) < nearest + 1e-6]
+    first, last = section.ends.working
+    level = [span for span in section.spans if first <= span.start and span.end <= last] or section.spans
+    nearest = min(abs(span.length - wanted) for span in level)
+    alike = [span for span in level if abs(span.length - wanted) < nearest + 1e-6]
     return wanted, min(alike, key=lambda span: abs(0.5 * (span.start + span.end) - middle))
 
 

@@ -17,8 +17,7 @@ from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_energy import LumpedBalance
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 from models.pantograph.lumped.swaying_strip import SwayingStrip
-from models.pantograph.operation import NO_DRIVE, Drive
-from models.pantograph.train_motion import Travel
+from models.pantograph.operation import NO_DRIVE, NO_SWAY, Drive
 
 
 class LumpedPantographPart:
@@ -122,15 +121,15 @@ class LumpedPantographPart:
         """Advance by ``step`` [s] under a contact force received for its beginning (or its end, if it says so)."""
         start, x, count = self.time, point.item(0), steps_within(step, self.definition.time_step)
         self.time = start + step
-        begin, middle, end = self._travel(start, step, drive)
-        driven = drive.air, drive.uplift, middle.speed
+        way = self._travel(start, step, drive)
+        driven = drive.air, drive.uplift, way[1]
         if driven != self._driven:
             self._driven, self._own[: self.model.size] = driven, self._drive_loads(*driven)
-        self._sway.receive(drive, base, step)
+        if drive.sway != NO_SWAY or not self._sway.is_still:
+            self._sway.receive(drive, base, step)
         if self._compiled is not None:
             when, contact = (self._start_time, start, step), (force, x)
             hung = (self.state.reference, self._roof, drive.reference_rate)
-            way = (begin.x, middle.speed, end.x, end.speed)
             self.state.reference = self._compiled.step(
                 self._values, when, count, contact, way, base, hung, self._own, self.outputs
             )
@@ -138,7 +137,7 @@ class LumpedPantographPart:
             self._sway.place(self.strip)
             self._watch(force, point)
             return
-        self._force.receive_at(start, force, x, begin.x, middle.speed, step)
+        self._force.receive_at(start, force, x, way[0], way[1], step)
         h = step / count
         height, velocity = base.tolist()
         for k in range(1, count + 1):
@@ -255,13 +254,14 @@ class LumpedPantographPart:
         if self._balance is not None:
             self._balance.stretch = after - self.state.reference
 
-    def _travel(self, start: float, step: float, drive: Drive) -> tuple[Travel, Travel, Travel]:
-        """Return the motion along the track at the beginning, the middle and the end of a step."""
+    def _travel(self, start: float, step: float, drive: Drive) -> tuple[float, float, float, float]:
+        """Take how the train moves; return the way of a step, as `TrainMotion.way` does."""
         train = self._train
-        train.receive(start, drive.train, step)
-        if train.told:
-            self.told.append(train.told)
-        return train.at(start), train.at(start + 0.5 * step), train.at(self.time)
+        if train.by_inputs:
+            train.receive(start, drive.train, step)
+            if train.told:
+                self.told.append(train.told)
+        return train.way(start, step)
 
     def _drive_loads(self, air: float, uplift: float, speed: float) -> FloatArray:
         """Return what the air and a force from outside load the masses with, shape (n,) [N]."""
@@ -274,7 +274,7 @@ class LumpedPantographPart:
         if self._excursions is None or self._held is None:
             return
         self._has_met |= force > 0.0
-        x, height = self.outputs.item(0), self.outputs.item(2)
+        x, height = self.outputs.item(0), self.definition.reference_height + self._motion.item(-3)
         if touched := self._held.touched():
             place, follows = Place(self.time, x, height), self.model.follows
             self._excursions.touch(touched, place, has_met=self._has_met, is_loaded=force > 0.0, is_neutral=follows)

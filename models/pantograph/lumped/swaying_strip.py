@@ -20,6 +20,11 @@ class SwayingStrip:
     Parameters
     ----------
     definition : LumpedDefinition
+
+    Attributes
+    ----------
+    is_still : bool
+        Whether the roof has not swayed yet.
     """
 
     def __init__(self, definition: LumpedDefinition) -> None:
@@ -28,7 +33,7 @@ class SwayingStrip:
         self._along = np.array([definition.strip_offset + half, definition.strip_offset - half])
         # Lateral position and velocity, roll and its rate at the end of the step; height and velocity of the roof.
         self._now = np.zeros(6)
-        self._is_still = True
+        self.is_still = True
 
     def receive(self, drive: Drive, base: FloatArray, step: float) -> None:
         """Continue what was received for the beginning of a step [s] to its end.
@@ -46,7 +51,7 @@ class SwayingStrip:
         if drive.sway == NO_SWAY:
             self._now[:4] = 0.0
             return
-        self._is_still = False
+        self.is_still = False
         y, vy, roll, roll_rate, yaw, yaw_rate = drive.sway
         if yaw != 0.0 or yaw_rate != 0.0:
             raise OperationError(f"{self._definition.name}: a lumped pantograph has no yaw")
@@ -60,7 +65,7 @@ class SwayingStrip:
 
     def place(self, strip: FloatArray) -> None:
         """Turn and shift a strip that is level, shape (2, 2, 3): end A, B; position, velocity; x, y, z."""
-        if self._is_still:
+        if self.is_still:
             return
         y, vy, roll, rate, height, velocity = self._now.tolist()
         if not (y or vy or roll or rate):
@@ -80,4 +85,4 @@ class SwayingStrip:
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
         self._now[:] = snapshot["sway"]
-        self._is_still = self._is_still and not self._now.any()
+        self.is_still = self.is_still and not self._now.any()

@@ -20,45 +20,45 @@ class LateralExtrapolation:
 
     Attributes
     ----------
-    times, values : ndarray, shape (2,)
-        Last value first [s, m].
+    times, values : list of float
+        Last value first [s, m]: plain floats, faster than such short arrays.
     rate : float
         [m/s]
     """
 
-    times: FloatArray = field(default_factory=lambda: np.zeros(2))
-    values: FloatArray = field(default_factory=lambda: np.zeros(2))
+    times: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    values: list[float] = field(default_factory=lambda: [0.0, 0.0])
     rate: float = 0.0
 
     def start(self, time: float, value: float) -> None:
         """Forget everything but one value."""
-        self.times[:] = time
-        self.values[:] = value
+        self.times = [time, time]
+        self.values = [value, value]
         self.rate = 0.0
 
     def receive(self, time: float, value: float) -> None:
         """Take a value that holds at ``time``; one for the same time replaces the last."""
         if time > self.times[0] + 1e-12:
-            self.times[1], self.values[1] = self.times[0], self.values[0]
-            self.times[0] = time
+            self.times = [time, self.times[0]]
+            self.values = [value, self.values[0]]
         self.values[0] = value
-        elapsed = float(self.times[0] - self.times[1])
-        rate = float(self.values[0] - self.values[1]) / elapsed if elapsed > 0.0 else 0.0
+        elapsed = self.times[0] - self.times[1]
+        rate = (self.values[0] - self.values[1]) / elapsed if elapsed > 0.0 else 0.0
         self.rate = rate if abs(rate) <= _FASTEST_SWEEP else 0.0
 
     def at(self, time: float) -> float:
         """Return the position at ``time`` [m]."""
-        return float(self.values[0]) + self.rate * (time - float(self.times[0]))
+        return self.values[0] + self.rate * (time - self.times[0])
 
     def snapshot(self) -> Snapshot:
         """Return the whole state."""
         rate = np.array([self.rate])
-        return {"lateral.times": self.times.copy(), "lateral.values": self.values.copy(), "lateral.rate": rate}
+        known = {"lateral.times": np.array(self.times), "lateral.values": np.array(self.values)}
+        return {**known, "lateral.rate": rate}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot."""
-        self.times[...] = snapshot["lateral.times"]
-        self.values[...] = snapshot["lateral.values"]
+        self.times, self.values = (snapshot[f"lateral.{name}"].tolist() for name in ("times", "values"))
         self.rate = float(snapshot["lateral.rate"][0])
 
 

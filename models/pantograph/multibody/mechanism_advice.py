@@ -26,7 +26,8 @@ def working_height_warning(mechanism: Mechanism, standing: FloatArray, x: float,
     """
     definition = mechanism.definition
     raised = _raised(definition)
-    if not raised.is_under_another_height(x, z) or not raised.value:
+    is_unused = definition.lift_input or not raised.value
+    if is_unused or not raised.is_under_another_height(x, z):
         return ""
     above = mechanism.strip_height(standing)
     at_reference = _force(mechanism, standing, above)

@@ -33,6 +33,7 @@ from models.pantograph.operation import Operation
 Triple = tuple[float, float, float]
 
 COORDINATES: Final = ("x", "y", "z", "e1", "e2", "e3")
+FORMULATIONS: Final = ("auto", "general")
 
 
 _Range = dict[str, Any]
@@ -546,6 +547,8 @@ class MechanismDefinition(Operation):
         Full value of the lifting force [N] or moment [N.m]; None of what does not lift.
     gravity : float
         [m/s2].
+    formulation : str
+        "auto": the reduced form where the mechanism allows it; "general": always that in Cartesian coordinates.
     tolerance : float
         Local error of an internal step [m]; velocities take 100 1/s times it.
     provenance : mapping
@@ -580,6 +583,7 @@ class MechanismDefinition(Operation):
         default=0, maximum=1,
     )  # fmt: skip
     tolerance: float = quantity("m", "local error of an internal step", default=1e-8, minimum=1e-15, maximum=0.1)
+    formulation: str = text(default="auto", choices=FORMULATIONS)
     provenance: Mapping[str, Quantity] = field(default_factory=dict, repr=False, compare=False)
 
     def parameters(self) -> tuple[Parameter, ...]:

@@ -103,7 +103,10 @@ class MechanismBalance:
             contact = -float(mechanism.contact_load(y, inputs, kinematics.frames[strip, :3]) @ motion[strip])
         lift = float(((loads - unlifted) * motion).sum())
         free, joints = float(by_body[mechanism.driven :].sum()), mechanism.power_of_base(y, inputs)
-        outer = lift - contact + joints - float(by_body[: mechanism.driven].sum())
+        # What the base is loaded with; its own weight is nobody's here, as in the energy that is stored.
+        on_base = loads[: mechanism.driven].copy()
+        on_base[:, 2] += mechanism.definition.gravity * mechanism.mass[: mechanism.driven]
+        outer = lift - contact + joints - float((on_base * motion[: mechanism.driven]).sum())
         if inputs.pull != 0.0 or inputs.against != 0.0:
             travel = np.zeros_like(loads)
             mechanism.add_travel_loads(travel, kinematics, inputs)

@@ -20,6 +20,8 @@ from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
 from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
 from models.pantograph.multibody.range_watch import RangeWatch
+from models.pantograph.multibody.reduced.reduced_motion import ReducedMotion, reduced_if_possible
+from models.pantograph.multibody.reduced.reduction import unsuitable_drive
 from models.pantograph.multibody.step_memory import (
     LastEvaluation,
     beyond_response,
@@ -56,6 +58,8 @@ class MultibodyPantographPart:
     def __init__(self, definition: MechanismDefinition) -> None:
         self.definition = definition
         self.observed = _observed(definition)
+        self._lifted, self._holds = definition.lift, float(definition.holds_force)
+        self._is_blown = definition.air_coefficient != 0.0
         self.time = 0.0
         self.strip = np.zeros((2, 2, 3))
         self.told: list[str] = []
@@ -71,6 +75,9 @@ class MultibodyPantographPart:
         self._history: History | None = None
         self._substep = definition.time_step
         self._observation = np.zeros(len(self.observed))
+        self._reduced: ReducedMotion | None = None  # in what form it moves: the general one if there is none
+        self._is_shown = True
+        self._left = ""  # why it went on in the general form
         self._built: _Built | None = None
         self._balance: MechanismBalance | None = None
 
@@ -109,6 +116,12 @@ class MultibodyPantographPart:
         self._train.begin(time, drive.train)
         self._substep = self.definition.time_step
         self._history = None
+        self._left = unsuitable_drive(drive)
+        self._reduced = None if self._left or built.reduced is None else ReducedMotion(built.reduced)
+        if self._reduced is not None:
+            self._reduced.begin(self._given())
+            self._show_reduced()
+            return
         inputs = self._inputs(0.0)
         self._y = built.mechanism.standing_on(built.standing, inputs)
         self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
@@ -144,11 +157,13 @@ class MultibodyPantographPart:
         self._take(drive)
         operation = self.definition
         speed = self._travel(drive, step)
-        expected = float(self.strip[:, 0, 0].mean())
+        expected = 0.5 * (self.strip.item(0) + self.strip.item(6))
         self._force.receive_at(self.time, force, float(point[0]), expected, speed, step)
         self._receive_lateral(force, point, speed, expected, step)
         self._base.receive(base, step)
         self._sway.receive(drive.sway, step)
+        if self._reduced is not None and self._step_reduced(self._reduced, step, drive):
+            return
         elapsed = self.time - self._start_time
         raising = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
         kinks = (*raising, *self._train.kinks(self.time))
@@ -168,7 +183,12 @@ class MultibodyPantographPart:
         if watch is None or not watch.is_due(self.time, force):
             return
         x, z = (0.5 * (self.strip.item(k) + self.strip.item(6 + k)) for k in (0, 2))
-        watch.look(self._y, Place(self.time, x, z), force, point.item(2))
+        watch.look(
+            self._y if self._reduced is None else self._reduced.posture(self._base.now),
+            Place(self.time, x, z),
+            force,
+            point.item(2),
+        )
         self.told += watch.told
         watch.told.clear()
 
@@ -184,6 +204,8 @@ class MultibodyPantographPart:
 
     def observation_values(self) -> FloatArray:
         """Return the values of ``observed``."""
+        if not self._is_shown:
+            self._observe_reduced()
         return self._observation.copy()
 
     def working_height_warning(self, x: float, z: float) -> str:
@@ -196,6 +218,15 @@ class MultibodyPantographPart:
         built = self._ready()
         return mechanism_warning(built.mechanism, built.reference)
 
+    @property
+    def state(self) -> FloatArray:
+        """State of the bodies, shape (13 n,); see `Mechanism`."""
+        return self._y if self._reduced is None else self._reduced.cartesian(self._base.now)
+
+    def form(self) -> str:
+        """Say in which form the equations of motion are solved, and why if it is the general one."""
+        return f"general form of the equations of motion: {self._left}" if self._left else self._ready().form
+
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
         return {
@@ -203,7 +234,8 @@ class MultibodyPantographPart:
             "state": self._y.copy(),
             "substep": np.array([self._substep]),
             "strip": self.strip.copy(),
-            "observation": self._observation.copy(),
+            "observation": self.observation_values(),
+            **({} if self._reduced is None else self._reduced.snapshot()),
             **(self._last.snapshot() if self._last is not None else {}),
             **(history_snapshot(self._history) if self._history is not None else {}),
             **self._force.snapshot(),
@@ -223,6 +255,10 @@ class MultibodyPantographPart:
         self._observation[...] = snapshot["observation"]
         self._last = LastEvaluation.restored(snapshot)
         self._history = restored_history(snapshot)
+        self._is_shown = True
+        self._reduced = self._restored_motion(snapshot)
+        went_on = self._reduced is None and self._ready().reduced is not None
+        self._left = self._left or "the state that was restored is in it" if went_on else ""
         self._force.restore(snapshot)
         self._lateral.restore(snapshot)
         self._base.restore(snapshot)
@@ -230,6 +266,74 @@ class MultibodyPantographPart:
         self._train.restore(snapshot)
         if self._balance is not None:
             self._balance.restore(snapshot)
+
+    def _restored_motion(self, snapshot: Snapshot) -> ReducedMotion | None:
+        """Return the motion that a snapshot holds; None: it went on in the general form."""
+        built = self._ready()
+        if built.reduced is None or "reduced" not in snapshot:
+            return None
+        motion = ReducedMotion(built.reduced)
+        motion.restore(snapshot)
+        return motion
+
+    def _step_reduced(self, motion: ReducedMotion, step: float, drive: Drive) -> bool:
+        """Advance in the reduced form; False if that ends here and the general form has to take over."""
+        reason = unsuitable_drive(drive)
+        if not reason:
+            reason = motion.step(self._given(), step)
+        if reason:
+            self._y = motion.cartesian(self._base.now)
+            self._reduced, self._left, self._is_shown = None, f"from {self.time:.6g} s on, {reason}", True
+            self._last, self._history, self._substep = None, None, self.definition.time_step
+            return False
+        self._base.finish(step)
+        self.time += step
+        self._show_reduced()
+        return True
+
+    def _given(self) -> list[float]:
+        """Return the inputs of a step as the reduced form takes them; see `ReducedMotion.step`."""
+        operation, force, lateral, drive = self.definition, self._force, self._lateral, self._drive
+        uplift = drive.uplift
+        if self._is_blown:
+            uplift += operation.aerodynamic_force(drive.air, self._train.at(self.time).speed)
+        return [
+            self.time, self._start_time,
+            force.known, *force.times, *force.values, force.order,
+            lateral.values[0], lateral.rate, lateral.times[0],
+            *self._base.cubic.tolist(),
+            self._ready().balance, self._lifted, operation.raise_start, operation.raise_duration,
+            uplift, self._holds,
+        ]  # fmt: skip
+
+    def _show_reduced(self) -> None:
+        """Bring the strip up to the state; what is observed waits until somebody asks."""
+        assert self._reduced is not None
+        built, travel = self._ready(), self._train.at(self.time)
+        z, vz = self._base.now.tolist()
+        self._reduced.place_strip((travel.x - built.strip_x, z + built.base_height, travel.speed, vz), self.strip)
+        self._is_shown = False
+
+    def _observe_reduced(self) -> None:
+        assert self._reduced is not None
+        motion, built, base = self._reduced, self._ready(), self._base
+        z, vz = base.now.tolist()
+        bodies = motion.bodies((z + built.base_height, vz, motion.base_acceleration))
+        held = (motion.lift[0],) if self.definition.holds_force else ()
+        self._observation[: bodies.size] = bodies.ravel()
+        self._observation[bodies.size :] = (*self._seen(self.strip), motion.lift_value(), *held, 0.0, 0.0)
+        self._is_shown = True
+
+    def _seen(self, ends: FloatArray) -> tuple[float, float, float]:
+        """Return roll, roll rate, and place of the contact along the strip for its ends, shape (2, 2, 3)."""
+        across = ends[0] - ends[1]
+        length2 = float(across[0] @ across[0])
+        roll = math.atan2(across[0, 2], across[0, 1])
+        roll_rate = float(across[1, 2] * across[0, 1] - across[1, 1] * across[0, 2]) / length2
+        middle = 0.5 * float(ends[0, 0, 1] + ends[1, 0, 1])
+        # Along the strip, which may roll and yaw.
+        offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
+        return roll, roll_rate, offset
 
     def _ready(self) -> _Built:
         if self._built is None:
@@ -327,20 +431,11 @@ class MultibodyPantographPart:
         self.strip[:, 1, 0] += travel.speed
         s, free = mechanism.split(self._y), slice(mechanism.driven, None)
         bodies = np.stack([s.r[free, 2] + built.base_height, s.v[free, 2], evaluation.acceleration[free, 2]], axis=1)
-        across = ends[0] - ends[1]
-        length2 = float(across[0] @ across[0])
-        roll = math.atan2(across[0, 2], across[0, 1])
-        roll_rate = float(across[1, 2] * across[0, 1] - across[1, 1] * across[0, 2]) / length2
-        middle = 0.5 * float(ends[0, 0, 1] + ends[1, 0, 1])
-        # Along the strip, which may roll and yaw.
-        offset = (self._lateral.at(self.time) - middle) * math.sqrt(length2) / max(float(across[0, 1]), 1e-9)
         values = evaluation.constraints
         acting = self._inputs(0.0) if self._last is None else self._last.inputs
         held = (mechanism.held_force(self._y, acting),) if operation.holds_force else ()
         own = (
-            roll,
-            roll_rate,
-            offset,
+            *self._seen(ends),
             mechanism.lift_value(self._y, acting),
             *held,
             np.abs(values.violation).max(initial=0.0),
@@ -364,6 +459,7 @@ class _Built:
         self.balance = posture.start.lift
         self.base_height = posture.base_height
         self.watch = RangeWatch.over(self.mechanism, self.standing, self.base_height)
+        self.reduced, self.form = reduced_if_possible(self.mechanism, self.standing)
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
 
 

@@ -98,6 +98,8 @@ def test_the_end_of_the_table_is_told_once_and_a_state_goes_on(fmu):
         (["--rate", "base.x=v"], "has no column 'base.x'; did you mean 'base.z'?"),
         (["--integral", "base.z=train.vx"], "there is an output 'train.vx' already"),
         (["--rate", "base.z=v", "--interpolation", "held"], "values that are held have none"),
+        (["--rate", "base.z=base.z.gain"], "'base.z.gain' is the name of a parameter of the FMU"),
+        (["--integral", "base.z=a b"], "write COLUMN=NAME"),
         (["--name", "a-b"], "'a-b' is no name for an FMU"),
         (["--time", "tme"], "there is no column 'tme' of times"),
     ],

@@ -44,6 +44,8 @@ def test_another_column_may_hold_the_times(file):
         ("time [s],z [furlong]\n0,1\n1,1\n", "line 1, column 2 ('z'): has the unknown unit 'furlong'"),
         ("time [s],v [kmh]\n0,1\n1,1\n", "did you mean 'km/h'?"),
         ("time [s],2z [m]\n0,1\n1,1\n", "line 1, column 2 ('2z'): is no name"),
+        ("time [s],a..z [m]\n0,1\n1,1\n", "line 1, column 2 ('a..z'): is no name"),
+        ("time [s],<z> [m]\n0,1\n1,1\n", "line 1, column 2 ('<z>'): is no name"),
         ("time [s],z [m],z [m]\n0,1,1\n1,1,1\n", "line 1, column 3 ('z'): is the name of a column before it too"),
         ("t [s],z [m]\n0,1\n1,1\n", "line 1, column 1 ('t'): is not 'time': name the column of the times by --time"),
         ("time [m],z [m]\n0,1\n1,1\n", "has times in a unit of 'm'"),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import ComplexArray, FloatArray
-from models.pantograph.multibody.analysis.cam_design import fit_force
+from models.pantograph.multibody.analysis.cam_design import fit_force, strip_height_where
 from models.pantograph.multibody.analysis.force_loop import moved_forces
 from models.pantograph.multibody.analysis.linearisation import (
     Mode,
@@ -80,6 +80,29 @@ class Dynamics:
     base_transmission: ComplexArray
 
 
+@dataclass(frozen=True)
+class CamCurves:
+    """A cam over its range, arrays of shape (k,).
+
+    Attributes
+    ----------
+    is_moment : bool
+        Whether the lifting element gives a moment, and its place is an angle.
+    place : ndarray
+        [rad or m]
+    height : ndarray
+        Of the strip above top of rail, with nothing on it [m]; NaN where it has no equilibrium.
+    for_weights, per_lift : ndarray
+        What it gives without any lift set, and besides for each unit of that [N.m or N].
+    """
+
+    is_moment: bool
+    place: FloatArray
+    height: FloatArray
+    for_weights: FloatArray
+    per_lift: FloatArray
+
+
 class Rig:
     """A pantograph on a rig, its base where it is in operation.
 
@@ -143,6 +166,20 @@ class Rig:
             rows.append((height, idle.lift, loaded.lift, pressed.inputs.force))
             y = idle.y
         return rows
+
+    def cam_curves(self, points: int = 41) -> CamCurves | None:
+        """Return the cam of the lifting element, None if it has none."""
+        cam = self.mechanism.forces.cam
+        if cam is None:
+            return None
+        places = np.linspace(*cam.per_lift.range, points)
+        heights = np.full(points, np.nan)
+        for k, place in enumerate(places.tolist()):
+            with suppress(MechanismError, np.linalg.LinAlgError):
+                heights[k] = self.base_height + strip_height_where(self.mechanism, self.reference, place)
+        own = [0.0 if cam.for_weights is None else cam.for_weights.at(place) for place in places.tolist()]
+        each = [cam.per_lift.at(place) for place in places.tolist()]
+        return CamCurves(self.definition.lifts_by_moment, places, heights, np.array(own), np.array(each))
 
     def up_and_down(self, heights: FloatArray, speed: float) -> FloatArray:
         """Return strip heights that can be reached [m] and the forces there as the strip goes up and down [N].

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.arrays import FloatArray
-from models.pantograph.multibody.analysis.cam_design import reach, stand
+from models.pantograph.multibody.analysis.cam_design import reach, stand, strip_height_where, working_range
 from models.pantograph.multibody.analysis.mechanism_statics import Equilibrium, equilibrium
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 
@@ -54,9 +54,22 @@ def take_posture(mechanism: Mechanism) -> Posture:
     return Posture(base, reference, working)
 
 
+def _check_stops(mechanism: Mechanism, standing: FloatArray, base: float, given: str, found: Equilibrium) -> None:
+    """Refuse a height at which the arms are beyond their stops."""
+    touched = mechanism.forces.stops.touched(mechanism.kinematics(found.y).frames)
+    if not touched:
+        return
+    text = f"{mechanism.definition.name}: {given} is beyond the stop '{touched[0]}'"
+    if mechanism.forces.lift_place is not None:
+        places = working_range(mechanism, standing)
+        low, high = sorted(base + strip_height_where(mechanism, standing, place) for place in places)
+        text += f": between its stops the strip goes from {low:.3f} to {high:.3f} m"
+    raise MechanismError(text)
+
+
 def _raised_to(mechanism: Mechanism, standing: FloatArray, base: float, key: str, height: float) -> Equilibrium:
     try:
-        return equilibrium(mechanism, height - base, start=standing)
+        found = equilibrium(mechanism, height - base, start=standing)
     except (MechanismError, np.linalg.LinAlgError) as error:
         if mechanism.forces.lift_place is None:
             raise
@@ -65,3 +78,5 @@ def _raised_to(mechanism: Mechanism, standing: FloatArray, base: float, key: str
             f"{mechanism.definition.name}: {key} = {height:g} m is out of reach: with the base at {base:.3f} m the "
             f"strip goes from {low:.3f} to {high:.3f} m"
         ) from error
+    _check_stops(mechanism, standing, base, f"{key} = {height:g} m", found)
+    return found

@@ -5,7 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from master.evaluation.contact_quality import figures_of
 from master.report.charts.chart import Band
+from master.report.charts.force_charts import force_over_time
 from master.report.charts.line_charts import geometry_charts, line_marks
 from master.report.charts.run_charts import file_charts, run_charts
 from master.report.charts.static_figure import static_figure
@@ -98,3 +100,22 @@ def test_charts_over_places_of_one_lap_say_so(made_up):
         for chart in (bars, droppers):
             assert ("in its lap" in chart.x.label) == named
             assert any(isinstance(part, Band) for part in chart.parts) != named  # the interval is not of one lap
+
+
+def test_a_run_whose_speed_changes_shows_its_force_over_time_too(made_up):
+    """And its figures are those of the interval's own mean speed: its way over its time."""
+    steady = made_up().signals
+    assert force_over_time(steady) == []
+    assert "contact_force_over_time" not in file_charts(made_up())
+    s = steady[0]
+    faster = dataclasses.replace(
+        s, position=s.position[0] + 20.0 * (s.time - s.time[0]) + 2.0 * (s.time - s.time[0]) ** 2
+    )
+    (chart,) = force_over_time([faster])
+    assert chart.x.name == "time"
+    inside = (faster.position > 25.0) & (faster.position < 60.0)
+    quality = figures_of(dataclasses.replace(faster, inside=inside).sampled, s.filter, 1)
+    t = faster.time[inside]
+    way = faster.position[inside]
+    assert quality.speed == pytest.approx((way[-1] - way[0]) / (t[-1] - t[0]))
+    assert 20.0 < quality.speed < 60.0

@@ -12,6 +12,7 @@ from models.coupled.monolithic import CoupledModel
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import line_names, load_line
 from models.numerics.newmark import Newmark
+from tests.effort import some
 from tests.models.nodal_line import NodalLine
 
 HIGHEST = "dynamics.highest_frequency"
@@ -227,7 +228,7 @@ def test_is_the_same_with_and_without_kernels(short_line, cx, highest, monkeypat
         assert np.nanmax(np.abs(other - one)) < 1e-10 * np.nanmax(np.abs(one)), name
 
 
-@pytest.mark.parametrize("name", line_names())
+@pytest.mark.parametrize("name", some(line_names(), "EN50318_2002", "LN2_overlap", "LN2_ring", "Re330", "Shinkansen"))
 def test_every_line_of_the_library_steps_with_few_modes(name):
     model = reduced(load_line(name), 15.0, **{"mesh.elements_between_droppers": 2})
     long_or_slow = ("EN50318_2002", "CA160", "CA220")  # every interval has a mode below 15 Hz

@@ -17,11 +17,14 @@ from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
 from models.catenary.shape.line_shape import line_shape
 from models.catenary.shape.support_places import SupportPlaces
 from models.library.catalogue import line_names, load_line
+from tests.effort import some
 
 GRAVITY = 9.81
 
 
-@pytest.fixture(scope="module", params=line_names())
+@pytest.fixture(
+    scope="module", params=some(line_names(), "EN50318_2002", "LN2_overlap", "LN2_ring", "Re330", "Shinkansen")
+)
 def built(request):
     line = load_line(request.param)
     mesh = build_mesh(line)

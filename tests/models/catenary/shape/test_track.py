@@ -10,6 +10,7 @@ from models.catenary.definition.track_definition import Track
 from models.catenary.shape.form_finding import find_form
 from models.catenary.shape.line_mesh import CatenaryMesh, Chain, build_mesh
 from models.catenary.shape.support_places import SupportPlaces
+from tests.effort import count
 from tests.models.curved_space import CurvedSpace
 
 NO_NODES = np.zeros(0, dtype=np.int64)
@@ -169,7 +170,7 @@ def mirrored(line):
 def test_a_mirrored_line_is_the_mirror_image(line_maker):
     random = np.random.default_rng(5)
     line = line_maker(spans=4, mesh={"elements_between_droppers": 1})
-    for _ in range(20):
+    for _ in range(count(5, 20)):
         knots = tuple(np.sort(random.uniform(0.0, 200.0, 4)))
         curved = with_track(
             line,

@@ -50,6 +50,10 @@ def test_the_usual_height_and_another_place_are_not(name, x, z):
     assert said(name, x, z) == ""
 
 
+def test_a_lifting_value_that_an_input_replaces_is_not_judged():
+    assert said("CX_multibody", 250.0, 5.30, static_force=178.0, lift_input=1) == ""
+
+
 def test_reference_height_at_the_wire_is_the_cure():
     assert said("generic_multibody", 250.0, 5.35, reference_height=5.30) == ""
 

@@ -47,3 +47,17 @@ def test_a_balance_goes_on_from_a_snapshot():
             part.step(120.0, np.zeros(3), np.zeros(2), 1e-3)
     assert np.array_equal(first.energy, second.energy)
     assert np.array_equal(first.contact_work, second.contact_work)
+
+
+def test_a_roof_that_rises_with_its_pantograph_lifts_the_weights_and_loses_nothing():
+    """At constant speed: the work is that on the weights of the bodies, the base's own aside."""
+    given = load_pantograph("CX_multibody").with_values({"monitor_energy": 1, "static_force": 0.0})
+    part, speed, h = MultibodyPantographPart(given), 0.2, 1e-3
+    part.initialise(0.0, 0.0, np.zeros(3), np.array([0.0, speed]))
+    for n in range(100):
+        part.step(0.0, np.array([0.0, 0.0, 5.0]), np.array([speed * n * h, speed]), h)
+    weight = given.gravity * sum(b.mass for b in given.bodies if b.name not in given.driven)
+    stored, dissipated, work, drift = part.energy
+    assert stored == pytest.approx(weight * speed * part.time, rel=1e-9)
+    assert work == pytest.approx(stored, rel=1e-9)
+    assert [dissipated, drift] == pytest.approx([0.0, 0.0], abs=1e-8)

@@ -1,5 +1,7 @@
 """The part between communication points: what a co-simulation sees."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -14,6 +16,19 @@ from tests.models.pantograph.multibody.test_mechanisms import run
 M = np.diag([5.58, 8.78, 7.75])
 SPRINGS, DAMPERS = [178.45, 15487.0, 7000.0], [108.39, 0.009, 45.85]
 REST = np.zeros(2)
+
+
+FORM = {"formulation": "auto"}
+
+
+@pytest.fixture(autouse=True, params=["auto", "general"])
+def formulation(request, monkeypatch):
+    """Either form of the equations of motion."""
+    monkeypatch.setitem(FORM, "formulation", request.param)
+
+
+def in_form(definition):
+    return replace(definition, **FORM)
 
 
 def chain(values):
@@ -67,7 +82,7 @@ def drive(part, duration, force, base=lambda t: REST, lateral=lambda t: 0.0, ste
 
 
 def cx_part(**changes):
-    return MultibodyPantographPart(library("CX_multibody").with_values({"start_position": 260.0, **changes}))
+    return MultibodyPantographPart(in_form(library("CX_multibody").with_values({"start_position": 260.0, **changes})))
 
 
 def test_part_follows_the_lumped_equations_under_extrapolated_inputs():
@@ -94,7 +109,7 @@ def test_part_travels_and_starts_at_its_reference():
 
 
 def generic_part(**changes):
-    part = MultibodyPantographPart(library("generic_multibody").with_values(changes))
+    part = MultibodyPantographPart(in_form(library("generic_multibody").with_values(changes)))
     part.initialise(0.0, 0.0, np.zeros(3), REST)
     return part
 
@@ -241,7 +256,7 @@ def test_when_a_run_begins_is_of_no_account_and_a_snapshot_knows_it():
     """Travel and raising count from the start; the second half goes on from a snapshot in the midst of the ramp."""
     motions = []
     for start in (0.0, 200.0):
-        part = MultibodyPantographPart(library("generic_multibody").with_values({"raise_duration": 0.1}))
+        part = MultibodyPantographPart(in_form(library("generic_multibody").with_values({"raise_duration": 0.1})))
         part.initialise(start, 0.0, np.zeros(3), REST)
         drive(part, 0.06, lambda t: 0.0)
         other = MultibodyPantographPart(part.definition)
@@ -252,7 +267,7 @@ def test_when_a_run_begins_is_of_no_account_and_a_snapshot_knows_it():
 
 
 def test_a_pantograph_on_a_moving_roof_begins_with_its_velocity():
-    part = MultibodyPantographPart(library("generic_multibody"))
+    part = MultibodyPantographPart(in_form(library("generic_multibody")))
     part.initialise(0.0, 0.0, np.zeros(3), np.array([0.03, 0.25]))
     assert part.strip[:, 1, 2] == pytest.approx(0.25)
     assert part.strip[:, 0, 2] == pytest.approx(part.definition.reference_height + 0.03)

@@ -82,3 +82,13 @@ def load_table(name):
     from models.definition_files.toml_reader import Table
 
     return Table.load(LIBRARY / f"{name}.toml")
+
+
+@pytest.mark.parametrize("height", [6.3, 4.4])
+def test_a_start_beyond_the_stops_is_refused_with_the_range_between_them(height):
+    table = load_table("generic_multibody_cam")
+    table.data["start_height"] = [height, "m", "test"]
+    part = MultibodyPantographPart(read_mechanism(table))
+    told = rf"start_height = {height} m is beyond the stop 'arm_stops': .* goes from 4\.456 to 6\.224 m"
+    with pytest.raises(ValueError, match=told):
+        part.initialise(0.0, 0.0, np.zeros(3), NOTHING)

@@ -169,7 +169,7 @@ def test_ten_kilonewtons_leave_every_body_above_the_base():
     lowest = []
     for n in range(350):
         part.step(10e3, np.array([part.definition.speed * n * 1e-3, 0.0, 5.0]), np.zeros(2), 1e-3)
-        lowest.append(mechanism.split(part._y).r[mechanism.driven :, 2].min())
+        lowest.append(mechanism.split(part.state).r[mechanism.driven :, 2].min())
     assert min(lowest) > -0.05
     assert lowest[-1] > 0.0
     assert part.strip[:, 0, 2].min() > part._built.base_height + 0.7
@@ -183,7 +183,7 @@ def test_a_blow_does_not_drive_the_head_through_what_carries_it():
     for n in range(150):
         force = 5e3 if 20 <= n < 40 else 150.0
         part.step(force, np.array([part.definition.speed * n * 1e-3, 0.0, 5.0]), np.zeros(2), 1e-3)
-        z = mechanism.split(part._y).r[:, 2]
+        z = mechanism.split(part.state).r[:, 2]
         gaps.append(z[mechanism.numbers["pan_head"]] - z[mechanism.numbers["stabilisation_arm"]])
     assert 0.0 < min(gaps) < 0.02
 

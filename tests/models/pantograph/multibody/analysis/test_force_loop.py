@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from models.commands import physics_main
+from models.commands.cam_curves import write_cam
 from models.definition_files.toml_reader import DefinitionError
 from models.library.catalogue import load_pantograph
 from models.pantograph.lumped import lumped_rig
@@ -81,6 +82,19 @@ def test_a_head_rubs_as_it_slides_and_as_it_rolls(friction, force, moment):
     assert loads[0, [2, 3]] == pytest.approx(-loads[1, [2, 3]])
 
 
+def test_a_head_that_has_rolled_rubs_along_its_own_axis():
+    m = head(**SLIDE)
+    s = m.split(m.written_state())
+    p, v = s.p.copy(), np.zeros((2, 3))
+    p[1] = [np.cos(0.2), np.sin(0.2), 0.0, 0.0]  # 0.4 rad about x
+    along = np.array([0.0, -np.sin(0.4), np.cos(0.4)])
+    v[1] = 0.008 * along
+    moving = m.join(s.r, p, v, np.zeros((2, 3)))
+    loads = m.loads(moving, m.kinematics(moving), Inputs())
+    assert loads[1, :3] == pytest.approx(-12.0 * np.tanh(0.8) * along)
+    assert loads[0, :3] == pytest.approx(-loads[1, :3])
+
+
 @pytest.mark.parametrize(
     ("friction", "told"),
     [
@@ -120,3 +134,24 @@ def test_values_that_do_nothing_are_told(capsys):
     said = capsys.readouterr().err
     assert "reference_time does nothing without follow_height = 1" in said
     assert "stop_damping does nothing without lowest_height or highest_height" in said
+
+
+@pytest.mark.parametrize(("time", "frequency", "less"), [(0.2, 1.70, 14.4), (0.5, 1.27, 19.8), (1.6, 0.89, 39.4)])
+def test_the_trade_of_the_time_constant_is_the_documented_one(time, frequency, less):
+    cx = load_pantograph("CX").with_values({"follow_height": 1, "reference_time": time})
+    assert lumped_rig.alike_from(cx) == pytest.approx(frequency, abs=0.01)
+    assert 0.1 * (cx.stage[0].stiffness * time + cx.stage[0].damping) == pytest.approx(less, abs=0.05)
+
+
+def test_the_cam_is_written_with_the_place_and_the_height(tmp_path):
+    rig = Rig(mechanism_from(library_data("generic_multibody_cam")))
+    curves = rig.cam_curves(5)
+    assert np.degrees(curves.place[[0, -1]]) == pytest.approx(
+        np.degrees([rig.mechanism.forces.stops.stops[0].lowest, rig.mechanism.forces.stops.stops[0].highest])
+    )
+    assert np.all(np.diff(curves.height) > 0.0)
+    # The rise of the strip per angle is what a newton takes, up to the head's tilt.
+    slope = np.gradient(curves.height, curves.place)[2]
+    assert slope == pytest.approx(curves.per_lift[2], rel=0.05)
+    write_cam(tmp_path, "t", curves, 17)
+    assert np.loadtxt(tmp_path / "cam.csv", delimiter=",", skiprows=1)[:, 1] == pytest.approx(curves.height)

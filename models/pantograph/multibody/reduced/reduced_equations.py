@@ -1,0 +1,631 @@
+"""The reduced equations of motion and their integration, in the part of Python that numba compiles as well.
+
+Coordinates are theta, which the closed arm follows; the roll phi of the head; and the displacements sigma of the bodies
+that slide on the carrier, the body of the arm that carries the head. Everything of the arm is tabulated over theta. A
+body of the head has its centre at
+
+    p = p0 + sin(phi) ps + cos(phi) pc + sigma e,    e = e0 + sin(phi) es + cos(phi) ec
+
+in axes that turn with the carrier about the y axis, by the pitch beta(theta). With its velocity linear in the rates of
+the coordinates, v = sum of columns times rates, and b the rest of its acceleration, virtual work gives
+
+    sum over columns of  m column . (columns rates' + b) + (rotation) = generalised forces.
+
+Displacements do not feel each other's inertia: they are eliminated one by one, which leaves theta and phi.
+
+Numbers come as lists or arrays, rows of tables as lists or rows of arrays: the same lines run as Python on lists, and
+compiled on arrays. ``model`` is what `reduced_motion.ReducedModel.numbers` makes. ``memory`` is what a step leaves for
+the next one: the coordinates with their rates (2 n), their accelerations (n) and response (3 n), the rates of all these
+in the middle and at the beginning of the step before (2 n each), single numbers.
+
+The file is longer than others because kernels are compiled from one source, and its functions take everything as
+numbers.
+"""
+
+from __future__ import annotations
+
+from math import ceil, cos, nan, sin, sqrt, tanh
+from typing import Any
+
+import numpy as np
+
+#: Functions of theta, in the order of the table; those of elements of the arm follow.
+INERTIA, SLOPE, WEIGHT, OWN, DAMPING, LEVER, PLACE, VX, VZ, PITCH, AX, AZ, PITCH_2, SINE, COSINE = range(15)
+CARRIER_X, CARRIER_Z, FIRST_OF_ARM = 15, 16, 17
+#: As in `mechanism_integrator`.
+_SMALLEST_STEP, _GROWTH = 1e-9, 2.0
+#: A coordinate that no motion reaches.
+_ABSURD = 1e6
+#: What became of a step.
+DONE, TOO_SMALL, BEYOND = range(3)
+#: Single numbers of a memory: last inputs, length of the step before (0: nothing to continue), step to try.
+FORCE, FORCE_Y, BASE_A, LIFT, UPLIFT, BEFORE, NEXT, SINGLE = range(8)
+
+
+def look_up(table: Any, theta: Any) -> Any:
+    """Return the functions of a table at ``theta``; beyond its ends those of the last cell go on."""
+    start, scale, count, cells = table
+    place = (theta - start) * scale
+    k = min(max(int(place), 0), count - 1)
+    x = place - k
+    x2 = x * x
+    x3 = x2 * x
+    return cells[k].dot(np.array((1.0, x, x2, x3, x2 * x2, x2 * x3))).tolist()
+
+
+def put(target: Any, values: Any) -> None:
+    """Write values into a memory."""
+    target[:] = values
+
+
+def is_beyond(table: Any, theta: Any) -> Any:
+    """Return whether a table does not say anything about ``theta``."""
+    start, scale, count, _ = table
+    return not 0.0 <= (theta - start) * scale <= count
+
+
+def curve_at(curve: Any, x: Any) -> Any:
+    """Return the value of a cubic curve, rows (place, coefficients highest first), its end values held outside."""
+    last = len(curve) - 1
+    if x >= curve[last][0]:
+        return curve[last][4]
+    if x <= curve[0][0]:
+        return curve[0][4]
+    low, high = 0, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if curve[middle][0] <= x:
+            low = middle
+        else:
+            high = middle
+    piece = curve[low]
+    t = x - piece[0]
+    return piece[4] + t * (piece[3] + t * (piece[2] + t * piece[1]))
+
+
+def lift_value(curves: Any, place: Any, lift: Any, uplift: Any) -> Any:
+    """Return what the lifting element gives [N or N.m]; see `ForceElements.lift_value`."""
+    for_weights, per_lift, per_force, adds = curves
+    value = lift
+    if len(per_lift) > 0:
+        own = curve_at(for_weights, place) if len(for_weights) > 0 else 0.0
+        value = own + lift * curve_at(per_lift, place)
+    if uplift == 0.0:
+        return value
+    if len(per_force) > 0:
+        return value + uplift * curve_at(per_force, place)
+    return value + uplift if adds > 0 else value
+
+
+def stop_force(value: Any, rate: Any, lowest: Any, highest: Any, stiffness: Any, damping: Any) -> Any:
+    """Return the force of a stop on a length or an angle: against what lies beyond, never pulling back."""
+    if value > highest:
+        return max(stiffness * (value - highest) + damping * rate, 0.0)
+    if value < lowest:
+        return min(stiffness * (value - lowest) + damping * rate, 0.0)
+    return 0.0
+
+
+def arm_force(arm: Any, t: Any, rate: Any) -> Any:
+    """Return the generalised force of stops and friction in the arm."""
+    total = 0.0
+    for row in arm:
+        value, slope = t[int(row[0])], t[int(row[1])]
+        if row[6] > 0.0:
+            total -= row[6] * tanh(slope * rate / row[7]) * slope
+        else:
+            total -= stop_force(value, slope * rate, row[2], row[3], row[4], row[5]) * slope
+    return total
+
+
+def line_forces(lines: Any, sine: Any, cosine: Any, y: Any, n: Any, forces: Any) -> Any:
+    """Add the generalised forces of springs, dampers and stops of the head to ``forces``; return that on the roll."""
+    on_roll, roll_rate = 0.0, y[n + 1]
+    for row in lines:
+        a, b = int(row[0]), int(row[1])
+        gap = rate = 0.0
+        if b >= 0:
+            gap, rate = y[2 + b], y[n + 2 + b]
+        if a >= 0:
+            gap -= y[2 + a]
+            rate -= y[n + 2 + a]
+        by_gap = row[6] + sine * row[7] + cosine * row[8]
+        value = row[3] + sine * row[4] + cosine * row[5] + gap * (by_gap + gap * row[9])
+        by_gap += 2.0 * gap * row[9]
+        by_roll = cosine * row[4] - sine * row[5] + gap * (cosine * row[7] - sine * row[8])
+        if row[2] == 0.0:
+            value = sqrt(abs(value)) + 1e-300
+            half = 0.5 / value
+            by_gap *= half
+            by_roll *= half
+        speed = by_gap * rate + by_roll * roll_rate
+        tension = row[10] * (value - row[11]) + row[12] * speed - row[13]
+        if row[14] > 0.0:
+            tension += stop_force(value, speed, row[16], row[17], row[14], row[15])
+        on_roll -= tension * by_roll
+        if b >= 0:
+            forces[b] -= tension * by_gap
+        if a >= 0:
+            forces[a] += tension * by_gap
+    return on_roll
+
+
+def joint_forces(slides: Any, turns: Any, y: Any, n: Any, forces: Any) -> Any:
+    """Add friction of the head's slides to ``forces``; return the moments of stops, friction and drives on its roll."""
+    for row in slides:
+        a, b = int(row[0]), int(row[1])
+        rate = 0.0
+        if b >= 0:
+            rate = y[n + 2 + b]
+        if a >= 0:
+            rate -= y[n + 2 + a]
+        friction = row[2] * tanh(rate / row[3])
+        if b >= 0:
+            forces[b] -= friction
+        if a >= 0:
+            forces[a] += friction
+    on_roll = 0.0
+    for row in turns:
+        factor = row[1]
+        rate = factor * y[n + 1]
+        moment = stop_force(row[0] + factor * y[1], rate, row[2], row[3], row[4], row[5]) - row[8]
+        if row[6] > 0.0:
+            moment += row[6] * tanh(rate / row[7])
+        on_roll -= moment * factor
+    return on_roll
+
+
+def vector_at(row: Any, at: Any, sin_p: Any, cos_p: Any) -> Any:
+    """Return a vector that rolls, from its nine numbers in a row."""
+    return (
+        row[at] + sin_p * row[at + 3] + cos_p * row[at + 6],
+        row[at + 1] + sin_p * row[at + 4] + cos_p * row[at + 7],
+        row[at + 2] + sin_p * row[at + 5] + cos_p * row[at + 8],
+    )
+
+
+def motion_of(body: Any, y: Any, n: Any, sin_p: Any, cos_p: Any) -> Any:
+    """Return how a body of the head stands to the carrier.
+
+    Returns
+    -------
+    tuple of 15 floats
+        Place of its centre, its derivative by the roll and by its displacement, its velocity, and what its acceleration
+        is without those of the coordinates; in axes of the carrier, as if that stood still.
+    """
+    slide = int(body[0])
+    s = s_rate = 0.0
+    if slide >= 0:
+        s, s_rate = y[2 + slide], y[n + 2 + slide]
+    px, py, pz = body[3], body[4], body[5]
+    ex, ey, ez = body[12], body[13], body[14]
+    if body[1] == 0.0:
+        return (
+            px + s * ex, py + s * ey, pz + s * ez, 0.0, 0.0, 0.0, ex, ey, ez,
+            s_rate * ex, s_rate * ey, s_rate * ez, 0.0, 0.0, 0.0,
+        )  # fmt: skip
+    rate = y[n + 1]
+    ux, uy, uz = (
+        sin_p * body[6] + cos_p * body[9],
+        sin_p * body[7] + cos_p * body[10],
+        sin_p * body[8] + cos_p * body[11],
+    )
+    hx, hy, hz = (
+        sin_p * body[15] + cos_p * body[18],
+        sin_p * body[16] + cos_p * body[19],
+        sin_p * body[17] + cos_p * body[20],
+    )
+    gx, gy, gz = (
+        cos_p * body[15] - sin_p * body[18],
+        cos_p * body[16] - sin_p * body[19],
+        cos_p * body[17] - sin_p * body[20],
+    )
+    tx = cos_p * body[6] - sin_p * body[9] + s * gx
+    ty = cos_p * body[7] - sin_p * body[10] + s * gy
+    tz = cos_p * body[8] - sin_p * body[11] + s * gz
+    ex, ey, ez = ex + hx, ey + hy, ez + hz
+    square, both = rate * rate, 2.0 * rate * s_rate
+    return (
+        px + ux + s * ex, py + uy + s * ey, pz + uz + s * ez, tx, ty, tz, ex, ey, ez,
+        rate * tx + s_rate * ex, rate * ty + s_rate * ey, rate * tz + s_rate * ez,
+        both * gx - square * (ux + s * hx), both * gy - square * (uy + s * hy), both * gz - square * (uz + s * hz),
+    )  # fmt: skip
+
+
+def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
+    """Return the accelerations of the coordinates, and if wanted what they become per change of the inputs.
+
+    Parameters
+    ----------
+    y : sequence, length 2 n
+        Coordinates, then their rates.
+    given : (force, lateral, base acceleration, lift, uplift)
+    respond : bool
+
+    Returns
+    -------
+    accelerations : list, length n
+    response : list, length 3 n
+        Per contact force at y = 0, per contact force times y, per acceleration of the base; empty if not wanted.
+    """
+    table, single, bodies, lines, slides, turns, arm, strip, curves = model
+    force, lateral, base, lift, uplift = given
+    n = len(y) // 2
+    if not (abs(y[0]) < _ABSURD and abs(y[1]) < _ABSURD):  # not a number, either: the step is too long
+        return [nan] * n, [nan] * (3 * n)
+    t = look_up(table, y[0])
+    speed, roll_rate = y[n], y[n + 1]
+    square = speed * speed
+    pitch, sine, cosine = t[PITCH], t[SINE], t[COSINE]
+    vx, vz, ax, az = t[VX], t[VZ], t[AX] * square, t[AZ] * square
+    turn, turning = pitch * speed, t[PITCH_2] * square
+    turn_2 = turn * turn
+    m_tt, m_tp, m_pp = t[INERTIA], 0.0, single[1]
+    w_t, w_p = t[WEIGHT], 0.0
+    f_t = t[OWN] - t[SLOPE] * square - t[DAMPING] * speed
+    f_t += t[LEVER] * lift_value(curves, t[PLACE], lift, uplift)
+    if len(arm) > 0:
+        f_t += arm_force(arm, t, speed)
+    sin_p, cos_p = sin(y[1]), cos(y[1])
+    m_ts, m_ps, m_ss = [0.0] * (n - 2), [0.0] * (n - 2), [0.0] * (n - 2)
+    w_s, f_s = [0.0] * (n - 2), [0.0] * (n - 2)
+    f_p = line_forces(lines, sin_p, cos_p, y, n, f_s)
+    if len(slides) + len(turns) > 0:
+        f_p += joint_forces(slides, turns, y, n, f_s)
+    on = strip[0]
+    # Of the strip's body: place and columns.
+    k_py = k_tx = k_tz = k_ex = k_ez = 0.0
+    k_cx, k_cz, k_slide = vx, vz, -1
+    number = 0.0
+    for body in bodies:
+        slide, rolls, mass = int(body[0]), body[1], body[2]
+        px, py, pz, tx, ty, tz, ex, ey, ez, wx, _, wz, rx, ry, rz = motion_of(body, y, n, sin_p, cos_p)
+        cx, cz = vx + pitch * pz, vz - pitch * px
+        bx = mass * (ax + turning * pz + 2.0 * turn * wz - turn_2 * px + rx)
+        by = mass * ry
+        bz = mass * (az - turning * px - 2.0 * turn * wx - turn_2 * pz + rz)
+        m_tt += mass * (cx * cx + cz * cz)
+        f_t -= cx * bx + cz * bz
+        w_t -= mass * (cosine * cz - sine * cx)
+        if slide >= 0:
+            m_ts[slide] += mass * (cx * ex + cz * ez)
+            m_ss[slide] += mass * (ex * ex + ey * ey + ez * ez)
+            f_s[slide] -= ex * bx + ey * by + ez * bz
+            w_s[slide] -= mass * (cosine * ez - sine * ex)
+        if rolls > 0.0:
+            m_tp += mass * (cx * tx + cz * tz)
+            m_pp += mass * (tx * tx + ty * ty + tz * tz) + body[29]
+            f_p -= tx * bx + ty * by + tz * bz
+            w_p -= mass * (cosine * tz - sine * tx)
+            if slide >= 0:
+                m_ps[slide] += mass * (tx * ex + ty * ey + tz * ez)
+            j_yy = body[21] + body[22] * sin_p + body[23] * cos_p + sin_p * (body[24] * sin_p + body[25] * cos_p)
+            d_yy = body[22] * cos_p - body[23] * sin_p + 2.0 * body[24] * sin_p * cos_p
+            d_yy += body[25] * (cos_p * cos_p - sin_p * sin_p)
+            j_yp = body[26] + body[27] * sin_p + body[28] * cos_p
+            d_yp = body[27] * cos_p - body[28] * sin_p
+            m_tt += pitch * pitch * j_yy
+            m_tp += pitch * j_yp
+            f_t -= pitch * (turning * j_yy + turn * roll_rate * d_yy + roll_rate * roll_rate * d_yp)
+            f_p -= turning * j_yp - 0.5 * turn_2 * d_yy
+        else:
+            m_tt += pitch * pitch * body[21]
+            f_t -= pitch * turning * body[21]
+        if number == on:
+            k_py, k_cx, k_cz, k_slide = py, cx, cz, slide
+            k_tx, k_tz, k_ex, k_ez = tx, tz, ex, ez
+        number += 1.0
+    # The contact's columns, at y = 0 and per y.
+    dx, dy, dz = vector_at(strip, 10, sin_p, cos_p)
+    lx, ly, lz = vector_at(strip, 1, sin_p, cos_p)
+    along = -(strip[19] + k_py + ly) / dy
+    lx += along * dx
+    ly += along * dy
+    lz += along * dz
+    dx /= dy
+    dz /= dy
+    c_t = -(cosine * (k_cz - pitch * lx) - sine * (k_cx + pitch * lz))
+    d_t = pitch * (cosine * dx + sine * dz)
+    c_p = d_p = c_s = 0.0
+    if strip[21] > 0.0:
+        ux, uy, uz = single[2], single[3], single[4]
+        c_p = -(cosine * (k_tz + ux * ly - uy * lx) - sine * (k_tx + uy * lz - uz * ly))
+        d_p = -(cosine * (ux - uy * dx) - sine * (uy * dz - uz))
+    if k_slide >= 0:
+        c_s = -(cosine * k_ez - sine * k_ex)
+    gravity, moment = single[0] + base, force * lateral
+    f_t += gravity * w_t + force * c_t + moment * d_t
+    f_p += gravity * w_p + force * c_p + moment * d_p
+    for j in range(n - 2):
+        f_s[j] += gravity * w_s[j]
+    if k_slide >= 0:
+        f_s[k_slide] += force * c_s
+    result = solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, f_t, f_p, f_s)
+    if not respond:
+        return result, result[:0]
+    u_s, none = [0.0] * (n - 2), [0.0] * (n - 2)
+    if k_slide >= 0:
+        u_s[k_slide] = c_s
+    response = solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, c_t, c_p, u_s)
+    response += solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, d_t, d_p, none)
+    response += solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, w_t, w_p, w_s)
+    return result, response
+
+
+def solved(m_tt: Any, m_tp: Any, m_pp: Any, m_ts: Any, m_ps: Any, m_ss: Any, f_t: Any, f_p: Any, f_s: Any) -> Any:
+    """Return the accelerations under generalised forces, the displacements eliminated first."""
+    count = len(m_ss)
+    for j in range(count):
+        by_t, by_p = m_ts[j] / m_ss[j], m_ps[j] / m_ss[j]
+        m_tt -= by_t * m_ts[j]
+        m_tp -= by_t * m_ps[j]
+        m_pp -= by_p * m_ps[j]
+        f_t -= by_t * f_s[j]
+        f_p -= by_p * f_s[j]
+    one = 1.0 / (m_tt * m_pp - m_tp * m_tp)
+    a_t, a_p = one * (m_pp * f_t - m_tp * f_p), one * (m_tt * f_p - m_tp * f_t)
+    result = [a_t, a_p]
+    for j in range(count):
+        result.append((f_s[j] - m_ts[j] * a_t - m_ps[j] * a_p) / m_ss[j])  # noqa: PERF401 - compiled, a loop is as fast
+    return result
+
+
+def inputs_at(given: Any, tau: Any) -> Any:
+    """Return (force, lateral, base acceleration, lift, uplift) ``tau`` after the beginning of a step.
+
+    ``given`` holds 23 numbers: see `reduced_motion.ReducedMotion.step`.
+    """
+    time = given[0] + tau
+    elapsed = time - given[1]
+    share = 0.0
+    if elapsed >= given[19]:
+        share = 1.0 if given[20] == 0.0 else min(1.0, (elapsed - given[19]) / given[20])
+    lift, uplift = given[17] + share * (given[18] - given[17]), given[21]
+    if given[22] > 0.0:
+        lift, uplift = lift + uplift, 0.0
+    lateral = given[10] + given[11] * (time - given[12])
+    return force_at(given, time), lateral, 2.0 * given[15] + 6.0 * given[16] * tau, lift, uplift
+
+
+def force_at(given: Any, time: Any) -> Any:
+    """Return the contact force at ``time``; see `ForceExtrapolation.at`."""
+    t0, f0 = given[3], given[6]
+    if f0 == 0.0 and time > t0:
+        return 0.0
+    degree, result = min(given[9], given[2] - 1.0), f0
+    if degree >= 1.0:
+        first = (f0 - given[7]) / (t0 - given[4])
+        result += first * (time - t0)
+        if degree >= 2.0:
+            second = (first - (given[7] - given[8]) / (given[4] - given[5])) / (t0 - given[5])
+            result += second * (time - t0) * (time - given[4])
+    return result if result > 0.0 else 0.0
+
+
+def begin(memory: Any, given: Any, model: Any, settings: Any) -> None:
+    """Begin at the coordinates and rates in a memory: fill the rest of it."""
+    state, rates, kept, _, _, single = memory
+    inputs = inputs_at(given, 0.0)
+    acceleration, response = evaluate(list(state), inputs, model, True)
+    put(rates, acceleration)
+    put(kept, response)
+    keep_inputs(single, inputs)
+    single[BEFORE], single[NEXT] = 0.0, settings[1]
+
+
+def keep_inputs(single: Any, inputs: Any) -> None:
+    """Note what acted."""
+    force, lateral, base, lift, uplift = inputs
+    single[FORCE], single[FORCE_Y], single[BASE_A] = force, force * lateral, base
+    single[LIFT], single[UPLIFT] = lift, uplift
+
+
+def step(memory: Any, given: Any, duration: Any, model: Any, settings: Any) -> Any:
+    """Advance a memory by ``duration``, as `mechanism_integrator.Integrator.advance` does; return what became of it.
+
+    Parameters
+    ----------
+    settings : (float, float, sequence of 2 n)
+        Local error of an internal step [m], longest one [s], weights of coordinates and rates.
+
+    Returns
+    -------
+    int
+        DONE; or why nothing has changed: TOO_SMALL, BEYOND (the table).
+    """
+    state, rates, kept, kept_middle, kept_begun, single = memory
+    n = len(rates)
+    y, middle, begun = list(state), list(kept_middle), list(kept_begun)
+    acting = inputs_at(given, 0.0)
+    force, lateral, base, lift, uplift = acting
+    before, first = single[BEFORE], y[n:]
+    if lift == single[LIFT] and uplift == single[UPLIFT]:
+        d_force, d_moment, d_base = force - single[FORCE], force * lateral - single[FORCE_Y], base - single[BASE_A]
+        for i in range(n):
+            change = d_force * kept[i] + d_moment * kept[n + i] + d_base * kept[2 * n + i]
+            first.append(rates[i] + change)
+            middle[n + i] += change
+            begun[n + i] += change
+    else:
+        acceleration, _ = evaluate(y, acting, model, False)
+        first, before = first + acceleration, 0.0
+    response = first[:0]
+    rise = given[19] - (given[0] - given[1])
+    raised = rise + given[20]
+    if abs(rise) <= _SMALLEST_STEP or abs(raised) <= _SMALLEST_STEP:
+        before = 0.0
+    now, trial, latest = 0.0, single[NEXT], duration - _SMALLEST_STEP
+    for end in (rise, raised, duration):  # inputs have kinks there: internal steps end there
+        if end != duration and not _SMALLEST_STEP < end < latest:
+            continue
+        while now < end:
+            longest = min(trial, settings[1], duration)
+            pieces = max(1, int(ceil((end - now) / longest - 1e-6)))  # noqa: RUF046 - compiled, ceil is no integer
+            h = (end - now) / pieces
+            if before > 0.0 and abs(before - h) <= 1e-9 * h:
+                new, new_rates, response, between, acting, error = continued(
+                    y, first, middle, begun, given, now, h, model, settings
+                )
+            else:
+                new, new_rates, response, between, acting, error = started(y, first, given, now, h, model, settings)
+            if not error <= 1.0:
+                trial, before = h * factor(error), 0.0
+                if trial < _SMALLEST_STEP:
+                    return TOO_SMALL
+                continue
+            if is_beyond(model[0], new[0]):
+                return BEYOND
+            now = end if pieces == 1 else now + h
+            y, middle, begun, first, before = new, between, first, new_rates, h
+            trial = longest
+            if longest < settings[1]:
+                growth = factor(error)
+                trial = min(longest * growth if growth >= _GROWTH else longest, settings[1])
+        if end < duration:
+            before = 0.0
+    put(state, y)
+    put(rates, first[n:])
+    put(kept, response)
+    put(kept_middle, middle)
+    put(kept_begun, begun)
+    keep_inputs(single, inputs_at(given, duration) if before != duration else acting)
+    single[BEFORE], single[NEXT] = before, trial
+    return DONE
+
+
+def continued(
+    y: Any, first: Any, before: Any, begun: Any, given: Any, now: Any, h: Any, model: Any, settings: Any
+) -> Any:
+    """Predict by the parabola through the last three rates, correct by Simpson's rule; see `Integrator`."""
+    n = len(y) // 2
+    a, b, c = h / 24.0, h / 48.0, h / 6.0
+    half = [x + a * (23.0 * f - 16.0 * m + 5.0 * k) for x, f, m, k in zip(y, first, before, begun)]  # noqa: B905 - numba
+    for i in range(n):
+        half[i] = y[i] + b * (begun[i] - 5.0 * before[i] + 19.0 * first[i] + 9.0 * half[n + i])
+    acceleration, _ = evaluate(half, inputs_at(given, now + 0.5 * h), model, False)
+    middle = half[n:] + acceleration
+    guess = [x + c * (m - 2.0 * f + 7.0 * k) for x, f, m, k in zip(y, first, before, middle)]  # noqa: B905
+    for i in range(n):
+        guess[i] = y[i] + c * (first[i] + 4.0 * middle[i] + guess[n + i])
+    acting = inputs_at(given, now + h)
+    acceleration, response = evaluate(guess, acting, model, True)
+    last = guess[n:] + acceleration
+    new = [x + c * (f + 4.0 * k + e) for x, f, k, e in zip(y, first, middle, last)]  # noqa: B905
+    error = error_of(new, guess, settings)
+    for i in range(n):
+        speed = y[n + i] + a * (5.0 * first[n + i] + 8.0 * middle[n + i] - last[n + i])
+        new[i] = y[i] + c * (first[i] + 4.0 * speed + new[n + i])
+    return new, last, response, middle, acting, error
+
+
+def started(y: Any, first: Any, given: Any, now: Any, h: Any, model: Any, settings: Any) -> Any:
+    """Take a Runge-Kutta step; see `Integrator`."""
+    n = len(y) // 2
+    at_middle, at_end = inputs_at(given, now + 0.5 * h), inputs_at(given, now + h)
+    a, c = 0.5 * h, h / 6.0
+    second = [y[i] + a * first[i] for i in range(2 * n)]
+    acceleration, _ = evaluate(second, at_middle, model, False)
+    k2 = second[n:] + acceleration
+    third = [y[i] + a * k2[i] for i in range(2 * n)]
+    acceleration, _ = evaluate(third, at_middle, model, False)
+    k3 = third[n:] + acceleration
+    fourth = [y[i] + h * k3[i] for i in range(2 * n)]
+    acceleration, _ = evaluate(fourth, at_end, model, False)
+    k4 = fourth[n:] + acceleration
+    new = [y[i] + c * (first[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) for i in range(2 * n)]
+    acceleration, response = evaluate(new, at_end, model, True)
+    last = new[n:] + acceleration
+    error = error_of([c * k for k in k4], [c * k for k in last], settings)
+    return new, last, response, k3, at_end, error
+
+
+def error_of(a: Any, b: Any, settings: Any) -> Any:
+    """Return the largest difference in units of the tolerance."""
+    largest = 0.0
+    for x, y, weight in zip(a, b, settings[2]):  # noqa: B905
+        difference = abs(x - y) * weight
+        if not difference <= largest:
+            largest = difference
+    return largest / settings[0]
+
+
+def factor(error: Any) -> Any:
+    """Return by how much a step may grow."""
+    if not error < _ABSURD:
+        return 0.1
+    return min(4.0, max(0.1, 0.9 * max(error, 1e-10) ** -0.25))
+
+
+def place_strip(memory: Any, model: Any, moved: Any, ends: Any) -> None:
+    """Write the ends of the strip, 12 numbers: A, B; position, velocity; x, y, z.
+
+    Parameters
+    ----------
+    moved : sequence of 4
+        What is added to x, z and their rates: the train and the base.
+    """
+    table, _, bodies, _, _, _, _, strip, _ = model
+    y, n = memory[0], len(memory[1])
+    t = look_up(table, y[0])
+    sin_p, cos_p = sin(y[1]), cos(y[1])
+    sine, cosine, turn = t[SINE], t[COSINE], t[PITCH] * y[n]
+    px = py = pz = wx = wy = wz = 0.0
+    on = int(strip[0])
+    if on >= 0:
+        px, py, pz, _, _, _, _, _, _, wx, wy, wz, _, _, _ = motion_of(bodies[on], y, n, sin_p, cos_p)
+    rate = y[n + 1] if strip[21] > 0.0 else 0.0
+    ux, uy, uz = model[1][2] * rate, model[1][3] * rate, model[1][4] * rate
+    dx, dy, dz = vector_at(strip, 10, sin_p, cos_p)
+    lx, ly, lz = vector_at(strip, 1, sin_p, cos_p)
+    for k in range(2):
+        side = strip[20] if k == 0 else -strip[20]
+        ax, ay, az = lx + side * dx, ly + side * dy, lz + side * dz
+        x, z = px + ax, pz + az
+        vx = t[VX] * y[n] + turn * z + wx + uy * az - uz * ay
+        vy = wy + uz * ax - ux * az
+        vz = t[VZ] * y[n] - turn * x + wz + ux * ay - uy * ax
+        ends[6 * k] = t[CARRIER_X] + cosine * x + sine * z + moved[0]
+        ends[6 * k + 1] = strip[19] + py + ay
+        ends[6 * k + 2] = t[CARRIER_Z] - sine * x + cosine * z + moved[1]
+        ends[6 * k + 3], ends[6 * k + 4] = cosine * vx + sine * vz + moved[2], vy
+        ends[6 * k + 5] = -sine * vx + cosine * vz + moved[3]
+
+
+def place_bodies(memory: Any, model: Any, outline: Any, moved: Any, out: Any) -> None:
+    """Write height, velocity and acceleration of the arm's bodies, then of the head's.
+
+    Parameters
+    ----------
+    outline : table
+        Height of the arm's bodies and two derivatives.
+    moved : sequence of 3
+        What is added: height, velocity and acceleration of the base.
+    """
+    table, _, bodies, _, _, _, _, _, _ = model
+    y, rates = memory[0], memory[1]
+    n = len(rates)
+    t, o = look_up(table, y[0]), look_up(outline, y[0])
+    speed, rise = y[n], rates[0]
+    square = speed * speed
+    k = 0
+    for i in range(0, len(o), 3):
+        out[k], out[k + 1] = o[i] + moved[0], o[i + 1] * speed + moved[1]
+        out[k + 2] = o[i + 1] * rise + o[i + 2] * square + moved[2]
+        k += 3
+    sin_p, cos_p = sin(y[1]), cos(y[1])
+    sine, cosine, turn = t[SINE], t[COSINE], t[PITCH] * speed
+    turning = t[PITCH] * rise + t[PITCH_2] * square
+    for body in bodies:
+        px, _, pz, tx, _, tz, ex, _, ez, wx, _, wz, rx, _, rz = motion_of(body, y, n, sin_p, cos_p)
+        slide = int(body[0])
+        own = rates[2 + slide] if slide >= 0 else 0.0
+        roll = rates[1]
+        bx = t[VX] * rise + t[AX] * square + turning * pz - turn * turn * px
+        bz = t[VZ] * rise + t[AZ] * square - turning * px - turn * turn * pz
+        bx += 2.0 * turn * wz + rx + tx * roll + ex * own
+        bz += rz - 2.0 * turn * wx + tz * roll + ez * own
+        vx, vz = t[VX] * speed + turn * pz + wx, t[VZ] * speed - turn * px + wz
+        out[k] = t[CARRIER_Z] - sine * px + cosine * pz + moved[0]
+        out[k + 1] = cosine * vz - sine * vx + moved[1]
+        out[k + 2] = cosine * bz - sine * bx + moved[2]
+        k += 3

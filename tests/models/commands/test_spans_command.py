@@ -1,0 +1,50 @@
+"""``spans`` and ``statics --wind``: the same wind, tables and figures, and what is missing said in words."""
+
+import csv
+
+import pytest
+
+from models.commands.physics_main import main
+
+
+@pytest.fixture
+def said(capsys):
+    def ask(*arguments):
+        code = main(list(arguments))
+        return code, capsys.readouterr()
+
+    return ask
+
+
+def test_spans_of_ca160(said, tmp_path):
+    wind = ("--pressure", "961.04", "--limit", "0.55")
+    spans = ("--radius", "800", "--stagger", "0.2", "0.2")
+    code, text = said("spans", "CA160", *wind, *spans, "--out", str(tmp_path / "out"))
+    assert code == 0
+    assert "961.04 Pa" in text.out
+    with (tmp_path / "out" / "spans.csv").open() as file:
+        assert [row["radius [m]"] for row in csv.DictReader(file)] == ["800"]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"radii.csv", "spans.csv", "spans.png"}
+
+
+def test_a_limit_is_needed(said):
+    code, text = said("spans", "LN2", "--wind", "29")
+    assert code == 1
+    assert text.err == "error: how far may the wire be blown? give --limit, in m, or --head 1600 or 1950\n"
+
+
+def test_a_limit_without_wind_is_refused(said):
+    code, text = said("statics", "LN2", "--head", "1600")
+    assert code == 1
+    assert "give --wind, in m/s, or --pressure, in Pa" in text.err
+
+
+def test_statics_in_the_wind(said, tmp_path):
+    code, text = said("statics", "LN2", "--wind", "29", "--head", "1600", "--out", str(tmp_path / "out"))
+    assert code == 0
+    assert "keeps" in text.out
+    with (tmp_path / "out" / "wind.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 24
+    assert [float(row["limit [m]"]) for row in rows][2:-2] == [0.4] * 20
+    assert (tmp_path / "out" / "wind.png").stat().st_size > 5000

@@ -1,0 +1,322 @@
+"""The reduced form against the general one, which knows nothing of tables, arm or head."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.library.catalogue import load_pantograph
+from models.numerics.cubic_curve import CubicCurve
+from models.pantograph.multibody.analysis.posture import take_posture
+from models.pantograph.multibody.mechanism import Inputs, Mechanism
+from models.pantograph.multibody.mechanism_assembly import assemble, project
+from models.pantograph.multibody.mechanism_definition import (
+    ActuatorForce,
+    ActuatorMoment,
+    AngleStop,
+    BumpStop,
+    Fixed,
+    Prismatic,
+    Revolute,
+    SlideAndTurnFriction,
+    SlidingFriction,
+    SpringDamper,
+    TurningFriction,
+)
+from models.pantograph.multibody.multibody_part import MultibodyPantographPart
+from models.pantograph.multibody.reduced import reduced_equations
+from models.pantograph.multibody.reduced.reduced_motion import ReducedModel, ReducedMotion
+from models.pantograph.operation import Drive
+from tests.effort import count
+
+#: The motion is plain here, but where kernels are compared with it.
+KERNEL = "OPENPANTO_KERNEL"
+LIBRARY = ("CX_multibody", "generic_multibody", "generic_multibody_cam")
+
+
+@pytest.fixture(autouse=True)
+def plain(monkeypatch):
+    monkeypatch.setenv(KERNEL, "numpy")
+
+
+def unit(*vector):
+    """A direction as the reader makes it."""
+    return tuple((np.array(vector) / np.linalg.norm(vector)).tolist())
+
+
+def with_everything():
+    """The generic pantograph with every element that the reduced form knows, each where it acts."""
+    d = load_pantograph("generic_multibody")
+    head = {"body_i": "stabilisation_arm", "body_j": "pan_head"}
+    arm = {"body_i": "base", "body_j": "lower_arm"}
+    y = (0.0, 1.0, 0.0)
+    roll = Revolute(
+        name="joint_8", body_i="frame", body_j="pan_head", point_i=(0.01, 0.0, 0.02), point_j=(0.0, 0.0, 0.02),
+        axis_i=unit(1.0, 0.2, 0.1), axis_j=unit(1.0, 0.2, 0.1),
+    )  # fmt: skip
+    slide = Prismatic(
+        name="slide", body_i="stabilisation_arm", body_j="frame", point_i=(0.0, 0.0, 0.0), point_j=(0.0, 0.0, 0.0),
+        axis_i=unit(0.1, 0.0, 1.0),
+    )  # fmt: skip
+    frame = replace(next(b for b in d.bodies if b.name == "pan_head"), name="frame", mass=3.0, inertia=(0.1, 0.2, 0.15))
+    horn = replace(frame, name="horn", mass=0.7, position=(0.6, 0.3, 1.6))
+    held = Fixed(name="held", body_i="pan_head", body_j="horn", point_i=(0.0, 0.3, 0.1), point_j=(-0.047, 0.0, -0.002))
+    sprung = {"point_i": (0.1, 0.3, 0.0), "point_j": (0.0, 0.3, 0.02), "stiffness": 900.0, "damping": 30.0}
+    forces = (
+        *(f for f in d.forces if not f.name.startswith("suspension")),
+        TurningFriction(name="f1", joint="joint_1", moment=30.0, transition=0.2),
+        TurningFriction(name="f2", joint="joint_4", moment=5.0, transition=0.3),
+        TurningFriction(name="f3", joint="joint_8", moment=4.0, transition=0.3),
+        SlidingFriction(name="f4", joint="slide", force=6.0, transition=0.1),
+        ActuatorMoment(name="m1", body_i="lower_arm", body_j="upper_arm", axis_i=y, moment=12.0),
+        ActuatorMoment(name="m2", body_i="frame", body_j="pan_head", axis_i=unit(0.5, 0.0, 0.3), moment=3.0),
+        AngleStop(name="a1", **arm, axis_i=y, lowest=-0.05, highest=0.05, stiffness=900.0, damping=40.0),
+        BumpStop(
+            name="b1", **arm, point_i=(-0.2, 0.0, 0.0), point_j=(0.8, 0.0, -0.1), shortest=0.5, longest=0.6,
+            stiffness=800.0, damping=20.0,
+        ),
+        ActuatorForce(name="p1", **arm, point_i=(-0.2, 0.0, 0.1), point_j=(0.5, 0.0, -0.1), force=40.0),
+        SpringDamper(name="s1", **head, **sprung, free_length=0.1),
+        SpringDamper(name="s2", **head, **sprung, free_length=0.1, direction=unit(0.0, 0.1, 1.0)),
+        BumpStop(
+            name="b2", body_i="frame", body_j="horn", point_i=(0.1, 0.2, 0.0), point_j=(0.0, 0.0, 0.0), shortest=0.16,
+            longest=0.17, stiffness=2e3, damping=20.0,
+        ),
+        ActuatorForce(name="p2", **head, point_i=(0.1, 0.3, 0.0), point_j=(0.0, 0.3, 0.02), force=15.0),
+    )  # fmt: skip
+    joints = (*(j for j in d.joints if j.name != "joint_8"), slide, roll, held)
+    assembly = replace(d.assembly, largest_gap=0.2)
+    return replace(d, bodies=(*d.bodies, frame, horn), joints=joints, forces=forces, assembly=assembly)
+
+
+def pitching_head():
+    """A head that pitches about y on a slide of its own, with a stop about its hinge."""
+    d = with_everything()
+    y = (0.0, 1.0, 0.0)
+    hinge = Revolute(
+        name="joint_8", body_i="pan_head", body_j="frame", point_i=(0.01, 0.0, 0.02), point_j=(0.0, 0.0, 0.02),
+        axis_i=y, axis_j=y,
+    )  # fmt: skip
+    stop = AngleStop(
+        name="a2", body_i="frame", body_j="pan_head", axis_i=y, lowest=-0.04, highest=0.06, stiffness=700.0, damping=9.0
+    )
+    joints = tuple(hinge if j.name == "joint_8" else j for j in d.joints)
+    return replace(d, joints=joints, forces=(*d.forces, stop))
+
+
+def rubbing_head():
+    """The generic head, whose joint slides and turns, with friction of both."""
+    d = load_pantograph("generic_multibody")
+    friction = SlideAndTurnFriction(
+        name="f", joint="joint_8", force=9.0, slide_transition=0.1, moment=4.0, transition=0.3
+    )  # fmt: skip
+    return replace(d, forces=(*d.forces, friction))
+
+
+def reduced(definition):
+    """The model about the working configuration, and the lift that balances it there."""
+    mechanism = Mechanism(definition)
+    posture = take_posture(mechanism)
+    return ReducedModel(mechanism, project(mechanism, posture.start.y)), posture.start.lift
+
+
+def reduced_as_assembled(definition):
+    """The same about a configuration that nothing balances."""
+    mechanism = Mechanism(definition)
+    return ReducedModel(mechanism, assemble(mechanism)), 1200.0
+
+
+def random_states(model, rng, number):
+    """Coordinates over the range, bodies at up to 2 m/s."""
+    n, (low, high) = model.size, model.range
+    for _ in range(number):
+        y = np.zeros(2 * n)
+        weights = np.array(model.settings[2][:n])
+        y[0], y[2:n] = rng.uniform(low, high), rng.uniform(-0.03, 0.03, n - 2)
+        y[n:] = rng.uniform(-2.0, 2.0, n) / weights
+        if model.rolls:
+            y[1] = rng.uniform(-0.2, 0.2)
+        else:
+            y[n + 1] = 0.0
+        yield y
+
+
+@pytest.fixture(scope="module", params=[*LIBRARY, "with_everything", "pitching_head", "rubbing_head"])
+def case(request):
+    own = {f.__name__: f for f in (with_everything, pitching_head, rubbing_head)}
+    if request.param in own:
+        definition = own[request.param]()
+        return definition, *reduced_as_assembled(definition)
+    definition = load_pantograph(request.param)
+    return definition, *reduced(definition)
+
+
+def test_accelerations_are_those_of_the_general_form(case):
+    definition, model, balance = case
+    rng, motion = np.random.default_rng(3), ReducedMotion(model)
+    mechanism, free = model.mechanism, slice(model.mechanism.driven, None)
+    for y in random_states(model, rng, count(40, 200)):
+        lift = rng.uniform(0.0, 300.0) if definition.holds_force else balance * rng.uniform(0.5, 1.5)
+        force, lateral, base = rng.uniform(0.0, 300.0), rng.uniform(-0.4, 0.4), rng.uniform(-3.0, 3.0)
+        acting = (force, lateral, base, lift, 0.0)
+        acceleration, response = motion.evaluate(y, acting)
+        motion.memory[0][:], motion.memory[1][:] = y.tolist(), acceleration.tolist()
+        state = model.cartesian(y, np.array([0.1, 0.3]))
+        found = mechanism.evaluate(state.copy(), Inputs((0.1, 0.3, base), lift, force, lateral), respond=True)
+        s = mechanism.split(state)
+        seen = motion.bodies((0.1, 0.3, base))
+        assert np.abs(seen[:, 0] - s.r[free, 2]).max() < 1e-11
+        assert np.abs(seen[:, 1] - s.v[free, 2]).max() < 1e-10
+        scale = max(1.0, np.abs(found.acceleration[free, 2]).max())
+        assert np.abs(seen[:, 2] - found.acceleration[free, 2]).max() < 1e-8 * scale
+        other, _ = motion.evaluate(y, (force + 30.0, lateral + 0.1, base + 0.5, lift, 0.0))
+        moment = (force + 30.0) * (lateral + 0.1) - force * lateral
+        change = np.array([30.0, moment, 0.5]) @ response.reshape(3, -1)
+        assert other == pytest.approx(acceleration + change, rel=1e-9, abs=1e-9 * scale)
+
+
+def test_kernels_give_the_plain_numbers(case, monkeypatch):
+    pytest.importorskip("numba")
+    definition, model, balance = case
+    plain = ReducedMotion(model)
+    monkeypatch.setenv(KERNEL, "numba")
+    compiled = ReducedMotion(model)
+    for y in random_states(model, np.random.default_rng(11), 20):
+        for acting in ((120.0, 0.3, 1.0, balance, 20.0), (0.0, 0.0, 0.0, 0.5 * balance, 0.0)):
+            for mine, theirs in zip(compiled.evaluate(y, acting), plain.evaluate(y, acting), strict=True):
+                assert mine == pytest.approx(theirs, rel=1e-12, abs=1e-12 * np.abs(theirs).max())
+    given = [0.0, 0.0, 3, 0.0, -1e-3, -2e-3, 150.0, 149.0, 147.0, 2, 0.1, 0.2, 0.0, 0.0, 0.01, 0.2, 5.0]
+    given += [balance, definition.lift, 0.0025, 0.02, 3.0, float(definition.holds_force)]
+    strips = np.zeros((2, 2, 2, 3))
+    for motion in (plain, compiled):
+        motion.begin(given)
+    for k in range(40):
+        given[0] = 1e-3 * k
+        for motion, strip in zip((plain, compiled), strips, strict=True):
+            assert motion.step(given, 1e-3) == ""
+            motion.place_strip((0.0, 0.0, 80.0, 0.0), strip)
+        assert np.abs(strips[0] - strips[1]).max() < 1e-12
+    assert np.abs(plain.bodies((0.0, 0.0, 0.0)) - compiled.bodies((0.0, 0.0, 0.0))).max() < 1e-9
+    assert compiled.lift_value() == pytest.approx(plain.lift_value(), rel=1e-12)
+    # What one leaves the other continues.
+    compiled.restore(plain.snapshot())
+    assert compiled.snapshot()["reduced"].tobytes() == plain.snapshot()["reduced"].tobytes()
+
+
+def test_the_strip_is_where_its_body_is(case):
+    _, model, _ = case
+    motion, mechanism = ReducedMotion(model), model.mechanism
+    strip = np.zeros((2, 2, 3))
+    for y in random_states(model, np.random.default_rng(5), 10):
+        motion.memory[0][:] = y.tolist()
+        motion.place_strip((0.0, 0.1, 0.0, 0.3), strip)
+        assert strip == pytest.approx(mechanism.strip_ends(model.cartesian(y, np.array([0.1, 0.3]))), abs=1e-10)
+
+
+def both_forms(definition):
+    """A part in either form, built once."""
+    auto, general = (MultibodyPantographPart(replace(definition, formulation=f)) for f in ("auto", "general"))
+    general._built = copy.copy(auto._ready())
+    general._built.reduced, general._built.form = None, "general form"
+    return auto, general
+
+
+def run_beside(definition, seconds, force_at, base_at):
+    """Run both forms under the same inputs; return the largest difference of the strips' places [m]."""
+    parts = both_forms(definition)
+    for part in parts:
+        part.initialise(0.0, force_at(0.0), np.zeros(3), np.array(base_at(0.0)))
+    worst = 0.0
+    for k in range(round(seconds * 1e3)):
+        t = 1e-3 * k
+        for part in parts:
+            point = np.array([part.strip[0, 0, 0], 0.2 * np.sin(2.0 * t), 5.0])
+            part.step(force_at(t), point, np.array(base_at(t)), 1e-3)
+        worst = max(worst, float(np.abs(parts[0].strip - parts[1].strip)[:, 0].max()))
+    return worst, parts
+
+
+@pytest.mark.parametrize("seconds", [0.4, pytest.param(10.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", LIBRARY)
+def test_trajectories_are_those_of_the_general_form(name, seconds):
+    """At a step so small that neither integration errs by as much as the forms may differ."""
+    definition = load_pantograph(name)
+
+    def force_at(t):
+        return 160.0 + 30.0 * np.sin(9.0 * t) + 20.0 * np.sin(37.0 * t)
+
+    worst, (auto, general) = run_beside(
+        replace(definition, time_step=5e-4), seconds, force_at,
+        lambda t: (0.004 * (1.0 - np.cos(6.0 * t)), 0.024 * np.sin(6.0 * t)),
+    )  # fmt: skip
+    assert auto.form().startswith("reduced form")
+    assert general.form().startswith("general form")
+    assert worst < 1e-7
+    shown, meant = auto.observation_values(), general.observation_values()
+    assert shown == pytest.approx(meant, abs=1e-4)
+
+
+def rising(formulation):
+    """A generic pantograph without a wire whose arms rise beyond the tables."""
+    d = load_pantograph("generic_multibody").with_values({"static_moment": 2500.0})
+    part = MultibodyPantographPart(replace(d, formulation=formulation))
+    part.initialise(0.0, 0.0, np.zeros(3), np.zeros(2))
+    return part
+
+
+def test_beyond_the_tables_the_general_form_goes_on():
+    auto, general = rising("auto"), rising("general")
+    worst, snapshots = 0.0, []
+    for _ in range(450):
+        for part in (auto, general):
+            part.step(0.0, np.zeros(3), np.zeros(2), 1e-3)
+        worst = max(worst, float(np.abs(auto.strip - general.strip).max()))
+        snapshots.append(auto.snapshot())
+    assert "beyond the tables" in auto.form()
+    assert worst < 1e-5
+    left = [("reduced" in s) for s in snapshots]
+    assert left[0]
+    assert not left[-1]
+    # Back to a state before that: in the reduced form again.
+    auto.restore(snapshots[100])
+    auto.step(0.0, np.zeros(3), np.zeros(2), 1e-3)
+    assert auto.snapshot()["reduced"].tobytes() == snapshots[101]["reduced"].tobytes()
+    assert auto.form().startswith("reduced form")
+
+
+def test_a_roof_that_sways_takes_the_general_form():
+    auto, general = both_forms(load_pantograph("generic_multibody"))
+    for k in range(60):
+        t = 1e-3 * k
+        y = 0.01 * (t - 0.03) ** 2 if t > 0.03 else 0.0
+        sway = (y, 0.02 * (t - 0.03) if t > 0.03 else 0.0, 0.0, 0.0, 0.0, 0.0)
+        for part in (auto, general):
+            if k == 0:
+                part.initialise(0.0, 150.0, np.zeros(3), np.zeros(2))
+            part.step(150.0, np.array([part.strip[0, 0, 0], 0.0, 5.0]), np.zeros(2), 1e-3, Drive(sway=sway))
+    assert "sway" in auto.form()
+    assert auto.strip == pytest.approx(general.strip, abs=1e-6)
+
+
+def test_a_force_from_outside_reaches_the_reduced_form():
+    """Its curve is found when it first acts (here it is given), after the model is made."""
+    auto, general = both_forms(load_pantograph("generic_multibody"))
+    for part in (auto, general):
+        part.initialise(0.0, 150.0, np.zeros(3), np.zeros(2))
+    moments = np.linspace(200.0, 250.0, 5)
+    auto._built.mechanism.forces.per_force = CubicCurve(np.linspace(-0.4, 0.4, 5), moments**1.1)
+    for part in (auto, general):
+        for k in range(40):
+            part.step(150.0, np.array([part.strip[0, 0, 0], 0.0, 5.0]), np.zeros(2), 1e-3, Drive(uplift=1.0 * k))
+    assert auto.form().startswith("reduced form")
+    assert auto.strip == pytest.approx(general.strip, abs=1e-8)
+    assert auto.observation_values() == pytest.approx(general.observation_values(), abs=1e-4)
+
+
+def test_numbers_of_functions_are_those_of_the_table():
+    model, _ = reduced(load_pantograph("generic_multibody"))
+    table = ReducedMotion(model).model.numbers(lambda t: t, np.asarray, np.asarray)[0][0]
+    assert table.cells.shape[1] == reduced_equations.FIRST_OF_ARM

@@ -27,8 +27,8 @@ records_of = reader(Records, "fiii")
 #: that loads at its attachments reach, from ``first`` on) and ``stretched`` (droppers); then where in the data its
 #: parts begin: ``slots``, where the amplitudes of its modes are in the table; ``ends``, the places of its attachments'
 #: displacements; ``droppers``, those that they stretch; ``plan`` to ``height_static`` of the `WireInterval`;
-#: ``yielding``, ``at_ends``, ``columns`` (by displacements of its attachments) and their ``dropper_force`` of the
-#: `IntervalResponse`. Offsets take the compiler far less time than arrays made of them.
+#: ``yielding`` and ``at_ends`` of the `IntervalResponse`, and its ``columns`` with their ``dropper_force``, both by
+#: displacements of its attachments. Offsets take the compiler far less time than arrays made of them.
 Interval = namedtuple(
     "Interval",
     "modes size elements reach first stretched slots ends droppers "

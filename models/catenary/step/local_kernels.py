@@ -154,9 +154,10 @@ def _effects(records, points, contacts, slack, yielding, size, table):
     for k in range(n):
         source, load = contacts[k], own(points.load, points, contacts[k])
         interval = interval_at(whole, points.record[source])
-        for j in range(count[k]):
-            for i in range(interval.size):
-                pulled[k, j] += data[interval.stretch + j * interval.size + i] * load[i]
+        for i in range(interval.size):
+            column = interval.stretch + i * count[k]
+            for j in range(count[k]):
+                pulled[k, j] += data[column + j] * load[i]
         for i in range(n):
             moved[i, k] = -moved_by(records, points, contacts[i], source, size, table)
             if points.pantograph[contacts[i]] == points.pantograph[source]:  # contacts of a strip share its retreat

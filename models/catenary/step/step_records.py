@@ -85,7 +85,7 @@ class StepRecords:
         size = len(slots), len(interval.ends), len(interval.height), len(columns.values), _first(columns)
         whole = (*size, len(columns.dropper_index)), slots, interval.ends, columns.dropper_index
         places = interval.plan, interval.plan_static, interval.height, interval.height_static
-        moved = response.yielding, response.at_ends, columns.values.T, columns.dropper_force
+        moved = response.yielding, response.at_ends, columns.values.T, columns.dropper_force.T
         self._add(self.arrays[2], number, whole, (*places, *moved))
 
     def add_dropper(self, index: int) -> None:

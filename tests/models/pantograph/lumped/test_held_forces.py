@@ -202,8 +202,8 @@ def test_it_is_raised_from_where_it_starts_and_rests_there_before(follow):
             {"lowest_height": 5.5, "highest_height": 5.2},
             "highest_height: 5.2 m is not above the lowest_height of 5.5 m",
         ),
-        ({"lowest_height": 5.1}, "reference_height: 5.02 m is outside the range from 5.1 to inf m"),
-        ({"lowest_height": 4.8, "start_height": 4.5}, "start_height: 4.5 m is outside the range"),
+        ({"lowest_height": 5.1}, "reference_height: 5.02 m is below the lowest_height of 5.1 m"),
+        ({"lowest_height": 4.8, "start_height": 4.5}, "start_height: 4.5 m is below the lowest_height of 4.8 m"),
     ],
 )
 def test_heights_that_do_not_fit_are_refused(values, told):

@@ -13,7 +13,8 @@ class LumpedBalance:
     """Add up, step by step, the work of all loads on the masses and what the dampers take.
 
     Energy counts from where the pantograph starts, at rest; the roof's motion is a load. A lowest spring that hangs
-    on a reference is counted apart: what it stores, what the reference takes in following, what moves it and the roof do.
+    on a reference is counted apart: what it stores, what the reference takes in following, what moves it and the roof
+    do.
 
     Parameters
     ----------

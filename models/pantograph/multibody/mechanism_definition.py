@@ -618,6 +618,9 @@ class MechanismDefinition(Operation):
         if self.holds_force and self.lifting is not None:
             cam = f"with the cam '{CONSTANT_FORCE}' of '{self.lifting.name}'"
             return f"does nothing: {cam} the strip's force is set, by 'static_force'"
+        if self.lifting is not None:
+            cam = f", unless its cam is '{CONSTANT_FORCE}'" if isinstance(self.lifting, LiftingMoment) else ""
+            return f"does nothing: '{self.lifting.name}' lifts by '{self.lift_parameter}'{cam}"
         kind = "actuator_force" if key == "static_force" else "actuator_moment"
         return f"does nothing: no {kind} has lift = true"
 

@@ -11,7 +11,7 @@ import pytest
 from models.commands.pantograph_command import friction_warning
 from models.commands.physics_main import main
 from models.definition_files.toml_reader import DefinitionError
-from models.library.catalogue import pantograph_path
+from models.library.catalogue import load_pantograph, pantograph_path
 from models.pantograph.multibody.analysis.mechanism_rig import Rig
 from models.pantograph.multibody.mechanism import MechanismError
 from models.pantograph.multibody.mechanism_definition import JointFriction
@@ -105,8 +105,8 @@ def test_modes_that_dry_friction_takes_are_told(rubbing):
     said = friction_warning(rubbing, found, analysed)
     assert said.startswith("dry friction in rub: the modes are those of small motions about rest")
     without = sum(m.frequency > 0.0 for m in free.modes)
-    assert f"{len(oscillating)} of them oscillate, without the friction {without}: " in said
-    assert said.endswith(", ".join(f"{m.frequency:.3f}" for m in free.modes if m.frequency > 0.0) + " Hz")
+    assert f"{len(oscillating)} of them oscillate, and without the friction {without} (" in said
+    assert said.endswith(", ".join(f"{m.frequency:.3f}" for m in free.modes if m.frequency > 0.0) + " Hz)")
 
 
 def test_without_friction_there_is_nothing_to_tell(rubbing):
@@ -147,3 +147,34 @@ def test_a_wrong_kind_is_one_mistake_and_not_what_follows_from_it(element):
         mechanism_from(data)
     (problem,) = error.value.problems
     assert str(problem).startswith(f"definition: {element}.kind: 'revolut' is none of")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            'type = "multibody"',
+            'type = "multi_body"',
+            ["type: 'multi_body' is none of lumped, multibody; did you mean"],
+        ),
+        (
+            'cam = "constant_force"',
+            'cam = "constant"',
+            [
+                "cam: 'constant' is none of constant_force; did you mean 'constant_force'?",
+                "static_force: does nothing: 'lift' lifts by 'static_moment', unless its cam is 'constant_force'",
+                "static_moment: is missing",
+            ],
+        ),
+    ],
+)
+def test_a_misspelt_word_is_told_and_nothing_follows_that_misleads(old, new, said, tmp_path):
+    text = pantograph_path("generic_multibody_cam").read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "generic_multibody_cam.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(DefinitionError) as caught:
+        load_pantograph(str(path))
+    lines = str(caught.value).splitlines()
+    assert len(lines) == len(said)
+    assert all(part in line for part, line in zip(said, lines, strict=True))

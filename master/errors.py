@@ -10,7 +10,7 @@ from functools import partial
 from typing import Final
 
 #: Longest value or text that is shown in full [characters], and most problems that are listed at once.
-_LONGEST: Final = 400
+_LONGEST: Final = 500
 _MOST: Final = 100
 #: What the system says of a file, in words, with what to do.
 _SAID: Final = {

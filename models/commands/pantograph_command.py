@@ -252,7 +252,9 @@ def _frequencies_of(dynamics: Dynamics) -> list[float]:
 
 def _mode_rows(result: Characteristics) -> list[tuple[str, str, str, str]]:
     return [
-        (f"{f:.3f}" if f > 0.0 else "-", "-" if remark.startswith("neutral") else f"{100.0 * d:.2f}", motion, remark)
+        ("-", "-", motion, remark)
+        if remark.startswith("neutral")
+        else (f"{f:.3f}" if f > 0.0 else "-", f"{100.0 * d:.2f}", motion, remark)
         for f, d, motion, remark in result.modes
     ]
 

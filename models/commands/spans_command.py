@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.shape.line_mesh import contact_wire_height
+from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.statics.span_table import LENGTHS, String, radii
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
@@ -69,13 +71,21 @@ def figure(smallest: Sequence[FloatArray], names: Sequence[str], text: str) -> F
 
 
 def _limit(definition: CatenaryDefinition, arguments: argparse.Namespace) -> float:
-    """Return the permissible offset [m]: as given, or that of a head on straight track at the line's height."""
+    """Return the permissible offset [m]: as given, or that of a head on straight track at the line's largest height."""
     if arguments.head is not None:
-        height = definition.profile.contact_wire_height
+        height = max(_heights(definition))
         return lateral_norm().permissible(arguments.head, height, 0.0, 0.0).permissible
     if arguments.limit is None:
         raise ParameterError("how far may the wire be blown? give --limit, in m, or --head 1600 or 1950")
     return float(arguments.limit)
+
+
+def _heights(definition: CatenaryDefinition) -> Iterator[float]:
+    """Yield the heights of the contact wire at the supports where it is at its working height [m]."""
+    for section in definition.sections:
+        places = SupportPlaces(definition, section)
+        first, last = (-math.inf, math.inf) if section.periodic else section.ends.working
+        yield from (contact_wire_height(places, s.x) for s in section.inner_supports if first <= s.x <= last)
 
 
 def _staggers(definition: CatenaryDefinition, arguments: argparse.Namespace) -> list[tuple[float, float]]:

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not blows and (arguments.limit is not None or arguments.head is not None):
         raise ParameterError("--limit and --head are limits in the wind: give --wind, in m/s, or --pressure, in Pa")
     wind = wind_report.in_the_wind(result, arguments) if blows else None
-    asked = [value + temperature_report.ZERO for value in arguments.temperature]
+    asked = [*map(temperature_report.kelvin, arguments.temperature)]
     states = temperature_table(result.model.definition, asked, result.section) if asked else ()
     print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
     print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))

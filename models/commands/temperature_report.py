@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from models.catenary.definition.tensioning_definition import COLDEST, HOTTEST
 from models.catenary.statics.temperature_table import LineAtTemperature
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.statics_plots import COLOURS
+from models.definition_files.parameter import ParameterError
 from models.definition_files.si_units import OFFSETS
 from models.library.norm_tables import support_limits
 
@@ -25,6 +27,20 @@ _DASHES: Final = (":", "-.", "--", "-")
 COLUMNS: Final = (
     "wire", "T [degC]", "tensioner [N]", "fixed point [N]", "D [mm]", "D_v [mm]", "sag [mm]",
 )  # fmt: skip
+
+
+def kelvin(temperature: float) -> float:
+    """Return a temperature of the command line, in degC, in K.
+
+    Raises
+    ------
+    ParameterError
+        If no line is as cold or hot.
+    """
+    if not COLDEST <= temperature + ZERO <= HOTTEST:
+        span = f"{COLDEST - ZERO:g} ... {HOTTEST - ZERO:g}"
+        raise ParameterError(f"--temperature {temperature:g}: is outside {span} degC, in which wires can be")
+    return temperature + ZERO
 
 
 def rows(states: Sequence[LineAtTemperature]) -> list[Sequence[str]]:

@@ -14,17 +14,21 @@ import numpy as np
 from models.arrays import BoolArray, FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.wind_definition import DesignWind, Wind
+from models.catenary.shape.line_mesh import contact_wire_height
 from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.shape.track import track_at
 from models.catenary.statics.blow_off import BlowOff, blow_off
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.statics_plots import COLOURS, GREY
+from models.definition_files.parameter import ParameterError
 from models.interface.line_statics import LineStatics
 from models.library.norm_tables import lateral_norm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Strongest wind that is meant [m/s], [Pa].
+_FASTEST, _HIGHEST = 100.0, 50e3
 COLUMNS = ("span", "from ... to [m]", "offset [mm]", "of a string [mm]", "limit [mm]", "verdict")
 
 
@@ -52,8 +56,18 @@ class InTheWind:
 
 
 def asked_wind(definition: CatenaryDefinition, arguments: argparse.Namespace) -> tuple[DesignWind, float]:
-    """Return the wind of a line's definition with the speed or pressure of the command line, and its pressure [Pa]."""
+    """Return the wind of a line's definition with the speed or pressure of the command line, and its pressure [Pa].
+
+    Raises
+    ------
+    ParameterError
+        If it is stronger than any wind.
+    """
     wind = (definition.wind or Wind()).design
+    for option, given, most, unit in (("wind", arguments.wind, _FASTEST, "m/s"),
+                                      ("pressure", arguments.pressure, _HIGHEST, "Pa")):  # fmt: skip
+        if given is not None and given > most:
+            raise ParameterError(f"--{option} {given:g}: no wind is stronger than {most:g} {unit}; check the unit")
     if arguments.wind is not None:
         wind = replace(wind, speed=arguments.wind)
     return wind, wind.pressure if arguments.pressure is None else arguments.pressure
@@ -150,7 +164,8 @@ def _limit(
     if arguments.head is None:
         return math.nan if arguments.limit is None else float(arguments.limit)
     places = SupportPlaces(definition, definition.sections[section])
-    height = 0.5 * (places.height(start) + places.height(end))
+    # The higher the wire, the less is permissible.
+    height = max(contact_wire_height(places, x) for x in (start, end))
     curvature = cant = 0.0
     if definition.track is not None:
         along = track_at(definition.track, np.linspace(start, end, 51))

@@ -65,7 +65,7 @@ class _Number:
     labels: tuple[str, ...] = ()
 
     def read(self, table: Table, name: str, default: Any) -> Any:
-        if default is None and not table.has(name):
+        if default is None and not table.offers(name):
             return None
         fallback = None if default in (dataclasses.MISSING, None) else default
         if self.integer:
@@ -97,7 +97,7 @@ class _Direction:
     """A direction in space, kept as a unit vector."""
 
     def read(self, table: Table, name: str, default: Any) -> Any:
-        if default is not dataclasses.MISSING and not table.has(name):
+        if default is not dataclasses.MISSING and not table.offers(name):
             return default
         x, y, z = table.quantities(name, "1", length=3)
         length = math.sqrt(x * x + y * y + z * z)
@@ -155,9 +155,9 @@ class _WordOrPart:
     cls: type[Any]
 
     def read(self, table: Table, name: str, default: Any) -> Any:
-        given = table.data.get(name)
-        if given is None and default is not dataclasses.MISSING:
+        if default is not dataclasses.MISSING and not table.offers(name):
             return default
+        given = table.data.get(name)
         if isinstance(given, dict):
             inner = table.table(name)
             return default if inner is None else read(self.cls, inner)
@@ -291,9 +291,19 @@ def read(cls: type[T], table: Table, **given: Any) -> T:
             values[field.name] = spec.read(table, field.name, field.default)
     result = cls(**values)
     if isinstance(result, Checked) and not unread(cls, table):
+        mistaken = _mistaken(cls, table)
         for key, problem in result.problems():
-            table.problem(key, problem)
+            if key not in mistaken:
+                table.problem(key, problem)
     return result
+
+
+def _mistaken(cls: type[Any], table: Table) -> set[str]:
+    """Return the fields that could not be read; of a table of columns all of them, which are to fit one another."""
+    fields = {f.name: f.metadata.get(_META) for f in dataclasses.fields(cls)}
+    found = table.mistaken(fields)
+    is_columns = all(isinstance(spec, _Series) for spec in fields.values())
+    return set(fields) if found and is_columns else found
 
 
 def unread(cls: type[Any], table: Table) -> set[str]:

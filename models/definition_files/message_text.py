@@ -10,7 +10,7 @@ from functools import partial
 from typing import Final
 
 #: Longest message shown in full [characters], as a value may be megabytes of nested lists.
-_LONGEST: Final = 400
+_LONGEST: Final = 500
 #: What the system says of a file, in words, with what to do.
 _SAID: Final = {
     errno.ENOENT: "there is no such file or folder: check the name",

@@ -173,6 +173,16 @@ class Table:
         """Return whether the table has a key."""
         return name in self._data
 
+    def offers(self, name: str) -> bool:
+        """Return whether the table has a key that it may have: one of those that messages list."""
+        self._known.add(name)
+        return name in self._data
+
+    def mistaken(self, names: Iterable[str]) -> set[str]:
+        """Return those of some keys with which a problem has been recorded."""
+        found = {p.key for p in self._log.problems}
+        return {name for name in names if self.key(name) in found}
+
     def names(self) -> tuple[str, ...]:
         """Return the keys, in the order of the file."""
         return tuple(self._data)

@@ -92,6 +92,9 @@ def _check_track(table: Table, definition: CatenaryDefinition) -> None:
         return
     if not {"curvature", "radius", "cant", "vertical_curvature"} & set(table.data["track"]):
         table.problem("track", "says nothing of the track: give curvature (or radius), cant or vertical_curvature")
+    for key, entry in table.data["track"].items():
+        if isinstance(entry, list) and entry[:1] == [[]]:
+            table.problem(f"track.{key}", "gives no value: one for each position is needed, and one position at least")
     if any(section.periodic for section in definition.sections) and track.positions and not track.is_constant:
         text = "a line that closes on itself takes a constant track only: the same values at every position"
         table.problem("track.positions", text)

@@ -11,7 +11,7 @@ from models.definition_files.field_schema import count, part, quantity, series, 
 DeviceKind = Literal["weights", "spring", "fixed"]
 DEVICE_KINDS: Final[tuple[DeviceKind, ...]] = ("weights", "spring", "fixed")
 #: Coldest and hottest that a wire can be meant to be [K].
-_COLDEST, _HOTTEST = 173.15, 473.15
+COLDEST, HOTTEST = 173.15, 473.15
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,21 +33,23 @@ class TensioningDevice:
     expansion: float = quantity("1/K", "thermal expansion of the wire", default=17e-6, minimum=0.0, maximum=1e-4)
 
     def problems(self) -> Iterator[tuple[str, str]]:
-        """Yield a problem if a spring has no stiffness, or something else has one."""
+        """Yield a problem if a spring has no stiffness, or a device has what only another kind has."""
         if self.kind == "spring" and self.stiffness is None:
             yield "stiffness", "is missing: how stiff is the spring?"
         if self.kind in ("weights", "fixed") and self.stiffness is not None:
             yield "stiffness", f"means nothing for kind '{self.kind}': remove it, or take kind 'spring'"
+        if self.kind != "weights" and self.efficiency != 1.0:
+            yield "efficiency", f"means nothing for kind '{self.kind}': remove it, or take kind 'weights'"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tensioning:
     """The temperature of a line and the devices that tension it; tensions are those at the reference temperature."""
 
-    temperature: float = quantity("K", "temperature of the wires", minimum=_COLDEST, maximum=_HOTTEST)
+    temperature: float = quantity("K", "temperature of the wires", minimum=COLDEST, maximum=HOTTEST)
     reference_temperature: float = quantity(
         "K", "temperature at which tensions, heights and lengths are those of the design",
-        minimum=_COLDEST, maximum=_HOTTEST,
+        minimum=COLDEST, maximum=HOTTEST,
     )  # fmt: skip
     fixed_point: float | None = quantity(
         "m", "where the wires stay as they expand, along the track; without it the middle of the section",

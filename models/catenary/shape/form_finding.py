@@ -341,9 +341,12 @@ def _check_tension(shape: LineShape, force: FloatArray) -> None:
     if slack.size:
         x = shape.points[shape.mesh.droppers[slack, 0], 0]
         listed = ", ".join(f"{a:.2f} m ({f:.1f} N)" for a, f in list(zip(x, force[slack], strict=True))[:8])
+        curve = "" if shape.definition.track is None else (
+            "; in a curve the steady arms pull harder and lift the wire: give them less slope (arm_angle in [supports])"
+        )  # fmt: skip
         raise EquilibriumError(
             f"line '{shape.definition.name}': {slack.size} dropper(s) would have to push to give the wanted profile: "
-            f"{listed}; reduce the pre-sag or the rise to the anchors, or move the droppers"
+            f"{listed}; reduce the pre-sag or the rise to the anchors, or move the droppers{curve}"
         )
 
 

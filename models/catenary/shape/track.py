@@ -65,6 +65,18 @@ def track_at(track: Track, x: FloatArray) -> TrackPlace:
     )
 
 
+def mean_curvature(track: Track, start: float, end: float) -> float:
+    """Return the mean of the curvature between two places, exact whatever knots and jumps lie between [1/m]."""
+    knots, values = np.array(track.positions), np.array(track.curvatures)
+    inside = (knots > start) & (knots < end)
+    # A jump at an end counts with its side within: np.interp takes either.
+    ends = np.array([start, end]) + np.array([1.0, -1.0]) * SAME_PLACE
+    first, last = np.interp(ends, knots, values)
+    x = np.concatenate([[start], knots[inside], [end]])
+    kappa = np.concatenate([[first], values[inside], [last]])
+    return float(0.5 * np.diff(x) @ (kappa[1:] + kappa[:-1]) / (end - start))
+
+
 def _slopes(track: Track) -> FloatArray:
     """Return D' before the first knot, between the knots and after the last one, shape (n_knots + 1,)."""
     length, rise = np.diff(np.array(track.positions)), np.diff(np.array(track.cants, dtype=np.float64))

@@ -17,11 +17,11 @@ from models.catenary.shape.beam_elements import NODE_DOFS, beam_mass, frames, to
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.line_matrices import axial_stiffness, element_dofs
 from models.catenary.shape.line_mesh import CatenaryMesh
-from models.catenary.shape.track import track_at
+from models.catenary.shape.track import mean_curvature
 from models.catenary.statics.span_table import String
 
-#: Wires that the wind blows; droppers' own drag is left out.
-_BLOWN = ("contact_wire", "messenger_wire")
+#: Wires that the wind blows; the drag of droppers and of stitch wires is left out.
+_BLOWN = ("contact_wire", "auxiliary_wire", "messenger_wire")
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,10 @@ def blow_off(model: CatenaryModel, pressure: float, section: int = 0) -> BlowOff
     if definition.sections[section].periodic:
         held = np.append(held[1:-1], held[1])
     apart = ~(held[1:] & held[:-1])
+    tension = _tensions(static, section, middle)
     strings = [
-        _string(definition, wind, *span) for span in zip(ends[:-1], ends[1:], places[:-1], places[1:], strict=True)
+        _string(definition, String(T, wind), *span)
+        for T, *span in zip(tension.tolist(), ends[:-1], ends[1:], places[:-1], places[1:], strict=True)
     ]
     return BlowOff(
         x=x,
@@ -92,14 +94,14 @@ def blow_off(model: CatenaryModel, pressure: float, section: int = 0) -> BlowOff
         offset=np.array([_farthest(x, still, aside, a, b) for a, b in pairwise(ends)]),
         blown=np.interp(middle, x, aside) - 0.5 * (clamps[1:] + clamps[:-1]),
         string=np.where(apart, np.nan, strings),
-        string_blown=np.where(apart, np.nan, wind * np.diff(ends) ** 2 / (8.0 * definition.contact_wire.tension)),
+        string_blown=np.where(apart, np.nan, wind * np.diff(ends) ** 2 / (8.0 * tension)),
         lift=np.outer(moved[arms, 2], [1.0, -1.0]),
         arm_x=mesh.points[arms, 0],
     )
 
 
 def wind_load(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, pressure: float) -> FloatArray:
-    """Return the consistent load of a wind to the left on contact and messenger wire, shape (6 n,)."""
+    """Return the consistent load of a wind to the left on the wires that it blows, shape (6 n,)."""
     per_length = np.zeros(len(mesh.beams))
     for name, force in _forces(definition, pressure).items():
         per_length[mesh.component == COMPONENTS.index(name)] = force
@@ -117,8 +119,8 @@ def wind_load(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatA
 def _forces(definition: CatenaryDefinition, pressure: float) -> dict[str, float]:
     """Return the wind's force per length on the wires that it blows [N/m]."""
     wind = (definition.wind or Wind()).design
-    wires: dict[str, Wire] = {name: getattr(definition, name) for name in _BLOWN}
-    return {name: wind.force(wire.width, pressure) for name, wire in wires.items()}
+    wires: dict[str, Wire | None] = {name: getattr(definition, name) for name in _BLOWN}
+    return {name: wind.force(wire.width, pressure) for name, wire in wires.items() if wire is not None}
 
 
 def _moved(static: StaticState, load: FloatArray) -> FloatArray:
@@ -148,12 +150,19 @@ def _farthest(x: FloatArray, still: FloatArray, aside: FloatArray, start: float,
     return float((np.abs(still) + np.abs(aside))[inside].max())
 
 
-def _string(definition: CatenaryDefinition, wind: float, start: float, end: float, first: float, last: float) -> float:
+def _tensions(static: StaticState, section: int, x: FloatArray) -> FloatArray:
+    """Return the tension that the contact wire has as the line is found, at places along a section [N]."""
+    mesh, definition = static.shape.mesh, static.shape.definition
+    chosen = (mesh.component == COMPONENTS.index("contact_wire")) & (mesh.section[mesh.beams[:, 0]] == section)
+    along = mesh.points[mesh.beams[chosen], 0].mean(axis=1)
+    order = along.argsort()
+    return definition.contact_wire.tension * np.interp(x, along[order], mesh.tension_factor[chosen][order])
+
+
+def _string(
+    definition: CatenaryDefinition, string: String, start: float, end: float, first: float, last: float
+) -> float:
     """Return the largest offset of a string in a span, of the curvature that the track has there on the average [m]."""
-    kappa = 0.0
-    if definition.track is not None:
-        kappa = float(track_at(definition.track, np.linspace(start, end, 21)).curvature.mean())
+    kappa = 0.0 if definition.track is None else mean_curvature(definition.track, start, end)
     outward = -np.sign(kappa) or 1.0
-    return String(definition.contact_wire.tension, wind).offset(
-        end - start, abs(kappa), outward * first, outward * last
-    )
+    return string.offset(end - start, abs(kappa), outward * first, outward * last)

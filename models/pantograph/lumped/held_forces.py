@@ -58,8 +58,8 @@ class HeldForces:
         self.rows[:, FORCE] = 0.0
         self.rows[:, PLACE] = [x for x, _ in self._relative(motion, (roof, 0.0))]
 
-    def act(self, transition: FloatArray, motion: FloatArray, roof: tuple[float, float]) -> float:
-        """Let stops and friction act in a step; return the work that they take [J].
+    def act(self, transition: FloatArray, motion: FloatArray, roof: tuple[float, float]) -> tuple[float, float]:
+        """Let stops and friction act in a step.
 
         Parameters
         ----------
@@ -69,6 +69,11 @@ class HeldForces:
             At the end of the step without them; changed in place.
         roof : (float, float)
             Height and velocity of the roof then [m, m/s].
+
+        Returns
+        -------
+        work, lifting : float
+            Work that they take [J]; mean force, in the step, that they lift the roof with [N].
         """
         rows, free = self.rows.tolist(), self._relative(motion, roof)
         give = [self._given(transition, port) for port in self._ports]
@@ -90,9 +95,10 @@ class HeldForces:
             motion -= value * _load_column(transition, n, upper, lower)
         places = [x for x, _ in self._relative(motion, roof)]
         moved = np.array(places) - self.rows[:, PLACE]
-        work = 0.5 * float((self.rows[:, FORCE] + np.array(force)) @ moved)
+        mean = 0.5 * (self.rows[:, FORCE] + np.array(force))
+        lifting = sum(f for f, (_, lower) in zip(mean.tolist(), self._ports, strict=True) if lower < 0)
         self.rows[:, FORCE], self.rows[:, PLACE] = force, places
-        return work
+        return float(mean @ moved), lifting
 
     @property
     def stored(self) -> float:

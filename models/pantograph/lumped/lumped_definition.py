@@ -101,16 +101,19 @@ class LumpedDefinition(Operation):
 
     def _height_problems(self) -> Iterator[tuple[str, str]]:
         low, high = self.range
+        if math.isnan(low) or math.isnan(high):
+            return  # told where it is read
         if low >= high:
             yield "highest_height", f"{high:g} m is not above the lowest_height of {low:g} m"
             return
         for key in ("reference_height", "start_height"):
             height = getattr(self, key)
-            if height is not None and not low <= height <= high:
-                yield (
-                    key,
-                    f"{height:g} m is outside the range from {low:g} to {high:g} m (lowest_height, highest_height)",
-                )
+            if height is None:
+                continue
+            if height < low:
+                yield key, f"{height:g} m is below the lowest_height of {low:g} m"
+            elif height > high:
+                yield key, f"{height:g} m is above the highest_height of {high:g} m"
 
     @property
     def range(self) -> tuple[float, float]:

@@ -12,8 +12,9 @@ from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
 class LumpedBalance:
     """Add up, step by step, the work of all loads on the masses and what the dampers take.
 
-    Energy counts from where the springs carry the weights; the roof's motion is a load. A lowest spring that hangs on a
-    reference is counted apart: what it stores, what the reference takes in following, what moves it and the roof do.
+    Energy counts from where the pantograph starts, at rest; the roof's motion is a load. A lowest spring that hangs
+    on a reference is counted apart: what it stores, what the reference takes in following, what moves it and the roof
+    do.
 
     Parameters
     ----------
@@ -39,6 +40,8 @@ class LumpedBalance:
         self._hung = model.definition.stage[0].stiffness if model.follows else 0.0
         self._stiffness[0, 0] -= self._hung
         self.stretch = self.held = 0.0
+        # A spring on the roof is stretched where the strip starts elsewhere than at the reference height.
+        self._at_start = float(self._stiffness.sum()) * model.definition.rise**2
 
     @property
     def contact_work(self) -> FloatArray:
@@ -79,15 +82,18 @@ class LumpedBalance:
         self._ledger.work -= self._hung * rate * first
         self._ledger.dissipated += self._hung / self._model.definition.reference_time * second
 
-    def add_held(self, work: float, stored: float) -> None:
-        """Add the work that stops and friction take in a step and what their springs store at its end [J]."""
+    def add_held(self, work: float, stored: float, by_roof: float) -> None:
+        """Add the work that stops and friction take in a step, what their springs store at its end, and the work of a
+        roof that moves against them [J].
+        """
         self._ledger.dissipated += work - (stored - self.held)
+        self._ledger.work += by_roof
         self.held = stored
 
     def balance(self, state: LumpedState) -> FloatArray:
         """Return the values of `models.numerics.energy_ledger.BALANCE` [J], shape (4,)."""
         d, v, model = state.displacement, state.velocity, self._model
-        stored = v @ model.M @ v + d @ self._stiffness @ d + self._hung * self.stretch**2
+        stored = v @ model.M @ v + d @ self._stiffness @ d + self._hung * self.stretch**2 - self._at_start
         return self._ledger.balance(0.5 * float(stored) + self.held)
 
     def snapshot(self) -> Snapshot:

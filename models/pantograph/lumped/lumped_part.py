@@ -218,9 +218,9 @@ class LumpedPantographPart:
         transition = self.model.transition(h)
         after = self._moved(transition)
         if self._held is not None:
-            work = self._held.act(transition, after, (self._base.item(0), self._base.item(1)))
+            work, lifting = self._held.act(transition, after, (self._base.item(0), self._base.item(1)))
             if self._balance is not None:
-                self._balance.add_held(work, self._held.stored)
+                self._balance.add_held(work, self._held.stored, -lifting * (self._base.item(0) - self._roof))
         if self._balance is not None:
             self._balance.add(h, after[0::3] - self.state.displacement, outer, force)
         if self.model.follows:

@@ -473,12 +473,19 @@ def _spring(table: Table) -> type[Force]:
     return WeightSpring if table.flag("carries_weights", default=False) else SpringDamper
 
 
+def _lifts(table: Table) -> bool:
+    lifts = table.flag("lift", default=False)
+    if not lifts and table.has("cam") and table.offers("cam"):
+        table.problem("cam", "does nothing: only what raises the pantograph has a cam; write lift = true beside it")
+    return lifts
+
+
 def _force(table: Table) -> type[Force]:
-    return LiftingForce if table.flag("lift", default=False) else ActuatorForce
+    return LiftingForce if _lifts(table) else ActuatorForce
 
 
 def _moment(table: Table) -> type[Force]:
-    return LiftingMoment if table.flag("lift", default=False) else ActuatorMoment
+    return LiftingMoment if _lifts(table) else ActuatorMoment
 
 
 def _friction(table: Table) -> type[Force]:
@@ -607,6 +614,8 @@ class MechanismDefinition(Operation):
             yield "aerodynamic_uplift", f"does nothing with lift_input = 1: {text}"
         wanted = self.lift_parameter
         cam = getattr(self.lifting, "cam", None)
+        if isinstance(cam, str) and cam != CONSTANT_FORCE:
+            return  # no cam that there is: what it takes is not known
         for key in ("static_force", "static_moment"):
             given = getattr(self, key)
             if key == wanted and given is None and not isinstance(cam, MomentCam | ForceCam):
@@ -618,11 +627,11 @@ class MechanismDefinition(Operation):
         if self.holds_force and self.lifting is not None:
             cam = f"with the cam '{CONSTANT_FORCE}' of '{self.lifting.name}'"
             return f"does nothing: {cam} the strip's force is set, by 'static_force'"
-        if self.lifting is not None:
-            cam = f", unless its cam is '{CONSTANT_FORCE}'" if isinstance(self.lifting, LiftingMoment) else ""
-            return f"does nothing: '{self.lifting.name}' lifts by '{self.lift_parameter}'{cam}"
-        kind = "actuator_force" if key == "static_force" else "actuator_moment"
-        return f"does nothing: no {kind} has lift = true"
+        if self.lifting is None:
+            return "does nothing: no force element has lift = true"
+        text = f"does nothing: '{self.lifting.name}' lifts by what '{self.lift_parameter}' says"
+        by_moment = key == "static_force" and self.lifts_by_moment
+        return f"{text}; with cam = '{CONSTANT_FORCE}' the strip's force is set" if by_moment else text
 
     @property
     def lifting(self) -> LiftingForce | LiftingMoment | None:

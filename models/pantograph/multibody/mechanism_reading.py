@@ -21,6 +21,7 @@ from models.pantograph.multibody.mechanism_definition import (
     SlideAndTurnFriction,
     SlidingFriction,
     Spherical,
+    TurningFriction,
     Universal,
 )
 
@@ -91,6 +92,12 @@ def _check_friction(table: Table, d: MechanismDefinition, unread: Collection[str
             )
         elif not isinstance(joint, Revolute | Spherical | Prismatic | Universal | RevolutePrismatic):
             table.problem(f"force.{f.name}.joint", f"a {joint.kind} joint takes no friction")
+        elif isinstance(f, SlidingFriction) and isinstance(joint, Revolute | Spherical | Universal):
+            text = f"a {joint.kind} joint does not slide: write 'moment' [N.m], and 'transition' in rad/s"
+            table.problem(f"force.{f.name}.force", text)
+        elif isinstance(f, TurningFriction) and isinstance(joint, Prismatic):
+            text = f"a {joint.kind} joint does not turn: write 'force' [N], and 'transition' in m/s"
+            table.problem(f"force.{f.name}.moment", text)
         elif isinstance(joint, RevolutePrismatic) and isinstance(f, SlidingFriction):
             text = f"that of the slide of a {joint.kind} joint is 'slide_transition'"
             table.problem(f"force.{f.name}.transition", text)

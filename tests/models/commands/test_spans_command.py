@@ -48,3 +48,17 @@ def test_statics_in_the_wind(said, tmp_path):
     assert len(rows) == 24
     assert [float(row["limit [m]"]) for row in rows][2:-2] == [0.4] * 20
     assert (tmp_path / "out" / "wind.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "answer"),
+    [
+        (("spans", "LN2", "--wind", "104.4", "--limit", "0.5"), "--wind 104.4: no wind is stronger than 100 m/s"),
+        (("statics", "LN2", "--pressure", "1e6"), "--pressure 1e+06: no wind is stronger than 50000 Pa"),
+        (("statics", "LN2", "--temperature", "293"), "--temperature 293: is outside -100 ... 200 degC"),
+    ],
+)
+def test_numbers_of_another_unit(said, arguments, answer):
+    code, text = said(*arguments)
+    assert code == 1
+    assert answer in text.err

@@ -16,6 +16,8 @@ from models.pantograph.multibody.mechanism_assembly import null_space
 
 #: Below this rate a motion neither dies out nor grows: it is neutral [1/s].
 NEUTRAL: Final = 1e-3
+#: Stiffness per mass, the product of the rates of a pair of motions, that a cam found to 0.01 N may leave [1/s2].
+_NO_STIFFNESS: Final = 1e-3
 #: Growth that deserves a warning: e-fold within 20 s, longer than a span takes [1/s].
 NOTABLE_GROWTH: Final = 0.05
 #: What carries the strip rises with it by at least this share, or it is the head alone that moves [choice].
@@ -36,12 +38,16 @@ class FreeMotion:
         0 if it does not oscillate [Hz].
     damping : float
         Damping ratio, below 0 if it grows [1].
+    is_undamped_rest : bool
+        Whether it is one of a pair, s^2 = -k / m, of an arm that neither a spring nor a damper holds: what is left of
+        k decides alone whether it creeps away or swings within minutes.
     """
 
     name: str
     eigenvalue: complex
     frequency: float
     damping: float
+    is_undamped_rest: bool = False
 
     @property
     def growth(self) -> float:
@@ -51,9 +57,9 @@ class FreeMotion:
     @property
     def remark(self) -> str:
         """What is special about it, empty if nothing is."""
-        if self.growth > NEUTRAL:
+        if self.growth > NEUTRAL and not self.is_undamped_rest:
             return f"grows at {self.growth:.2g} 1/s"
-        if abs(self.eigenvalue) < NEUTRAL:
+        if abs(self.eigenvalue) < NEUTRAL or self.is_undamped_rest:
             return "neutral: rests at any height" if self.name == "raise" else "neutral: rests anywhere"
         return ""
 
@@ -65,7 +71,21 @@ def degrees_of_freedom(mechanism: Mechanism, y: FloatArray) -> int:
 
 def name_motions(mechanism: Mechanism, found: Sequence[Mode]) -> tuple[FreeMotion, ...]:
     """Return the modes with their motions in words, in the order given."""
-    return tuple(FreeMotion(_name(mechanism, m.shape), m.eigenvalue, m.frequency, m.damping) for m in found)
+    rates = [m.eigenvalue for m in found]
+    return tuple(
+        FreeMotion(_name(mechanism, m.shape), m.eigenvalue, m.frequency, m.damping, _is_undamped_rest(m, rates))
+        for m in found
+    )
+
+
+def _is_undamped_rest(mode: Mode, rates: Sequence[complex]) -> bool:
+    s = mode.eigenvalue
+    if abs(s) > NOTABLE_GROWTH:
+        return False
+    if s.imag != 0.0:
+        return abs(s) ** 2 < _NO_STIFFNESS
+    others = (r.real for r in rates if r.imag == 0.0 and r.real * s.real < 0.0 and abs(r) < NOTABLE_GROWTH)
+    return any(abs(s.real * r) < _NO_STIFFNESS and max(abs(r), abs(s)) < 10.0 * min(abs(r), abs(s)) for r in others)
 
 
 def freedom_warning(mechanism: Mechanism, standing: FloatArray, contact_force: float) -> str:

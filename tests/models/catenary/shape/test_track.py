@@ -7,9 +7,10 @@ import pytest
 
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY
 from models.catenary.definition.track_definition import Track
-from models.catenary.shape.form_finding import find_form
+from models.catenary.shape.form_finding import EquilibriumError, find_form
 from models.catenary.shape.line_mesh import CatenaryMesh, Chain, build_mesh
 from models.catenary.shape.support_places import SupportPlaces
+from models.catenary.shape.track import mean_curvature
 from tests.effort import count
 from tests.models.curved_space import CurvedSpace
 
@@ -215,3 +216,20 @@ def test_a_whole_line_is_in_equilibrium_in_space(line_maker):
             _, _, left, up = space.frame(mesh.points[lower, 0])
             assert abs(force @ left) < 0.7, (name, mesh.points[lower, 0], force @ left)
             assert abs(force @ up) < 0.7, (name, mesh.points[lower, 0], force @ up)
+
+
+def test_the_mean_curvature_between_two_places():
+    """A ramp with a knot inside, and a jump that is inside, at one end, at the other."""
+    track = Track(positions=(0.0, 100.0, 150.0, 150.0), curvature=(0.0, 0.002, 0.002, -0.001))
+    assert mean_curvature(track, 50.0, 150.0) == pytest.approx((0.0015 * 50.0 + 0.002 * 50.0) / 100.0)
+    assert mean_curvature(track, 140.0, 170.0) == pytest.approx(0.0)
+    assert mean_curvature(track, 150.0, 200.0) == pytest.approx(-0.001)
+
+
+def test_arms_that_lift_the_wire_off_its_droppers_are_told(line_maker):
+    line = line_maker(stagger={"listed": [[-0.2] * 5, "m", "x"], "anchor": [-0.2, "m", "x"]})
+    line = dataclasses.replace(line, track=Track(positions=(0.0,), curvature=(1 / 400,)))
+    with pytest.raises(EquilibriumError, match="in a curve the steady arms pull harder and lift the wire"):
+        find_form(line, build_mesh(line))
+    flatter = dataclasses.replace(line, steady_arm=dataclasses.replace(line.steady_arm, angle=-0.02))
+    assert find_form(flatter, build_mesh(flatter)).dropper_force.min() > 0.0

@@ -5,9 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from models.catenary.definition.tensioning_definition import Tensioning, TensioningDevice
 from models.catenary.definition.track_definition import Track
+from models.catenary.definition.wind_definition import DesignWind
 from models.catenary.line_model import CatenaryModel
 from models.catenary.statics.blow_off import blow_off
+from models.library.catalogue import load_line
 
 PRESSURE = 961.04
 
@@ -53,3 +56,41 @@ def test_twice_the_pressure_moves_twice_as_far(short_line):
     model = CatenaryModel(short_line)
     once, twice = (blow_off(model, p) for p in (400.0, 800.0))
     np.testing.assert_allclose(twice.blown, 2.0 * once.blown)
+
+
+def test_the_auxiliary_wire_takes_the_contact_wire_along():
+    """Three strings over a span, held at its ends, that hang from one another by pendulums of w / L per length."""
+    line = load_line("Shinkansen")
+    model = CatenaryModel(line)
+    static, mesh = model.static, model.mesh
+    tied = [
+        force.sum() / (mesh.points[:, 0].max() - mesh.points[:, 0].min()) / length.mean()
+        for kind in (True, False)
+        for force, length in [
+            (static.dropper_force[mesh.is_hanger == kind], static.droppers.length[mesh.is_hanger == kind])
+        ]
+    ]
+    span, n = 50.0, 200
+    second = (np.eye(n, k=1) - 2.0 * np.eye(n) + np.eye(n, k=-1)) * ((n + 1) / span) ** 2
+    wires = (line.contact_wire, line.auxiliary_wire, line.messenger_wire)
+    ties = np.array([[tied[0], -tied[0], 0.0], [-tied[0], sum(tied), -tied[1]], [0.0, -tied[1], tied[1]]])
+    K = np.kron(ties, np.eye(n)) - np.kron(np.diag([w.tension for w in wires]), second)
+    load = [DesignWind().force(w.width, PRESSURE) for w in wires]
+    strings = np.linalg.solve(K, np.repeat(load, n))[:n].max()
+    found = blow_off(model, PRESSURE)
+    assert found.blown[5:-5] == pytest.approx(strings, rel=0.03)
+    assert strings > 1.1 * found.string_blown[10]
+
+
+def test_the_string_has_the_tension_of_the_day_and_the_curvature_of_its_span(short_line):
+    """In the heat a wire between fixed ends is slacker; a curvature that jumps at the end of a span is not in it."""
+    tensioning = Tensioning(
+        temperature=293.15, reference_temperature=283.15, contact_wire=TensioningDevice(kind="fixed")
+    )
+    jump = Track(positions=(0.0, 150.0, 150.0), curvature=(0.0, 0.0, 1e-3))
+    free = dataclasses.replace(short_line.dynamics, geometric_stiffness=0)
+    found = blown(short_line, tensioning=tensioning, track=jump, dynamics=free)
+    cold = blown(short_line, track=jump)
+    assert found.string_blown[2] > 1.1 * cold.string_blown[2]
+    np.testing.assert_allclose(found.blown[2:4] / found.string_blown[2:4], 0.99, atol=0.01)
+    np.testing.assert_allclose(cold.offset[1:-1], cold.string[1:-1], rtol=0.02)

@@ -84,6 +84,14 @@ def test_neutral_and_growing_are_different_words():
     assert FreeMotion("head heave", 0.3 + 2j, 0.3, -0.1).remark == "grows at 0.3 1/s"
 
 
+def test_a_cam_on_an_arm_without_a_damper_is_neutral_too():
+    """s^2 = -k / m: of a stiffness as small as 0.01 N leave it, s itself is not small."""
+    data = library_data("generic_multibody_cam")
+    del data["force"]["raising_spring"]
+    motions = [m for m in Rig(mechanism_from(data)).dynamics(5.02, np.array([1.0])).motions if m.name == "raise"]
+    assert {m.remark for m in motions} == {"neutral: rests at any height"}
+
+
 def test_a_bushing_is_untwisted_where_the_mechanism_was_put_together():
     """Beside a ball joint it does nothing there: the moment for the weights stays that of the ideal mechanism."""
     lifts = []

@@ -242,6 +242,8 @@ class ScenarioChecks:
         connector = self._connectors.get((element, name))
         if connector is None:
             near = hint(name, (x for owner, x in self._connectors if owner == element))
+            if element in self._fmus and (variable := self._fmus[element].variables.get(name)):
+                near = f"; its FMU has it: add a Connector of kind '{variable.causality}' to the component"
             self._report(line, "connection", f"component '{element}' declares no connector '{name}'{near}")
             return None
         return _Endpoint(component, connector)

@@ -23,6 +23,8 @@ _GUESSED = ("exact", "approx")
 #: Which SSP types a variable of a type accepts, if more than its own.
 _ACCEPTED = {"Real": ("Real", "Integer"), "Enumeration": ("Enumeration", "Integer")}
 _TAKING = ("input", "parameter")
+#: What to do about a speed that an FMU does not take.
+_PROFILE = "; its speed is given otherwise (by a speed profile, say): take the parameter out"
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,8 @@ class StartValues:
         variable = self._fmus[component.name].variables.get(name)
         where = f"parameter '{component.name}.{name}'"
         if variable is None:
-            near = hint(name, self._fmus[component.name].variables)
+            known = self._fmus[component.name].variables
+            near = _PROFILE if name == "speed" and "start_position" in known else hint(name, known)
             self._report_name(p, f"{where}: the FMU {component.source} has no such variable{near}")
             return None
         if text := settable(variable, p.type):

@@ -21,6 +21,8 @@ from master.system.step_rounding import ROUNDING
 AFTER_INTERVAL: Final = 0.5
 #: Parameters that lift a pantograph, in N or N.m.
 _LIFTS: Final = ("static_force", "static_moment")
+#: Parameters that say where a pantograph is at any time.
+_WAY: Final = ("start_position", "speed")
 
 
 def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
@@ -79,7 +81,9 @@ def stop_after_interval(system: System) -> float | str:
         if start is None or speed is None:
             if parameter_value(pantograph, "speed") is not None and start is not None:
                 return f"'{pantograph.name}' moves as its inputs say (use_train = 1); give a stop time"
-            return f"the FMU of '{pantograph.name}' gives no start_position and speed; give a stop time"
+            absent = " and ".join(n for n in _WAY if parameter_value(pantograph, n) is None)
+            text = f"the FMU of '{pantograph.name}' gives no {absent}, so when it leaves the interval is not known"
+            return f'{text}; give a stop time (stopTime instead of until="end", or --stop)'
         if speed <= 0.0:
             return f"{pantograph.name}.speed = {speed:g} m/s never leads to the end of the interval, {end:g} m"
         times.append((end - start) / speed)

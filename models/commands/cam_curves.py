@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.commands.physics_files import write_csv, write_figure
+from models.commands.physics_files import set_heading, write_csv, write_figure
 from models.pantograph.multibody.analysis.mechanism_rig import CamCurves
 
 if TYPE_CHECKING:
@@ -36,5 +36,5 @@ def _plot(title: str, names: tuple[str, ...], cam: CamCurves) -> Figure:
         panels[row, 0].set_ylabel(name)
     panels[1, 0].set_xlabel(names[0])
     panels[1, 1].set_xlabel(names[1])
-    figure.suptitle(f"{title}: cam")
+    set_heading(figure, f"{title}: cam")
     return figure

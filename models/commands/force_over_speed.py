@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.commands.physics_files import write_csv, write_figure
+from models.commands.physics_files import set_heading, write_csv, write_figure
 from models.commands.physics_options import print_table
 from models.library.force_laws import force_laws
 
@@ -52,5 +52,5 @@ def write_over_speed(folder: Path, title: str, table: FloatArray, digits: int) -
     axes.set_ylabel("contact force [N]")
     axes.grid(visible=True, alpha=0.4)
     axes.legend()
-    figure.suptitle(f"{title}: force over the speed")
+    set_heading(figure, f"{title}: force over the speed")
     write_figure(folder / "force_over_speed.png", figure, 120)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from models.arrays import FloatArray
 from models.commands.cam_curves import write_cam
 from models.commands.force_over_speed import SPEEDS, print_over_speed, tabulated, write_over_speed
-from models.commands.physics_files import write_csv, write_figure
+from models.commands.physics_files import set_heading, show_no_noise, write_csv, write_figure
 from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import doubts, load_pantograph
@@ -241,8 +241,8 @@ def friction_warning(
     free = _frequencies_of(analysed(definition.with_values(without)))
     return (
         f"dry friction in {', '.join(f.name for f in rubbing)}: the modes are those of small motions about rest, where "
-        f"it damps like a fluid; {len(_frequencies_of(found))} of them oscillate, without the friction {len(free)}: "
-        f"{', '.join(f'{f:.3f}' for f in free)} Hz"
+        f"it damps like a fluid; {len(_frequencies_of(found))} of them oscillate, and without the friction {len(free)} "
+        f"({', '.join(f'{f:.3f}' for f in free)} Hz)"
     )
 
 
@@ -285,7 +285,7 @@ def _plot_response(result: Characteristics) -> Figure:
     lower.set_xlabel("frequency [Hz]")
     for axes in (upper, lower):
         axes.grid(visible=True, alpha=0.4)
-    figure.suptitle(result.title)
+    set_heading(figure, result.title)
     return figure
 
 
@@ -300,8 +300,8 @@ def _plot_loop(result: Characteristics) -> Figure:
     axes.set_xlabel("strip height [m]")
     axes.set_ylabel("contact force [N]")
     axes.grid(visible=True, alpha=0.4)
-    axes.legend()
-    figure.suptitle(f"{result.title}: static force at {_SLOW:g} m/s")
+    figure.legend(loc="outside lower center", ncols=3)
+    set_heading(figure, f"{result.title}: static force at {_SLOW:g} m/s")
     return figure
 
 
@@ -313,8 +313,9 @@ def _plot_statics(result: Characteristics) -> Figure:
     panels = np.atleast_1d(figure.subplots(count, 1, sharex=True))
     for axes, name, values in zip(panels, result.static_columns[1:], result.statics.T[1:], strict=True):
         axes.plot(result.statics[:, 0], values)
+        show_no_noise(axes, values, name.partition("[")[2].rstrip("]"))
         axes.set_ylabel(name)
         axes.grid(visible=True, alpha=0.4)
     panels[-1].set_xlabel(result.static_columns[0])
-    figure.suptitle(result.title)
+    set_heading(figure, result.title)
     return figure

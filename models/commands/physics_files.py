@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -21,10 +22,15 @@ from models.definition_files.message_text import said
 from models.definition_files.parameter import ParameterError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: What a file that is being written is called.
 _PART: Final = ".part"
+#: Letters of a heading that an inch of a figure's width holds.
+_LETTERS_PER_INCH: Final = 9.5
+#: An axis spans at least this share of the largest value.
+_LEAST_SHARE: Final = 0.02
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -74,6 +80,24 @@ def write_figure(path: Path, figure: Figure, dpi: int) -> None:
     buffer = io.BytesIO()
     figure.savefig(buffer, format=check_figure(path), dpi=dpi)
     write_atomically(path, buffer.getvalue())
+
+
+def set_heading(figure: Figure, text: str) -> None:
+    """Put a heading over a figure, broken into lines that fit its width."""
+    figure.suptitle(textwrap.fill(text, int(_LETTERS_PER_INCH * figure.get_figwidth()), break_long_words=False))
+
+
+def show_no_noise(axes: Axes, values: FloatArray, unit: str) -> None:
+    """Widen an axis over which a value hardly changes, so that rounding errors do not fill it.
+
+    What is drawn spans at least 2 % of the largest value and, of forces and moments, 1 N or 1 N.m.
+    """
+    least = max(_LEAST_SHARE * float(np.max(np.abs(values), initial=0.0)), 1.0 if unit in ("N", "N.m") else 0.0)
+    low, high = axes.get_ylim()
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+    axes.ticklabel_format(axis="y", useOffset=False)
 
 
 def check_figure(path: Path) -> str:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Final
 
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import load as load_line_file
 from models.definition_files.message_text import hint
-from models.definition_files.toml_reader import Table
+from models.definition_files.toml_reader import DefinitionError, Problem, Table
 from models.library import search_path
 from models.library.search_path import LIBRARY, Kind, definition_files, definition_names
 from models.pantograph.lumped.lumped_definition import LumpedDefinition, read_lumped
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import read_mechanism
+
+#: Types of pantograph that a definition can be of.
+_TYPES: Final = ("lumped", "multibody")
 
 
 class UnknownNameError(LookupError):
@@ -66,7 +70,11 @@ def load_line(name: str) -> CatenaryDefinition:
 def load_pantograph(name: str) -> LumpedDefinition | MechanismDefinition:
     """Read a pantograph of any kind by its name or file; raises ``UnknownNameError`` or ``DefinitionError``."""
     table = Table.load(pantograph_path(name))
-    return read_mechanism(table) if table.data.get("type") == "multibody" else read_lumped(table)
+    kind = table.data.get("type", "")
+    if isinstance(kind, str) and kind and kind not in _TYPES:  # read as one of these, every other key would be wrong
+        text = f"'{kind}' is none of {', '.join(_TYPES)}{hint(kind, _TYPES)}"
+        raise DefinitionError([Problem(table.file, "type", text)])
+    return read_mechanism(table) if kind == "multibody" else read_lumped(table)
 
 
 def load_lumped(name: str) -> LumpedDefinition:

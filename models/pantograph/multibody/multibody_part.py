@@ -108,6 +108,7 @@ class MultibodyPantographPart:
         self._take(drive)
         if built.watch is not None:
             built.watch.start()
+        time, force = float(time), float(force)  # as in ``step``
         self.time = self._start_time = time
         self._force.start(time, force)
         self._lateral.start(time, float(point[1]))
@@ -149,6 +150,7 @@ class MultibodyPantographPart:
         MechanismError
             If the motion becomes singular.
         """
+        force, step = float(force), float(step)  # an array's scalar would make the whole step's arithmetic one of such
         built = self._ready()
         self._look(built, force, point)
         values = (force, *point.tolist(), *base.tolist(), *drive.sway, *drive.train, *drive[1:4])

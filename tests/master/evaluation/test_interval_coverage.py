@@ -111,7 +111,9 @@ def test_a_scenario_that_stops_early_is_incomplete(toy, toy_text, tmp_path, caps
 def test_a_toy_that_cannot_tell_its_speed_needs_a_stop_time(toy, toy_text, capsys):
     (toy / "SystemStructure.ssd").write_text(toy_text('<panto:Interval start="20" end="45" until="end"/>'))
     assert main(["validate", str(toy), "--no-build"]) == 1
-    assert "gives no start_position and speed; give a stop time" in " ".join(capsys.readouterr().err.split())
+    assert "gives no start_position, so when it leaves the interval is not known; give a stop time" in " ".join(
+        capsys.readouterr().err.split()
+    )
 
 
 @pytest.mark.parametrize("value", ["4 kN/m", "4000", "4 N/mm"])

@@ -135,6 +135,16 @@ def test_connections_that_lead_nowhere_are_refused(connection, text):
     assert any(text in p.text and p.line == 7 for p in problems)
 
 
+def test_a_connector_left_out_of_the_description_is_told_from_a_wrong_name():
+    a = component("a", [Connector("y", "output", "Real", "", 2)])
+    b = component("b", [Connector("u", "input", "Real", "", 3)])
+    fmus = {"a": fmu(variable("y", "output")), "b": fmu(variable("u", "input"), variable("w", "input"))}
+    _, _, problems = check(structure([a, b], [wire(), wire(end=("b", "w"))]), fmus)
+    assert [p.text for p in problems if "'w'" in p.text] == [
+        "component 'b' declares no connector 'w'; its FMU has it: add a Connector of kind 'input' to the component"
+    ]
+
+
 def test_doubly_connected_inputs_are_refused_and_unconnected_ones_told():
     a = component("a", [Connector("y", "output", "Real", "", 2)])
     b = component("b", [Connector("u", "input", "Real", "", 3), Connector("w", "input", "Real", "", 4)])
@@ -225,6 +235,11 @@ def test_a_later_binding_takes_priority():
     ("given", "declared", "text"),
     [
         (parameter("x", 1.0), variable("f", "parameter"), "has no such variable"),
+        (
+            parameter("speed", 1.0),
+            variable("start_position", "parameter"),
+            "no such variable; its speed is given otherwise (by a speed profile, say): take the parameter out",
+        ),
         (parameter("f", 1.0), variable("f", "output"), "causality 'output'"),
         (parameter("f", 1.0), variable("f", "parameter", variability="constant"), "it is constant"),
         (

@@ -138,7 +138,11 @@ def test_that_is_a_whole_number_of_steps_and_not_one_too_many():
     ("train", "last", "said"),
     [
         (pantograph(), None, "has no end that the run could end at; give it one, or a stop time"),
-        (pantograph(speed="none"), 390.0, "the FMU of 'train' gives no start_position and speed; give a stop time"),
+        (
+            pantograph(speed="none"),
+            390.0,
+            "the FMU of 'train' gives no speed, so when it leaves the interval is not known; give a stop time",
+        ),
         (pantograph(speed="0"), 390.0, "train.speed = 0 m/s never leads to the end of the interval, 390 m"),
     ],
 )

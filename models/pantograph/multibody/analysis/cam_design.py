@@ -16,7 +16,7 @@ from models.numerics.cubic_curve import CubicCurve
 from models.pantograph.multibody.analysis.mechanism_statics import Equilibrium, equilibrium_where, settle_springs
 from models.pantograph.multibody.elements.angle_elements import BodyAngle, Cam, PointDistance
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_definition import AngleStop, CamTable, LiftingMoment
+from models.pantograph.multibody.mechanism_definition import AngleStop, BumpStop, CamTable, LiftingMoment
 
 #: Points of a cam that is found, over the working range.
 _POINTS: Final = 41
@@ -66,8 +66,8 @@ def fit_force(mechanism: Mechanism, standing: FloatArray) -> None:
 def working_range(mechanism: Mechanism, standing: FloatArray) -> tuple[float, float]:
     """Return the lowest and the highest place of the lifting element [rad or m].
 
-    Between the stops of the same bodies about the same axis; where none is, as far as the statics go before a dead
-    centre.
+    Between the stops of the same bodies about the same axis; where none is, as far as the statics go before another
+    stop of the arm or a dead centre.
     """
     lowest, highest = _stops(mechanism)
     if lowest is None:
@@ -141,7 +141,7 @@ def strip_height_where(mechanism: Mechanism, standing: FloatArray, place: float)
 
 
 def reach(mechanism: Mechanism, standing: FloatArray, way: float) -> tuple[float, float]:
-    """Return the last place on a way, -1 or 1, in which statics have an answer before a dead centre.
+    """Return the last place on a way, -1 or 1, in which statics have an answer before a stop or a dead centre.
 
     Returns
     -------
@@ -151,11 +151,15 @@ def reach(mechanism: Mechanism, standing: FloatArray, way: float) -> tuple[float
     step = way * _STEP[isinstance(mechanism.definition.lifting, LiftingMoment)]
     smallest = abs(step) / 128.0
     y, place, height = standing, _now(mechanism, standing), mechanism.strip_height(standing)
-    direction = 0.0
+    direction, stops = 0.0, _ArmStops(mechanism)
+    left = stops.touched(standing)  # it is to come away from them
     while abs(step) >= smallest:
         try:
             found = _held(mechanism, place + step, y, 0.0, 0.0)
         except (MechanismError, np.linalg.LinAlgError):
+            step *= 0.5
+            continue
+        if stops.touched(found.y) - left:
             step *= 0.5
             continue
         slope = (found.strip_height - height) / step
@@ -181,6 +185,29 @@ def _stops(mechanism: Mechanism) -> tuple[float | None, float | None]:
             lowest = stop.lowest if lowest is None else lowest
             highest = stop.highest if highest is None else highest
     return lowest, highest
+
+
+class _ArmStops:
+    """The stops of a mechanism but those of its strip's body: beyond them a cam would lift against the stop."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        strip = mechanism.definition.strip
+        head = "" if strip is None else strip.body
+        bumps = (f for f in mechanism.definition.forces if isinstance(f, BumpStop))
+        self._bumps = [(f, PointDistance(f, mechanism.numbers)) for f in bumps if head not in (f.body_i, f.body_j)]
+
+    def touched(self, y: FloatArray) -> set[str]:
+        """Return the names of those that are reached in a state, shape (13 n,)."""
+        kinematics = self._mechanism.kinematics(y)
+        found = set(self._mechanism.forces.stops.touched(kinematics.frames))
+        for stop, distance in self._bumps:
+            length = distance.at(kinematics)
+            if (stop.shortest is not None and length < stop.shortest) or (
+                stop.longest is not None and length > stop.longest
+            ):
+                found.add(stop.name)
+        return found
 
 
 def _place(mechanism: Mechanism) -> BodyAngle | PointDistance:

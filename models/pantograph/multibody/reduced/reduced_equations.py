@@ -118,9 +118,9 @@ def arm_force(arm: Any, t: Any, rate: Any) -> Any:
     return total
 
 
-def line_forces(lines: Any, sine: Any, cosine: Any, y: Any, n: Any, forces: Any) -> Any:
+def line_forces(lines: Any, rolls: Any, sine: Any, cosine: Any, y: Any, n: Any, forces: Any) -> Any:
     """Add the generalised forces of springs, dampers and stops of the head to ``forces``; return that on the roll."""
-    on_roll, roll_rate = 0.0, y[n + 1]
+    on_roll, by_roll, roll_rate = 0.0, 0.0, y[n + 1]
     for row in lines:
         a, b = int(row[0]), int(row[1])
         gap = rate = 0.0
@@ -129,19 +129,30 @@ def line_forces(lines: Any, sine: Any, cosine: Any, y: Any, n: Any, forces: Any)
         if a >= 0:
             gap -= y[2 + a]
             rate -= y[n + 2 + a]
-        by_gap = row[6] + sine * row[7] + cosine * row[8]
-        value = row[3] + sine * row[4] + cosine * row[5] + gap * (by_gap + gap * row[9])
-        by_gap += 2.0 * gap * row[9]
-        by_roll = cosine * row[4] - sine * row[5] + gap * (cosine * row[7] - sine * row[8])
-        if row[2] == 0.0:
+        bend = gap * row[9]
+        if rolls:
+            by_gap = row[6] + sine * row[7] + cosine * row[8]
+            value = row[3] + sine * row[4] + cosine * row[5] + gap * (by_gap + bend)
+        else:
+            by_gap = row[6] + row[8]
+            value = row[3] + row[5] + gap * (by_gap + bend)
+        squared, is_stop = row[2] == 0.0, row[14] > 0.0
+        if squared:
             value = sqrt(abs(value)) + 1e-300
+        if is_stop and row[16] <= value <= row[17]:  # a stop is nothing besides
+            continue
+        by_gap += 2.0 * bend
+        if rolls:
+            by_roll = cosine * row[4] - sine * row[5] + gap * (cosine * row[7] - sine * row[8])
+        if squared:
             half = 0.5 / value
             by_gap *= half
             by_roll *= half
         speed = by_gap * rate + by_roll * roll_rate
-        tension = row[10] * (value - row[11]) + row[12] * speed - row[13]
-        if row[14] > 0.0:
-            tension += stop_force(value, speed, row[16], row[17], row[14], row[15])
+        if is_stop:
+            tension = stop_force(value, speed, row[16], row[17], row[14], row[15])
+        else:
+            tension = row[10] * (value - row[11]) + row[12] * speed - row[13]
         on_roll -= tension * by_roll
         if b >= 0:
             forces[b] -= tension * by_gap
@@ -175,12 +186,17 @@ def joint_forces(slides: Any, turns: Any, y: Any, n: Any, forces: Any) -> Any:
     return on_roll
 
 
-def vector_at(row: Any, at: Any, sin_p: Any, cos_p: Any) -> Any:
-    """Return a vector that rolls, from its nine numbers in a row."""
+def strip_on_body(strip: Any, sin_p: Any, cos_p: Any) -> Any:
+    """Return the strip's direction across, and where its middle is from its body's centre, in axes of the carrier."""
+    if strip[21] == 0.0:
+        return strip[10], strip[11], strip[12], strip[1], strip[2], strip[3]
     return (
-        row[at] + sin_p * row[at + 3] + cos_p * row[at + 6],
-        row[at + 1] + sin_p * row[at + 4] + cos_p * row[at + 7],
-        row[at + 2] + sin_p * row[at + 5] + cos_p * row[at + 8],
+        strip[10] + sin_p * strip[13] + cos_p * strip[16],
+        strip[11] + sin_p * strip[14] + cos_p * strip[17],
+        strip[12] + sin_p * strip[15] + cos_p * strip[18],
+        strip[1] + sin_p * strip[4] + cos_p * strip[7],
+        strip[2] + sin_p * strip[5] + cos_p * strip[8],
+        strip[3] + sin_p * strip[6] + cos_p * strip[9],
     )
 
 
@@ -266,10 +282,12 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
     f_t += t[LEVER] * lift_value(curves, t[PLACE], lift, uplift)
     if len(arm) > 0:
         f_t += arm_force(arm, t, speed)
-    sin_p, cos_p = sin(y[1]), cos(y[1])
-    m_ts, m_ps, m_ss = [0.0] * (n - 2), [0.0] * (n - 2), [0.0] * (n - 2)
-    w_s, f_s = [0.0] * (n - 2), [0.0] * (n - 2)
-    f_p = line_forces(lines, sin_p, cos_p, y, n, f_s)
+    rolls, sin_p, cos_p = m_pp == 0.0, 0.0, 1.0
+    if rolls:
+        sin_p, cos_p = sin(y[1]), cos(y[1])
+    none = [0.0] * (n - 2)
+    m_ts, m_ps, m_ss, w_s, f_s = none[:], none[:], none[:], none[:], none[:]
+    f_p = line_forces(lines, rolls, sin_p, cos_p, y, n, f_s)
     if len(slides) + len(turns) > 0:
         f_p += joint_forces(slides, turns, y, n, f_s)
     on = strip[0]
@@ -278,11 +296,21 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
     k_cx, k_cz, k_slide = vx, vz, -1
     number = 0.0
     for body in bodies:
-        slide, rolls, mass = int(body[0]), body[1], body[2]
-        px, py, pz, tx, ty, tz, ex, ey, ez, wx, _, wz, rx, ry, rz = motion_of(body, y, n, sin_p, cos_p)
+        slide, mass = int(body[0]), body[2]
+        if body[1] > 0.0:
+            px, py, pz, tx, ty, tz, ex, ey, ez, wx, _, wz, rx, ry, rz = motion_of(body, y, n, sin_p, cos_p)
+            by = mass * ry
+        else:  # `motion_of` in few words
+            px, py, pz, ex, ey, ez = body[3], body[4], body[5], body[12], body[13], body[14]
+            tx = ty = tz = wx = wz = rx = rz = by = 0.0
+            if slide >= 0:
+                shift, rate = y[2 + slide], y[n + 2 + slide]
+                px += shift * ex
+                py += shift * ey
+                pz += shift * ez
+                wx, wz = rate * ex, rate * ez
         cx, cz = vx + pitch * pz, vz - pitch * px
         bx = mass * (ax + turning * pz + 2.0 * turn * wz - turn_2 * px + rx)
-        by = mass * ry
         bz = mass * (az - turning * px - 2.0 * turn * wx - turn_2 * pz + rz)
         m_tt += mass * (cx * cx + cz * cz)
         f_t -= cx * bx + cz * bz
@@ -292,16 +320,16 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
             m_ss[slide] += mass * (ex * ex + ey * ey + ez * ez)
             f_s[slide] -= ex * bx + ey * by + ez * bz
             w_s[slide] -= mass * (cosine * ez - sine * ex)
-        if rolls > 0.0:
+        if body[1] > 0.0:
             m_tp += mass * (cx * tx + cz * tz)
             m_pp += mass * (tx * tx + ty * ty + tz * tz) + body[29]
             f_p -= tx * bx + ty * by + tz * bz
             w_p -= mass * (cosine * tz - sine * tx)
             if slide >= 0:
                 m_ps[slide] += mass * (tx * ex + ty * ey + tz * ez)
-            j_yy = body[21] + body[22] * sin_p + body[23] * cos_p + sin_p * (body[24] * sin_p + body[25] * cos_p)
-            d_yy = body[22] * cos_p - body[23] * sin_p + 2.0 * body[24] * sin_p * cos_p
-            d_yy += body[25] * (cos_p * cos_p - sin_p * sin_p)
+            double, slant = sin_p * body[24], cos_p * body[25]
+            j_yy = body[21] + body[22] * sin_p + body[23] * cos_p + sin_p * (double + slant)
+            d_yy = cos_p * (body[22] + 2.0 * double + slant) - sin_p * (body[23] + sin_p * body[25])
             j_yp = body[26] + body[27] * sin_p + body[28] * cos_p
             d_yp = body[27] * cos_p - body[28] * sin_p
             m_tt += pitch * pitch * j_yy
@@ -309,15 +337,15 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
             f_t -= pitch * (turning * j_yy + turn * roll_rate * d_yy + roll_rate * roll_rate * d_yp)
             f_p -= turning * j_yp - 0.5 * turn_2 * d_yy
         else:
-            m_tt += pitch * pitch * body[21]
-            f_t -= pitch * turning * body[21]
+            turned = pitch * body[21]
+            m_tt += pitch * turned
+            f_t -= turning * turned
         if number == on:
             k_py, k_cx, k_cz, k_slide = py, cx, cz, slide
             k_tx, k_tz, k_ex, k_ez = tx, tz, ex, ez
         number += 1.0
     # The contact's columns, at y = 0 and per y.
-    dx, dy, dz = vector_at(strip, 10, sin_p, cos_p)
-    lx, ly, lz = vector_at(strip, 1, sin_p, cos_p)
+    dx, dy, dz, lx, ly, lz = strip_on_body(strip, sin_p, cos_p)
     along = -(strip[19] + k_py + ly) / dy
     lx += along * dx
     ly += along * dy
@@ -340,33 +368,38 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
         f_s[j] += gravity * w_s[j]
     if k_slide >= 0:
         f_s[k_slide] += force * c_s
-    result = solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, f_t, f_p, f_s)
+    # Displacements first: what is left of inertia, and how they follow.
+    by_t, by_p = none[:], none[:]
+    for j in range(n - 2):
+        share = 1.0 / m_ss[j]
+        by_t[j], by_p[j] = share * m_ts[j], share * m_ps[j]
+        m_tt -= by_t[j] * m_ts[j]
+        m_tp -= by_t[j] * m_ps[j]
+        m_pp -= by_p[j] * m_ps[j]
+    one = 1.0 / (m_tt * m_pp - m_tp * m_tp)
+    inverse = (one * m_pp, -one * m_tp, one * m_tt)
+    result = solved(inverse, by_t, by_p, m_ss, f_t, f_p, f_s)
     if not respond:
         return result, result[:0]
-    u_s, none = [0.0] * (n - 2), [0.0] * (n - 2)
+    u_s = none[:]
     if k_slide >= 0:
         u_s[k_slide] = c_s
-    response = solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, c_t, c_p, u_s)
-    response += solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, d_t, d_p, none)
-    response += solved(m_tt, m_tp, m_pp, m_ts, m_ps, m_ss, w_t, w_p, w_s)
+    response = solved(inverse, by_t, by_p, m_ss, c_t, c_p, u_s)
+    response += solved(inverse, by_t, by_p, m_ss, d_t, d_p, none)
+    response += solved(inverse, by_t, by_p, m_ss, w_t, w_p, w_s)
     return result, response
 
 
-def solved(m_tt: Any, m_tp: Any, m_pp: Any, m_ts: Any, m_ps: Any, m_ss: Any, f_t: Any, f_p: Any, f_s: Any) -> Any:
-    """Return the accelerations under generalised forces, the displacements eliminated first."""
-    count = len(m_ss)
-    for j in range(count):
-        by_t, by_p = m_ts[j] / m_ss[j], m_ps[j] / m_ss[j]
-        m_tt -= by_t * m_ts[j]
-        m_tp -= by_t * m_ps[j]
-        m_pp -= by_p * m_ps[j]
-        f_t -= by_t * f_s[j]
-        f_p -= by_p * f_s[j]
-    one = 1.0 / (m_tt * m_pp - m_tp * m_tp)
-    a_t, a_p = one * (m_pp * f_t - m_tp * f_p), one * (m_tt * f_p - m_tp * f_t)
+def solved(inverse: Any, by_t: Any, by_p: Any, m_ss: Any, f_t: Any, f_p: Any, f_s: Any) -> Any:
+    """Return the accelerations under generalised forces, inertia being eliminated and inverted."""
+    i_tt, i_tp, i_pp = inverse
+    for b_t, b_p, f in zip(by_t, by_p, f_s):  # noqa: B905 - numba
+        f_t -= b_t * f
+        f_p -= b_p * f
+    a_t, a_p = i_tt * f_t + i_tp * f_p, i_tp * f_t + i_pp * f_p
     result = [a_t, a_p]
-    for j in range(count):
-        result.append((f_s[j] - m_ts[j] * a_t - m_ps[j] * a_p) / m_ss[j])  # noqa: PERF401 - compiled, a loop is as fast
+    for b_t, b_p, m, f in zip(by_t, by_p, m_ss, f_s):  # noqa: B905
+        result.append(f / m - b_t * a_t - b_p * a_p)
     return result
 
 
@@ -500,20 +533,31 @@ def continued(
     n = len(y) // 2
     a, b, c = h / 24.0, h / 48.0, h / 6.0
     v, f, m, k = y[n:], first[n:], before[n:], begun[n:]
-    speeds = [x + a * (23.0 * q - 16.0 * r + 5.0 * s) for x, q, r, s in zip(v, f, m, k)]  # noqa: B905 - numba
-    terms = zip(y, begun, before, first, speeds)  # noqa: B905
-    places = [x + b * (s - 5.0 * r + 19.0 * q + 9.0 * u) for x, s, r, q, u in terms]
+    speeds, places = [], []
+    # Of a coordinate: place and speed; rates of both at first, in the middle of the step before, at its beginning.
+    for x, u, q, dq, r, dr, s, ds in zip(y, v, first, f, before, m, begun, k):  # noqa: B905 - numba
+        speed = u + a * (23.0 * dq - 16.0 * dr + 5.0 * ds)
+        speeds.append(speed)
+        places.append(x + b * (s - 5.0 * r + 19.0 * q + 9.0 * speed))
     acceleration, _ = evaluate(places + speeds, inputs_at(given, now + 0.5 * h), model, False)
-    middle = speeds + acceleration
-    guess = [x + c * (r - 2.0 * q + 7.0 * s) for x, r, q, s in zip(v, m, f, acceleration)]  # noqa: B905
-    places = [x + c * (q + 4.0 * s + u) for x, q, s, u in zip(y, first, speeds, guess)]  # noqa: B905
+    guess, places = [], []
+    for x, u, q, dq, dr, r, dm in zip(y, v, first, f, m, speeds, acceleration):  # noqa: B905
+        speed = u + c * (dr - 2.0 * dq + 7.0 * dm)
+        guess.append(speed)
+        places.append(x + c * (q + 4.0 * r + speed))
     acting = inputs_at(given, now + h)
     latest, response = evaluate(places + guess, acting, model, True)
-    speeds = [x + c * (q + 4.0 * s + u) for x, q, s, u in zip(v, f, acceleration, latest)]  # noqa: B905
-    error = error_of(speeds, guess, settings[2][n:], settings[0])  # of places it is 0 by construction
-    halves = [x + a * (5.0 * q + 8.0 * s - u) for x, q, s, u in zip(v, f, acceleration, latest)]  # noqa: B905
-    places = [x + c * (q + 4.0 * s + u) for x, q, s, u in zip(y, first, halves, speeds)]  # noqa: B905
-    return places + speeds, guess + latest, response, middle, acting, error
+    places, ends, largest = [], [], 0.0
+    terms = zip(y, v, first, f, acceleration, latest, guess, settings[2][n:])  # noqa: B905
+    for x, u, q, dq, dm, de, guessed, weight in terms:
+        speed = u + c * (dq + 4.0 * dm + de)
+        half = u + a * (5.0 * dq + 8.0 * dm - de)
+        ends.append(speed)
+        places.append(x + c * (q + 4.0 * half + speed))
+        difference = abs(speed - guessed) * weight  # of places it is 0 by construction
+        if not difference <= largest:
+            largest = difference
+    return places + ends, guess + latest, response, speeds + acceleration, acting, largest / settings[0]
 
 
 def started(y: Any, first: Any, given: Any, now: Any, h: Any, model: Any, settings: Any) -> Any:
@@ -573,8 +617,7 @@ def place_strip(memory: Any, model: Any, moved: Any, ends: Any) -> None:
         px, py, pz, _, _, _, _, _, _, wx, wy, wz, _, _, _ = motion_of(bodies[on], y, n, sin_p, cos_p)
     roll = y[n + 1] if strip[21] > 0.0 else 0.0
     ux, uy, uz = model[1][2] * roll, model[1][3] * roll, model[1][4] * roll
-    dx, dy, dz = vector_at(strip, 10, sin_p, cos_p)
-    lx, ly, lz = vector_at(strip, 1, sin_p, cos_p)
+    dx, dy, dz, lx, ly, lz = strip_on_body(strip, sin_p, cos_p)
     x, z = px + lx, pz + lz
     vx = t[VX] * y[n] + turn * z + wx + uy * lz - uz * ly
     vz = t[VZ] * y[n] - turn * x + wz + ux * ly - uy * lx

@@ -16,6 +16,7 @@ from models.arrays import FloatArray
 from models.pantograph.multibody.mechanism import Mechanism
 from models.pantograph.multibody.mechanism_assembly import null_space
 from models.pantograph.multibody.mechanism_definition import (
+    FORCES,
     ActuatorForce,
     ActuatorMoment,
     AngleStop,
@@ -113,8 +114,12 @@ def unsuitable(definition: MechanismDefinition) -> str:
         return "there is no strip"
     for force in definition.forces:
         if type(force) not in _FORCES:
-            return f"force '{force.name}' is a {type(force).__name__}"
+            return f"force '{force.name}' is of a kind that the reduced form does not have ({_kind(force)})"
     return ""
+
+
+def _kind(force: Force) -> str:
+    return next((kind for kind, cls in FORCES.items() if cls is type(force)), type(force).__name__)
 
 
 def unsuitable_drive(drive: Drive) -> str:

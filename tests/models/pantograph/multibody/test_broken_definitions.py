@@ -12,7 +12,7 @@ import pytest
 from models.commands.pantograph_command import friction_warning
 from models.commands.physics_main import main
 from models.definition_files.toml_reader import DefinitionError
-from models.library.catalogue import pantograph_path
+from models.library.catalogue import load_pantograph, pantograph_path
 from models.pantograph.multibody.analysis.mechanism_rig import Rig
 from models.pantograph.multibody.mechanism import MechanismError
 from models.pantograph.multibody.mechanism_definition import JointFriction
@@ -106,8 +106,8 @@ def test_modes_that_dry_friction_takes_are_told(rubbing):
     said = friction_warning(rubbing, found, analysed)
     assert said.startswith("dry friction in rub: the modes are those of small motions about rest")
     without = sum(m.frequency > 0.0 for m in free.modes)
-    assert f"{len(oscillating)} of them oscillate, without the friction {without}: " in said
-    assert said.endswith(", ".join(f"{m.frequency:.3f}" for m in free.modes if m.frequency > 0.0) + " Hz")
+    assert f"{len(oscillating)} of them oscillate, and without the friction {without} (" in said
+    assert said.endswith(", ".join(f"{m.frequency:.3f}" for m in free.modes if m.frequency > 0.0) + " Hz)")
 
 
 def test_without_friction_there_is_nothing_to_tell(rubbing):
@@ -197,3 +197,13 @@ def test_a_cam_on_what_does_not_lift_says_what_to_do():
 def test_the_keys_that_messages_list_have_those_without_a_default():
     (told,) = told_of(library_data("generic_multibody") | {"start_hight": q(5.0, "m")})
     assert "did you mean 'start_height'?" in told
+
+
+def test_a_type_that_is_none_is_one_mistake(tmp_path):
+    text = pantograph_path("generic_multibody_cam").read_text(encoding="utf-8")
+    path = tmp_path / "generic_multibody_cam.toml"
+    path.write_text(text.replace('type = "multibody"', 'type = "multi_body"'), encoding="utf-8")
+    with pytest.raises(DefinitionError) as error:
+        load_pantograph(str(path))
+    (told,) = str(error.value).splitlines()
+    assert "type: 'multi_body' is none of lumped, multibody; did you mean 'multibody'?" in told

@@ -101,11 +101,13 @@ def test_what_is_set_must_suit_the_cam():
         mechanism_from(data)
 
 
-def test_a_cam_on_a_force_that_pushes_the_arm():
-    """A bellows between base and lower arm holds the force as well, by its length."""
+@pytest.mark.parametrize("stops", [{}, {"arm_stops": library_data("generic_multibody_cam")["force"]["arm_stops"]}])
+def test_a_cam_on_a_force_that_pushes_the_arm(stops):
+    """A bellows between base and lower arm holds the force as well, by its length, up to the stops if there are any."""
     data = library_data("generic_multibody")
     del data["static_moment"]
     data["static_force"] = q(120.0, "N")
+    data["force"] |= stops
     data["force"]["lift"] = {
         "kind": "actuator_force",
         "body_i": "base",
@@ -120,6 +122,20 @@ def test_a_cam_on_a_force_that_pushes_the_arm():
     for above in (1.3, 1.7):
         found = contact_force_at(mechanism, above, 120.0, start=posture.reference)
         assert found.inputs.force == pytest.approx(120.0, abs=0.05)
+    if stops:
+        stop = mechanism.forces.stops.stops[0]
+        ends = [strip_height_where_arm_is(mechanism, posture.reference, a) for a in (stop.lowest, stop.highest)]
+        for above in (ends[0] + 0.02, ends[1] - 0.05):  # the head gives way by 20 mm
+            found = contact_force_at(mechanism, above, 120.0, start=posture.reference)
+            assert found.inputs.force == pytest.approx(120.0, abs=0.05)
+
+
+def strip_height_where_arm_is(mechanism, start, angle):
+    (where,) = mechanism.forces.stops.angles
+    for share in np.linspace(0.25, 1.0, 4):
+        found = equilibrium_where(mechanism, lambda y, a=share * angle: where.at(mechanism.kinematics(y)) - a, start)
+        start = found.y
+    return found.strip_height
 
 
 def test_heights_out_of_reach_name_those_within():

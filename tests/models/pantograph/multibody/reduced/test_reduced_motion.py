@@ -323,3 +323,16 @@ def test_numbers_of_functions_are_those_of_the_table():
     model, _ = reduced(load_pantograph("generic_multibody"))
     table = ReducedMotion(model).model.numbers(lambda t: t, np.asarray, np.asarray)[0][0]
     assert table.cells.shape[1] == reduced_equations.FIRST_OF_ARM
+
+
+def test_scalars_of_arrays_do_not_get_into_the_plain_arithmetic():
+    """They are right, but every operation with one takes several times as long as with Python's numbers."""
+    parts = [MultibodyPantographPart(load_pantograph("CX_multibody")) for _ in range(2)]
+    for part, scalar in zip(parts, (float, np.float64), strict=True):
+        part.initialise(scalar(0.0), scalar(150.0), np.zeros(3), np.zeros(2))
+        for k in range(4):
+            point = np.array([part.strip[0, 0, 0], 0.1, 5.0])
+            part.step(scalar(150.0 + k), point, np.zeros(2), scalar(1e-3))
+    plain, given = (part._reduced.memory for part in parts)
+    assert given == plain
+    assert {type(x) for values in given for x in values} == {float}

@@ -87,7 +87,10 @@ def reasons():
             replace(d, forces=(*d.forces, across)),
             "force 'far' acts between head and arm (lower_arm, pan_head)",
         ),
-        "bushing": (replace(d, forces=(*d.forces, soft)), "force 'soft' is a Bushing"),
+        "bushing": (
+            replace(d, forces=(*d.forces, soft)),
+            "force 'soft' is of a kind that the reduced form does not have (bushing)",
+        ),
         "universal": (
             replace(d, joints=joints, assembly=replace(d.assembly, largest_gap=0.2)),
             "its closed part has 3 degrees of freedom",

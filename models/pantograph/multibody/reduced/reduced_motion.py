@@ -259,7 +259,7 @@ class ReducedMotion:
         self, y: FloatArray, acting: tuple[float, float, float, float, float]
     ) -> tuple[FloatArray, FloatArray]:
         """Return accelerations (n,) and their response (3 n,); see `reduced_equations.evaluate`."""
-        acceleration, response = self._equations.evaluate(y.tolist(), acting, self._numbers, True)
+        acceleration, response = self._equations.evaluate(self._rows(y), acting, self._numbers, True)
         return np.array(acceleration), np.array(response)
 
     def begin(self, given: list[float]) -> None:

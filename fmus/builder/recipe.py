@@ -54,6 +54,8 @@ MAX_PORTS = 16
 _PLATFORMS = {".so": "linux64", ".dll": "win64", ".dylib": "darwin64"}
 #: In every FMU of ours: what it is, for the loader and for whoever wants to know whether it may be replaced.
 MARK = "resources/openpanto.txt"
+#: First part of an FMU's name, and the kind of its definition.
+_PREFIXES: tuple[tuple[str, Kind], ...] = (("Catenary", "lines"), ("Pantograph", "pantographs"))
 
 
 class BuildError(ValueError):
@@ -186,6 +188,8 @@ def _sound_recipe(name: str, pantographs: int | None, folders: Sequence[Path], b
         return _line_recipe(path, _head(path).get("title", ""), ports)
     if path is not None and (adapter := _PANTOGRAPHS.get(_head(path).get("type", ""))):
         return _pantograph_recipe(path, _head(path).get("title", ""), adapter)
+    if meant := [f"{prefix}_{name}" for prefix, own in _PREFIXES if definition_files(own, name, [*folders, LIBRARY])]:
+        raise UnknownFmuError(f"There is no FMU '{name}'; that of the definition '{name}' is {' or '.join(meant)}.")
     known = known_names()
     text = f"There is no FMU '{name}'; known are {', '.join(known) or 'none'} (and NAME_P2: a line for two pantographs)"
     raise UnknownFmuError(text + (hint(name, known) or "."))

@@ -42,7 +42,7 @@ _FROM_PROJECT: Final = re.compile(
     rb"^from (?:openpanto_\w+\.)?models\.[\w.]+_kernels import (?:\([^)]*\)|[^(\n]*)$", re.MULTILINE
 )
 _LOG: Final = logging.getLogger("openpanto")
-_COMPILING: Final = "compiling kernels for this processor, once for each user and version: up to half a minute"
+_COMPILING: Final = "compiling kernels that were not used before, once for each user and version: up to half a minute"
 #: The end of a folder's name.
 _VERSION: Final = re.compile(r"\w+-[0-9a-f]{16}")
 #: Length of the checksum before the content of a file [bytes].

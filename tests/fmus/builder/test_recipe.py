@@ -9,7 +9,7 @@ import pytest
 
 from fmus.__main__ import main
 from fmus.builder.fmu_build import build
-from fmus.builder.recipe import MARK, BuildError, content_hash, fingerprint, recipe
+from fmus.builder.recipe import MARK, BuildError, UnknownFmuError, content_hash, fingerprint, recipe
 from master.fmu import fmu_provision
 from models.library.catalogue import line_path, pantograph_path
 from models.library.definition_copy import renamed
@@ -201,3 +201,10 @@ def test_an_fmu_of_the_library_says_so(tmp_path):
 def test_a_mistyped_name_is_answered_by_the_one_that_may_be_meant(capsys):
     assert main(["build", "Catenary_LN22"]) == 1
     assert "did you mean 'Catenary_LN2'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "fmu"), [("CX", "Pantograph_CX"), ("LN2", "Catenary_LN2")])
+def test_the_name_of_a_definition_leads_to_that_of_its_fmu(name, fmu):
+    with pytest.raises(UnknownFmuError) as error:
+        recipe(name)
+    assert str(error.value) == f"There is no FMU '{name}'; that of the definition '{name}' is {fmu}."

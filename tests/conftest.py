@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from tests.effort import IS_LONG
 
@@ -45,6 +46,11 @@ def group(item: pytest.Item) -> str:
     """Return the name of the group whose tests run in one process."""
     place = item.path.relative_to(HERE).as_posix()
     return next((name for begin, name in TOGETHER.items() if place.startswith(begin)), place)
+
+
+#: For how long other processes hold the processor is no fault of a test.
+settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("suite")
 
 
 def pytest_configure(config: pytest.Config) -> None:

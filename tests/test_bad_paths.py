@@ -73,6 +73,9 @@ COMMANDS: Final = (
     "verify wave_speeds --out {dir}",
     "statics {in:toml}",
     "statics EN50318_2002 --out {dir}",
+    "signal {in:csv}",
+    "signal s.csv --out {dir}",
+    "signal s.csv --standalone --runtime {in:d}",
     "spans {in:toml} --wind 29 --limit 0.5",
     "spans EN50318_2002 --wind 29 --limit 0.5 --out {dir}",
     "pantograph {in:toml}",
@@ -111,6 +114,7 @@ def workplace(tmp_path, monkeypatch, request):
     (tmp_path / "afile").write_text("a file\n")
     (tmp_path / "empty").mkdir()
     (tmp_path / "r.csv").write_text("".join(f"{f / 2},{100 - f},{3 * f}\n" for f in range(1, 41)))
+    (tmp_path / "s.csv").write_text("time [s],base.z [m]\n0,0\n1,0.01\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -34,7 +35,9 @@ def test_a_multibody_pantograph_for_many_spans(soak):
 
     Joints stay closed, nothing is kept, and the contact never opens after the raise.
     """
-    pantograph = soak.at_speed(soak.load_pantograph("generic_multibody"), 30.0)
+    # Only the general form has joints that could open.
+    mechanism = replace(soak.load_pantograph("generic_multibody"), formulation="general")
+    pantograph = soak.at_speed(mechanism, 30.0)
     system = soak.system_of(soak.line(STOP * 30.0), pantograph)
     windows = list(soak.run(system, STOP, WINDOW))
     assert len(windows) == round(STOP / WINDOW)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from models.catenary.definition.condition_definition import Fault
 from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition, Section
-from models.catenary.definition.section_reading import read_section
+from models.catenary.definition.section_reading import SECTION_TABLES, read_section
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
 
@@ -31,6 +31,8 @@ def read(table: Table) -> CatenaryDefinition:
     line = field_schema.read(CatenaryDefinition, table, sections=(), provenance=table.provenance)
     has_arms, has_hangers = line.steady_arm is not None, line.type == "compound"
     tables = table.tables("section") or [table]
+    if table.has("section"):
+        _check_places(table)
     sections = tuple(read_section(t, has_arms=has_arms, has_hangers=has_hangers) for t in tables)
     faults = table.tables("fault")
     listed = tuple(field_schema.read(Fault, t) for t in faults)
@@ -40,6 +42,13 @@ def read(table: Table) -> CatenaryDefinition:
     _check_faults(faults, definition)
     table.finish()
     return definition
+
+
+def _check_places(table: Table) -> None:
+    """Check that what belongs to sections is written there, if the line has several."""
+    for name in SECTION_TABLES:
+        if table.offers(name):
+            table.problem(name, f"every section has its own: write [section.{name}] below its [[section]]")
 
 
 def _check_stitch(table: Table, definition: CatenaryDefinition) -> None:

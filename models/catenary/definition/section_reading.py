@@ -7,11 +7,14 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Final
 
 from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
 from models.catenary.definition.support_reading import listed_stagger, with_own_values
 from models.definition_files.toml_reader import Table
 
+#: Tables of a section.
+SECTION_TABLES: Final = ("spans", "stagger", "ends", "measured", "supports")
 #: Largest numbers of spans in a section, of droppers in a span and of droppers in a section.
 MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 

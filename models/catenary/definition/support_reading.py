@@ -35,6 +35,8 @@ def with_own_values(own: Table, supports: Sequence[Support], *, periodic: bool, 
     Anchors have the heights of the supports beside them, from which the wires rise.
     """
     inner = supports if periodic else supports[1:-1]
+    for name in (*_QUANTITIES, "stagger", "arm_side"):
+        own.offers(name)
     columns = {
         name: _each(own, name, len(inner), unit, low, high)
         for name, (unit, low, high) in _QUANTITIES.items()

@@ -14,6 +14,8 @@ TIGHTEST_RADIUS: Final = 15.0
 _TIGHTEST: Final = 1.0 / TIGHTEST_RADIUS
 #: Largest cant of any track, with the sign of a mistake in the unit well beyond it [m].
 _LARGEST_CANT: Final = 0.3
+#: Steepest ramp of a cant [1]; railways build 1 in 400.
+STEEPEST_RAMP: Final = 0.05
 #: Knots closer than this are the same place, at which a quantity jumps [m].
 SAME_PLACE: Final = 1e-6
 
@@ -103,6 +105,9 @@ class Track:
             if abs(b - a) <= SAME_PLACE and D != E:
                 text = f"jumps from {1e3 * D:g} to {1e3 * E:g} mm at {a:g} m: a cant rises along a ramp"
                 yield "cant", f"{text}; give its two ends different positions"
+            elif abs(E - D) > STEEPEST_RAMP * (b - a) > 0.0:
+                text = f"goes from {1e3 * D:g} to {1e3 * E:g} mm within {b - a:g} m, from {a:g} m on"
+                yield "cant", f"{text}: no ramp is steeper than 1 in {1.0 / STEEPEST_RAMP:g}; check the positions"
 
 
 def _order_problems(positions: Sequence[float]) -> Iterator[tuple[str, str]]:

@@ -15,6 +15,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition, Section, Support
 from models.catenary.shape.track import curve_force, track_at, twist_jumps
+from models.numerics.gauss_points import gauss_points
 
 #: Points of Gauss-Legendre integration in every piece of a span between knots of the track.
 _GAUSS: Final = 8
@@ -112,7 +113,7 @@ class SupportPlaces:
             return 0.0
         low, high = min(x, other), max(x, other)
         breaks = [low, *sorted({k for k in track.positions if low < k < high}), high]
-        nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
+        nodes, weights = gauss_points(_GAUSS)
         total = 0.0
         slope, rise = (stagger - y) / (other - x), (self.height(other) - self.height(x)) / (other - x)
         for a, b in pairwise(breaks):

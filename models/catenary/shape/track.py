@@ -22,9 +22,10 @@ from models.arrays import FloatArray, IntArray
 from models.catenary.definition.line_definition import GRAVITY
 from models.catenary.definition.track_definition import SAME_PLACE, Track
 from models.catenary.shape.beam_elements import NODE_DOFS, point_loads
+from models.numerics.gauss_points import gauss_points
 
 #: Points of Gauss-Legendre integration in an element, or in its part between knots of the track.
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+_POINTS, _WEIGHTS = gauss_points(3)
 _XI: Final = 0.5 * (1.0 + _POINTS)
 _SHARE: Final = 0.5 * _WEIGHTS
 

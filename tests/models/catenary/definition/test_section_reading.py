@@ -9,7 +9,7 @@ from models.catenary.line_part import CatenaryPart
 from models.catenary.line_state import StripMotion
 from models.catenary.statics.rest_profile import arm_loads
 from models.definition_files.toml_reader import DefinitionError
-from models.library.catalogue import load_line
+from models.library.catalogue import LIBRARY, load_line
 
 #: Half of the pan-head's working length [m].
 HALF_STRIP = 0.725
@@ -52,7 +52,7 @@ def test_mistakes_name_their_section(section_maker, sections_maker):
 
 
 def test_spans_of_the_line_and_sections_exclude_each_other(section_maker, line_maker):
-    with pytest.raises(DefinitionError, match="spans: unknown key"):
+    with pytest.raises(DefinitionError, match="spans: every section has its own"):
         line_maker(section=[section_maker(0.0, 4, [0.2, -0.2, 0.2])])
 
 
@@ -182,3 +182,13 @@ def test_a_wire_that_is_not_near_would_not_be_met_either(pair):
         near.append(wire.is_near(strip))
         assert near[-1] or not met
     assert near == [False, True, True, True, True, False]
+
+
+@pytest.mark.parametrize("name", ["spans", "stagger", "ends", "measured", "supports"])
+def test_what_belongs_to_sections_is_told_where_to_go(tmp_path, name):
+    text = (LIBRARY / "lines" / "LN2_overlap.toml").read_text(encoding="utf-8")
+    (tmp_path / "wrong.toml").write_text(f"{text}\n[{name}]\nanything = 1\n", encoding="utf-8")
+    with pytest.raises(DefinitionError) as caught:
+        load_line(str(tmp_path / "wrong.toml"))
+    assert f"{name}: every section has its own: write [section.{name}] below its [[section]]" in str(caught.value)
+    assert "anything" not in str(caught.value)

@@ -35,6 +35,7 @@ def test_a_radius_is_a_curvature():
         ({"positions": of("m", 0), "cant": of("m", 0.29), "base": [0.4, "km", "x"]}, "track.base: unknown unit"),
         ({"positions": of("m", 0), "curvature": of("1/m", float("nan"))}, "track.curvature: "),
         ({"positions": of("m", 0), "bank": of("mm", 0)}, "track.bank: unknown key"),
+        ({"positions": of("m", 0, 0.01), "cant": of("mm", 0, 100)}, "track.cant: goes from 0 to 100 mm within 0.01 m"),
         ({"positions": of("m"), "radius": of("m", 600)}, "track.positions: gives no value"),
         ({"positions": of("m", 0), "cant": of("mm")}, "track.cant: gives no value"),
     ],

@@ -65,7 +65,7 @@ def test_the_auxiliary_wire_takes_the_contact_wire_along():
     static, mesh = model.static, model.mesh
     tied = [
         force.sum() / (mesh.points[:, 0].max() - mesh.points[:, 0].min()) / length.mean()
-        for kind in (True, False)
+        for kind in (False, True)
         for force, length in [
             (static.dropper_force[mesh.is_hanger == kind], static.droppers.length[mesh.is_hanger == kind])
         ]
@@ -78,7 +78,7 @@ def test_the_auxiliary_wire_takes_the_contact_wire_along():
     load = [DesignWind().force(w.width, PRESSURE) for w in wires]
     strings = np.linalg.solve(K, np.repeat(load, n))[:n].max()
     found = blow_off(model, PRESSURE)
-    assert found.blown[5:-5] == pytest.approx(strings, rel=0.03)
+    assert found.blown[5:-5] == pytest.approx(strings, rel=0.02)
     assert strings > 1.1 * found.string_blown[10]
 
 

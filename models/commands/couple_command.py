@@ -53,6 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
     pantograph = load_lumped(arguments.pantograph)
     given = settings(arguments.set, "pantograph", pantograph)
     _check_given(given)
+    if pantograph.speed_profile is not None:
+        raise ParameterError(
+            f"pantograph '{pantograph.name}' has a [speed_profile], and couple runs at the one speed of --speed: "
+            "take it out, or run a scenario, which follows it"
+        )
     pantograph = pantograph.with_values({"speed": speed, "start_position": way[0]} | given)
     coupled = CoupledModel(line, [pantograph])
     warn([*advice(line, pantograph, arguments.step), *advice_at_start(coupled)])

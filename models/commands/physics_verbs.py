@@ -92,7 +92,11 @@ def add_pantograph(verbs: Any) -> None:
     )
     parser.add_argument("--height", type=finite, default=None, help="strip height of the working point [m]")
     parser.add_argument(
-        "--limit", type=finite, default=None, metavar="N", help="judge half the difference of the force up and down [N]"
+        "--limit",
+        type=positive,
+        default=None,
+        metavar="N",
+        help="judge half the difference of the force up and down [N]",
     )
     parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
     add_settings(parser)

@@ -162,8 +162,8 @@ def _check_component(component: Component, *, is_pantograph: bool) -> None:
             text = f"has pantographs without stops, friction and start_height ({component.name}.{name})"
             raise RequestError(f"--engine lanes {text}; {_INSTEAD}")
     if _chosen(component, "follow_height"):
-        text = f"has no pantograph that follows the height ({component.name}.follow_height)"
-        raise RequestError(f"--engine lanes {text}; {_INSTEAD}")
+        text = f"has no pantograph that follows the height: set {component.name}.follow_height=0 (spring on the roof)"
+        raise RequestError(f"--engine lanes {text}, or {_INSTEAD}")
     if _chosen(component, USE_TRAIN):
         raise RequestError(f"--engine lanes runs at constant speed ({component.name}.{USE_TRAIN}); {_INSTEAD}")
     if _chosen(component, "monitor_energy"):

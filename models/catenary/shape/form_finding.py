@@ -364,7 +364,8 @@ def _check_arms(shape: LineShape, force: FloatArray) -> None:
             f"the arm at {a:.2f} m pushes with {-f:.1f} N" for a, f in list(zip(x, force[pushing], strict=True))[:8]
         )
         raise EquilibriumError(
-            f"line '{shape.definition.name}': {listed}: an arm must pull; change its side or the stagger"
+            f"line '{shape.definition.name}': {listed}: an arm must pull; change its side "
+            "(arm_side in [supports]) or the stagger"
         )
 
 

@@ -102,6 +102,20 @@ def test_another_component_and_an_energy_balance_are_refused(base):
         check_scenario(replace(base, components=monitored))
 
 
+def test_a_reference_that_follows_is_refused_with_what_to_do(base):
+    """New projects have it, so this is what their first sweep of this kind says."""
+    parts = [replace(c, parameters={**c.parameters, "follow_height": 1}) for c in base.components]
+    with pytest.raises(RequestError, match=r"set pantograph\.follow_height=0 \(spring on the roof\), or use --engine"):
+        check_scenario(
+            replace(
+                base,
+                components=tuple(
+                    c if c.name == "pantograph" else o for c, o in zip(parts, base.components, strict=True)
+                ),
+            )
+        )
+
+
 def test_a_multibody_pantograph_is_refused():
     path = SCENARIOS / "generic_multibody_ln2.ssp"
     with (

@@ -174,7 +174,7 @@ def test_an_arm_that_pushes_is_refused(line_maker):
     with pytest.raises(EquilibriumError) as raised:
         CatenaryModel(line_maker(spans=6, stagger=stagger))
     assert "the arm at 150.00 m pushes with" in str(raised.value)
-    assert "an arm must pull; change its side or the stagger" in str(raised.value)
+    assert "an arm must pull; change its side (arm_side in [supports]) or the stagger" in str(raised.value)
 
 
 def test_arms_of_a_straight_wire_neither_pull_nor_push(line_maker):

@@ -10,6 +10,8 @@ from models.definition_files.field_schema import count, part, quantity, series, 
 
 DeviceKind = Literal["weights", "spring", "fixed"]
 DEVICE_KINDS: Final[tuple[DeviceKind, ...]] = ("weights", "spring", "fixed")
+#: How much further the weights of a pulley or a wheel move than the wire, unless said otherwise.
+_RATIO: Final = 5.0
 #: Coldest and hottest that a wire can be meant to be [K].
 COLDEST, HOTTEST = 173.15, 473.15
 
@@ -20,7 +22,7 @@ class TensioningDevice:
 
     kind: DeviceKind = text(default="weights", choices=DEVICE_KINDS)
     ratio: float = quantity(
-        "1", "movement of the weights over that of the wire", default=5.0, minimum=0.5, maximum=20.0
+        "1", "movement of the weights over that of the wire", default=_RATIO, minimum=0.5, maximum=20.0
     )
     efficiency: float = quantity(
         "1", "efficiency of the tensioning device: by it the tension is less after the wire has lengthened, and "
@@ -40,6 +42,8 @@ class TensioningDevice:
             yield "stiffness", f"means nothing for kind '{self.kind}': remove it, or take kind 'spring'"
         if self.kind != "weights" and self.efficiency != 1.0:
             yield "efficiency", f"means nothing for kind '{self.kind}': remove it, or take kind 'weights'"
+        if self.kind != "weights" and self.ratio != _RATIO:
+            yield "ratio", f"means nothing for kind '{self.kind}': remove it, or take kind 'weights'"
 
 
 @dataclass(frozen=True, kw_only=True)

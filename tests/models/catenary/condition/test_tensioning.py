@@ -244,6 +244,7 @@ def test_the_table_as_read(line_maker):
         ({"contact_wire": {"kind": "spring"}}, "contact_wire.stiffness: is missing: how stiff is the spring?"),
         ({"contact_wire": {"stiffness": of("kN/m", 15)}}, "stiffness: means nothing for kind 'weights'"),
         ({"contact_wire": {"kind": "fixed", "efficiency": of("1", 0.9)}}, "efficiency: means nothing for kind 'fixed'"),
+        ({"contact_wire": {"kind": "fixed", "ratio": of("1", 3.0)}}, "ratio: means nothing for kind 'fixed'"),
         ({"contact_wire": {"kind": "rope"}}, "tensioning.contact_wire.kind: 'rope' is none of weights, spring, fixed"),
         ({"auxiliary_wire": {"ratio": of("1", 3)}}, "tensioning.auxiliary_wire: the line has no auxiliary wire"),
         ({"stitch_wire": {}}, "tensioning.stitch_wire: unknown key"),

@@ -64,7 +64,7 @@ def _largest(x: np.ndarray, lateral: np.ndarray, limits: SupportLimits) -> str:
 def _smallest(x: np.ndarray, lateral: np.ndarray, limits: SupportLimits) -> str:
     worst = int(np.nanargmin(lateral))
     kept = _verdict(is_kept=bool(lateral[worst] >= limits.smallest_lateral))
-    return f"{lateral[worst]:.0f} at {x[worst]:g} m: {kept} {limits.smallest_lateral:g} at least"
+    return f"{lateral[worst]:.0f} at {x[worst]:g} m: {kept} {limits.smallest_lateral:g} at least (from memory: check)"
 
 
 def _verdict(*, is_kept: bool) -> str:

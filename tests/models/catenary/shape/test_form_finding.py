@@ -97,7 +97,7 @@ def test_every_dropper_is_in_tension(found):
 
 
 def slid(line, state):
-    """Return by how much wires stretch whose supports are not equally high: weight along the slope, over half a section."""
+    """Return by how much weight along their slope stretches wires whose supports are not equally high, at most."""
     supports = [s for section in line.sections for s in section.inner_supports]
     heights = [s.contact_wire_height + s.encumbrance for s in supports if s.contact_wire_height and s.encumbrance]
     length = sum(np.ptp([s.x for s in section.supports]) for section in line.sections)

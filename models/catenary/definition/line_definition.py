@@ -215,7 +215,7 @@ class Support:
     """A support of the messenger wire; with a steady arm where the contact wire is registered.
 
     What is None is line-wide: of the profile, of the steady arms. The messenger wire is then above the contact wire,
-    and the arm on the side from which it pulls.
+    and the arm on the side from which it pulls. ``structure`` names the mast.
     """
 
     x: float
@@ -227,6 +227,7 @@ class Support:
     arm_length: float | None = None
     arm_angle: float | None = None
     arm_side: int | None = None
+    structure: str = ""
 
 
 @dataclass(frozen=True)

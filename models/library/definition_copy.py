@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 import tomllib
+from pathlib import Path
 from typing import Final
+
+from models.catenary.definition.surface_reading import named_profile
 
 _NAME: Final = re.compile(r"""^(\s*name\s*=\s*)("[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
 _TABLE: Final = re.compile(r"^\s*\[", re.MULTILINE)
@@ -28,6 +31,29 @@ def checked_name(name: str) -> str:
             f"'{name}' cannot name a definition, its file and its FMU: take letters, digits and _ (1 to 60)"
         )
     return name
+
+
+def copy_profile(path: Path, copy: Path) -> None:
+    """Copy the file of a line's running surface, if it has one, to where a copy of the line's definition looks for it.
+
+    Parameters
+    ----------
+    path, copy : Path
+        The definition and its copy, both there.
+
+    Raises
+    ------
+    CopyError
+        If another file is there already.
+    """
+    source, target = named_profile(path), named_profile(copy)
+    if source is None or target is None or source.resolve() == target.resolve():
+        return
+    data = source.read_bytes()
+    if target.exists() and target.read_bytes() != data:
+        raise CopyError(f"{target} is there already, and is not {source}, the running surface of {path.stem}")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(data)
 
 
 def renamed(text: str, name: str) -> str:

@@ -40,6 +40,7 @@ WHOLE = {
     "master/fmu/kept_fingerprints.py": {"keep_answer"},
     "master/ssp/pack.py": {"pack"},
     "models/commands/physics_files.py": {"write_atomically", "write_csv", "write_figure"},
+    "models/layout/xlsx_sheets.py": {"workbook_bytes"},
     "models/numerics/kernel_cache.py": None,
     "models/numerics/user_cache.py": {"keep_arrays"},
     "fmus/builder/fmu_build.py": {"_describe", "_zipped", "_write_atomically"},

@@ -35,6 +35,7 @@ _FORMS: Final = {
     "quantities": "list of values",
     "integer": "whole number",
     "text": "text",
+    "texts": "list of texts",
     "flag": "`true` or `false`",
     "table": "table",
     "required_table": "table",

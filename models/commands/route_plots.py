@@ -68,7 +68,7 @@ def _heights(axes: Axes, result: LineStatics) -> None:
     _wires(axes, result, "z")
     s = result.supports
     axes.plot(s.x, s.height, "o", color=COLOURS["contact_wire"], markersize=3)
-    for number, over in enumerate(result.model.definition.structure, 1):
+    for number, over in enumerate(result.model.definition.overbridge, 1):
         axes.hlines(over.underside, over.start, over.end, color="black", linewidth=3.0)
         place = 0.5 * (over.start + over.end), over.underside
         axes.annotate(str(number), place, xytext=(0, 3), textcoords="offset points", fontsize=8, ha="center")

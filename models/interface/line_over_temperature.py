@@ -1,4 +1,4 @@
-"""A line over temperature: tensions, movements, sags, waves, the room under structures, and what norms say of them."""
+"""A line over temperature: tensions, movements, sags, waves, the room under bridges, and what norms say of them."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class LineOverTemperature:
 
     @property
     def judgements(self) -> tuple[Judgement, ...]:
-        """Return the verdicts on the largest loss of tension, the slowest waves and the room under structures."""
+        """Return the verdicts on the largest loss of tension, the slowest waves and the room under bridges."""
         return tuple(self._judged())
 
     def _judged(self) -> Iterator[Judgement]:
@@ -67,7 +67,7 @@ class LineOverTemperature:
         yield from _waves(self.states)
         highest = np.array([state.highest for state in self.states])
         temperatures = [state.temperature for state in self.states]
-        yield from clearance_at_temperatures(self.definition.structure, temperatures, highest)
+        yield from clearance_at_temperatures(self.definition.overbridge, temperatures, highest)
 
     @property
     def tables(self) -> dict[str, Table]:
@@ -196,8 +196,8 @@ def _columns(definition: CatenaryDefinition, states: Sequence[LineAtTemperature]
         "reflection factor [1]": [s.waves.reflection for s in states],
         "Doppler factor [1]": [s.waves.doppler for s in states],
     }
-    for k, over in enumerate(definition.structure):
-        columns[f"clearance under structure {k + 1} [m]"] = [over.underside - float(s.highest[k]) for s in states]
+    for k, over in enumerate(definition.overbridge):
+        columns[f"clearance under bridge {k + 1} [m]"] = [over.underside - float(s.highest[k]) for s in states]
     return columns
 
 

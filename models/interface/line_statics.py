@@ -12,20 +12,20 @@ import numpy as np
 from models.arrays import BoolArray, FloatArray
 from models.catenary import line_advice
 from models.catenary.definition.line_definition import CatenaryDefinition, Span
-from models.catenary.definition.structure_definition import Structure
+from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics import elasticity as under_force
 from models.catenary.statics import rest_profile, wire_waves
 from models.catenary.statics.found_tension import found_tension
-from models.catenary.statics.structure_room import StructureRoom, structure_room
+from models.catenary.statics.overbridge_room import OverbridgeRoom, overbridge_room
 from models.catenary.statics.support_loads import SupportLoads, support_loads
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.interface.column_frames import column_frame
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.norm_judgement import Judgement
-from models.interface.support_verdicts import structure_verdicts, support_verdicts
+from models.interface.support_verdicts import overbridge_verdicts, support_verdicts
 from models.library.norm_tables import gradient_limits, support_limits
 
 if TYPE_CHECKING:
@@ -57,10 +57,10 @@ class LineStatics:
         ``x`` [m], ``lateral``, ``lift`` [N] of every steady arm.
     supports : SupportLoads
         ``x``, ``height`` [m], ``lateral`` [N] (left > 0), ``gradient`` and more of every support between the anchors.
-    structures : StructureRoom
-        ``highest``, ``clearance``, ``encumbrance``, ``lift`` [m] of every structure over the line.
+    overbridges : OverbridgeRoom
+        ``highest``, ``clearance``, ``encumbrance``, ``lift`` [m] of every bridge over the line.
     judgements : tuple of Judgement
-        What norms say of supports, droppers, gradients and structures: ``what``, ``figure``, ``word``, ``limit``,
+        What norms say of supports, droppers, gradients and overbridges: ``what``, ``figure``, ``word``, ``limit``,
         ``source``, ``is_kept``.
     elasticity : Elasticity
         ``x`` [m], ``value`` [m/N] along the span, ``minimum``, ``maximum``, ``non_uniformity``.
@@ -80,7 +80,7 @@ class LineStatics:
     droppers: rest_profile.Droppers
     arms: rest_profile.ArmLoads
     supports: SupportLoads
-    structures: StructureRoom
+    overbridges: OverbridgeRoom
     judgements: tuple[Judgement, ...]
     elasticity: under_force.Elasticity
     others: dict[int, tuple[int, under_force.Elasticity]]
@@ -104,7 +104,7 @@ class LineStatics:
     def tables(self) -> dict[str, Table]:
         """Columns by name: ``droppers``, ``elasticity``, ``steady_arms``, ``supports``, and every kind of wire.
 
-        Of a line with structures over it, ``structures`` too, in the order of the file.
+        Of a line with bridges over it, ``overbridges`` too, in the order of the file.
         """
         d, a = self.droppers, self.arms
         all_sections = {self.section: self.elasticity} | {section: other for section, (_, other) in self.others.items()}
@@ -116,8 +116,8 @@ class LineStatics:
             "steady_arms": (("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift)),
         }
         found["supports"] = _support_table(self.supports)
-        if self.model.definition.structure:
-            found["structures"] = _structure_table(self.model.definition.structure, self.structures)
+        if self.model.definition.overbridge:
+            found["overbridges"] = _overbridge_table(self.model.definition.overbridge, self.overbridges)
         for component in dict.fromkeys(p.component for p in self.profiles):
             same = [(p.x, p.y, p.z) for p in self.profiles if p.component == component]  # stitch wires one by one
             found[component] = (("x [m]", "y [m]", "z [m]"), _joined(same))
@@ -223,7 +223,7 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         line_advice.track_warning(definition),
     )
     hung = rest_profile.droppers(model, section=index)
-    supports, room = support_loads(model, index), structure_room(model, force)
+    supports, room = support_loads(model, index), overbridge_room(model, force)
     return LineStatics(
         model=model,
         section=index,
@@ -233,10 +233,10 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         droppers=hung,
         arms=rest_profile.arm_loads(model, index),
         supports=supports,
-        structures=room,
+        overbridges=room,
         judgements=(
             *support_verdicts(supports, hung, support_limits(), gradient_limits(), speed),
-            *structure_verdicts(definition.structure, room, force),
+            *overbridge_verdicts(definition.overbridge, room, force),
         ),
         elasticity=_elasticity(model, index, number, force),
         others={
@@ -257,12 +257,12 @@ def _waves(model: CatenaryModel, section: int, span: Span, speed: float) -> wire
     return wire_waves.waves(definition, speed, span.length, below, above)
 
 
-def _structure_table(structures: Sequence[Structure], room: StructureRoom) -> Table:
+def _overbridge_table(overbridges: Sequence[Overbridge], room: OverbridgeRoom) -> Table:
     columns = {
-        "structure": np.arange(1.0, len(structures) + 1.0),
-        "from [m]": np.array([s.start for s in structures]),
-        "to [m]": np.array([s.end for s in structures]),
-        "underside [m]": np.array([s.underside for s in structures]),
+        "bridge": np.arange(1.0, len(overbridges) + 1.0),
+        "from [m]": np.array([s.start for s in overbridges]),
+        "to [m]": np.array([s.end for s in overbridges]),
+        "underside [m]": np.array([s.underside for s in overbridges]),
         "highest wire [m]": room.highest,
         "encumbrance left [m]": room.encumbrance,
         "clearance at rest [m]": room.clearance,

@@ -1,4 +1,4 @@
-"""What norms say of a line's supports, droppers, gradients and of the room under structures."""
+"""What norms say of a line's supports, droppers, gradients and of the room under bridges."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.structure_definition import Structure
+from models.catenary.definition.overbridge_definition import Overbridge
+from models.catenary.statics.overbridge_room import OverbridgeRoom
 from models.catenary.statics.rest_profile import Droppers
-from models.catenary.statics.structure_room import StructureRoom
 from models.catenary.statics.support_loads import SupportLoads
 from models.interface.norm_judgement import Judgement, kept
 from models.library.norm_tables import GradientLimits, SupportLimits, clearances, norm_sources
@@ -44,8 +44,8 @@ def support_verdicts(
         yield from _gradient_verdicts(supports, steepness, gradients, speed)
 
 
-def structure_verdicts(structures: Sequence[Structure], room: StructureRoom, force: float) -> Iterator[Judgement]:
-    """Yield what norms, or wishes in the line's file, say of the room under structures.
+def overbridge_verdicts(overbridges: Sequence[Overbridge], room: OverbridgeRoom, force: float) -> Iterator[Judgement]:
+    """Yield what norms, or wishes in the line's file, say of the room under bridges.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def structure_verdicts(structures: Sequence[Structure], room: StructureRoom, for
         By which wires are lifted where nothing is said of that [N].
     """
     wanted, sources = clearances(), norm_sources("clearance")
-    for k, over in enumerate(structures):
+    for k, over in enumerate(overbridges):
         if not np.isfinite(room.clearance[k]):
             continue
         yield _clearance(over.name, "at rest", room.clearance[k], over.clearance, wanted.at_rest, sources["at_rest"])
@@ -66,19 +66,19 @@ def structure_verdicts(structures: Sequence[Structure], room: StructureRoom, for
 
 
 def clearance_at_temperatures(
-    structures: Sequence[Structure], temperatures: Sequence[float], highest: FloatArray
+    overbridges: Sequence[Overbridge], temperatures: Sequence[float], highest: FloatArray
 ) -> Iterator[Judgement]:
-    """Yield what the room under structures is at rest where it is least of some temperatures.
+    """Yield what the room under bridges is at rest where it is least of some temperatures.
 
     Parameters
     ----------
     temperatures : sequence of float
         [K].
-    highest : ndarray, shape (n_temperatures, n_structures)
+    highest : ndarray, shape (n_temperatures, n_overbridges)
         Height of the highest wire [m].
     """
     wanted, sources = clearances(), norm_sources("clearance")
-    for k, over in enumerate(structures):
+    for k, over in enumerate(overbridges):
         if not np.isfinite(highest[:, k]).all():
             continue
         worst = int(highest[:, k].argmax())

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from models.catenary.definition.condition_definition import Fault
 from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition, Section
+from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.section_reading import SECTION_TABLES, read_section
-from models.catenary.definition.structure_definition import Structure
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
 
@@ -38,13 +38,13 @@ def read(table: Table) -> CatenaryDefinition:
     sections = tuple(read_section(t, has_arms=has_arms, has_hangers=has_hangers) for t in tables)
     faults = table.tables("fault")
     listed = tuple(field_schema.read(Fault, t) for t in faults)
-    structures = table.tables("structure")
-    over = tuple(field_schema.read(Structure, t) for t in structures)
-    definition = dataclasses.replace(line, sections=sections, fault=listed, structure=over)
+    overbridges = table.tables("overbridge")
+    over = tuple(field_schema.read(Overbridge, t) for t in overbridges)
+    definition = dataclasses.replace(line, sections=sections, fault=listed, overbridge=over)
     for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track, _check_tensioning):
         check(table, definition)
     _check_faults(faults, definition)
-    _check_structures(structures, definition)
+    _check_overbridges(overbridges, definition)
     table.finish()
     return definition
 
@@ -170,15 +170,15 @@ def _check_faults(tables: Sequence[Table], definition: CatenaryDefinition) -> No
             )
 
 
-def _check_structures(tables: Sequence[Table], definition: CatenaryDefinition) -> None:
-    """Check that every structure stands over the line, and no two have one name, by which verdicts call them."""
+def _check_overbridges(tables: Sequence[Table], definition: CatenaryDefinition) -> None:
+    """Check that every bridge stands over the line, and no two have one name, by which verdicts call them."""
     first = min((section.spans[0].start for section in definition.sections if section.spans), default=-math.inf)
     last = max((section.spans[-1].end for section in definition.sections if section.spans), default=math.inf)
     seen: dict[str, int] = {}
-    for number, (table, over) in enumerate(zip(tables, definition.structure, strict=True), 1):
+    for number, (table, over) in enumerate(zip(tables, definition.overbridge, strict=True), 1):
         if other := seen.get(over.name):
-            table.problem("name", f"'{over.name}' is that of structure[{other}] already: give it another one")
-        seen[over.name or f"structure[{number}]"] = number
+            table.problem("name", f"'{over.name}' is that of overbridge[{other}] already: give it another one")
+        seen[over.name or f"overbridge[{number}]"] = number
         mistaken = table.mistaken(("start", "end"))
         for key, x in (("start", over.start), ("end", over.end)):
             if key not in mistaken and not first <= x <= last:

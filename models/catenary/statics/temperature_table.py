@@ -15,7 +15,7 @@ from models.catenary.definition.line_definition import CatenaryDefinition, Secti
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
-from models.catenary.statics.structure_room import highest_wires
+from models.catenary.statics.overbridge_room import highest_wires
 from models.catenary.statics.wire_waves import Waves, waves
 from models.definition_files.parameter import ParameterError
 
@@ -56,8 +56,8 @@ class LineAtTemperature:
         Largest slant of droppers along the track, difference of movements over mean length.
     waves : Waves
         In the span where the contact wire's waves are slowest, with the tensions that the wires have there.
-    highest : ndarray, shape (n_structures,)
-        Height of the highest wire under each of the line's structures [m]; NaN where there is none.
+    highest : ndarray, shape (n_overbridges,)
+        Height of the highest wire under each of the line's bridges [m]; NaN where there is none.
     """
 
     temperature: float
@@ -127,7 +127,7 @@ def _at(design: StaticState, temperature: float, index: int, speed: float) -> Li
         stagger_change=float(swing(np.array(moved), tensioning.cantilever_length)),
         dropper_slant=float(slant / _mean_length(design, index)),
         waves=_slowest(definition, contact, upper, speed),
-        highest=highest_wires(state, definition.structure),
+        highest=highest_wires(state, definition.overbridge),
     )
 
 

@@ -72,10 +72,10 @@ def _parts(found: Found) -> Iterator[Part]:
     yield Part("verdicts", "Verdicts", (markup.verdicts(found.judgements),) if found.judgements else ())
     yield _figures(result)
     chart = inline_figure(route_plots.profile(result), "route", "track, plan, heights and gradients along the line")
-    remark = "Black: undersides of the structures, by their number." if result.model.definition.structure else ""
+    remark = "Black: undersides of the bridges, by their number." if result.model.definition.overbridge else ""
     yield Part("route", "Plan, profile and gradients", (markup.figure("The line along its track", chart, remark),))
     yield Part("supports", "Supports", tuple(_supports(result)))
-    yield Part("structures", "Structures over the line", tuple(_structures(result)))
+    yield Part("overbridges", "Bridges over the line", tuple(_overbridges(result)))
     yield Part("span", f"Span {result.number} in detail", tuple(_span(result)))
     yield Part("temperature", "Temperature", tuple(_temperature(found.over)))
     yield Part("wind", "Wind", tuple(_wind(found.wind)))
@@ -172,11 +172,11 @@ def _supports(result: LineStatics) -> Iterator[str]:
     )
 
 
-def _structures(result: LineStatics) -> Iterator[str]:
-    over, room = result.model.definition.structure, result.structures
+def _overbridges(result: LineStatics) -> Iterator[str]:
+    over, room = result.model.definition.overbridge, result.overbridges
     if not over:
         return
-    heads = ("no.", "structure", "from ... to [m]", "underside [m]", "highest wire [m]", "encumbrance left [m]",
+    heads = ("no.", "bridge", "from ... to [m]", "underside [m]", "highest wire [m]", "encumbrance left [m]",
              "clearance [m]", "lift [mm]", "lifted [m]")  # fmt: skip
     rows = [
         (
@@ -189,7 +189,7 @@ def _structures(result: LineStatics) -> Iterator[str]:
     yield markup.table(heads, rows, leading=2)
     yield markup.note(
         f"Lift of the messenger wire as the file says, or by {result.elasticity.force:g} N on the contact wire under "
-        "the structure, at rest; a run says what pantographs do."
+        "the bridge, at rest; a run says what pantographs do."
     )
 
 
@@ -226,14 +226,14 @@ def _temperature(over: LineOverTemperature | None) -> Iterator[str]:
         for s in over.states
     ]  # fmt: skip
     yield markup.table(of_line, rows, leading=0)
-    structures = over.definition.structure
-    if structures:
+    overbridges = over.definition.overbridge
+    if overbridges:
         left = [
-            (f"{s.temperature - ZERO:g}", *(_cell(o.underside - s.highest[k], 3) for k, o in enumerate(structures)))
+            (f"{s.temperature - ZERO:g}", *(_cell(o.underside - s.highest[k], 3) for k, o in enumerate(overbridges)))
             for s in over.states
         ]
-        yield "<h3>Clearance under structures, at rest [m]</h3>"
-        yield markup.table(("T [\u00b0C]", *(o.name for o in structures)), left, leading=0)
+        yield "<h3>Clearance under bridges, at rest [m]</h3>"
+        yield markup.table(("T [\u00b0C]", *(o.name for o in overbridges)), left, leading=0)
     drawn = temperature_report.tension(over.states)
     yield markup.figure("Tension along the track", inline_figure(drawn, "tension", "tension along the track"))
     if len(over.states) > 1:

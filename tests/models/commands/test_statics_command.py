@@ -33,14 +33,14 @@ def test_verdicts_are_in_the_summary(statics_folder):
 
 
 def test_room_under_the_bridge_at_rest_lifted_and_over_temperature(statics_folder):
-    with (statics_folder / "structures.csv").open() as file:
+    with (statics_folder / "overbridges.csv").open() as file:
         (row,) = csv.DictReader(file)
     found = {name: float(value) for name, value in row.items()}
     assert found["clearance at rest [m]"] == pytest.approx(7.1 - found["highest wire [m]"])
     assert found["clearance lifted [m]"] == pytest.approx(found["clearance at rest [m]"] - 0.05)
     with (statics_folder / "temperature.csv").open() as file:
         cold, warm = csv.DictReader(file)
-    left = "clearance under structure 1 [m]"
+    left = "clearance under bridge 1 [m]"
     assert float(cold[left]) < float(warm[left])  # a messenger wire between springs is tighter in the cold
     assert float(cold["wave speed [km/h]"]) == pytest.approx(429.5, abs=0.1)
 

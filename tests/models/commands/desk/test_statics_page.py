@@ -79,7 +79,7 @@ def test_drawings_are_sound_and_their_letters_are_letters(page):
 def test_verdicts_come_first_what_is_not_kept_on_top(page):
     parts = re.findall(r"<section id='(\w+)'", page)
     assert parts == [
-        "verdicts", "figures", "route", "supports", "structures", "span", "temperature", "wind", "droppers",
+        "verdicts", "figures", "route", "supports", "overbridges", "span", "temperature", "wind", "droppers",
     ]  # fmt: skip
     marks = re.findall(r"<span class='(pass|near|fail)'>", page)
     assert marks == sorted(marks, key=("fail", "near", "pass").index)

@@ -9,8 +9,8 @@ from models.definition_files.field_schema import quantity, text
 
 
 @dataclass(frozen=True, kw_only=True)
-class Structure:
-    """A structure over the track, whose underside is level in the rail plane; what is None is the norm's."""
+class Overbridge:
+    """A bridge, portal or tunnel roof over the track, its underside level in the rail plane; None is the norm's."""
 
     name: str = text(filled=True)
     start: float = quantity("m", "where it begins along the track", minimum=-1e7, maximum=1e7, tunable=False)

@@ -1,4 +1,4 @@
-"""Room under structures: heights node by node, and the lift by a solution of the whole line in nodal coordinates."""
+"""Room under bridges: heights node by node, and the lift by a solution of the whole line in nodal coordinates."""
 
 import dataclasses
 
@@ -6,26 +6,26 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from models.catenary.definition.structure_definition import Structure
+from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.statics.elasticity import elasticity, rise_of_nodes
-from models.catenary.statics.structure_room import highest_wires, structure_room
+from models.catenary.statics.overbridge_room import highest_wires, overbridge_room
 from tests.models.nodal_line import NodalLine
 
 OVER = (
-    Structure(name="wide", start=120.0, end=180.0, underside=7.0),
-    Structure(name="narrow", start=171.3, end=171.4, underside=6.9, lift=0.08),
+    Overbridge(name="wide", start=120.0, end=180.0, underside=7.0),
+    Overbridge(name="narrow", start=171.3, end=171.4, underside=6.9, lift=0.08),
 )
 
 
 @pytest.fixture(scope="module")
 def model(short_line):
-    return CatenaryModel(dataclasses.replace(short_line, structure=OVER))
+    return CatenaryModel(dataclasses.replace(short_line, overbridge=OVER))
 
 
-def test_heights_and_encumbrance_under_a_structure(model):
-    room = structure_room(model, 100.0)
+def test_heights_and_encumbrance_under_a_bridge(model):
+    room = overbridge_room(model, 100.0)
     x, _, z = model.static.positions.T
     wide = (x > 119.9) & (x < 180.1)
     assert room.highest[0] == pytest.approx(z[wide].max(), abs=2e-3)
@@ -57,21 +57,21 @@ def test_a_force_lifts_the_messenger_wire_as_in_nodal_coordinates(model):
     assert expected.max() > 0.2 * elasticity(model, np.array([x]), force).value[0] * force
 
 
-def test_the_lift_is_the_largest_rise_under_the_structure(model):
-    room = structure_room(model, 100.0)
+def test_the_lift_is_the_largest_rise_under_the_bridge(model):
+    room = overbridge_room(model, 100.0)
     assert 0.02 < room.lift[0] < 0.06  # some of the 40 mm of the contact wire
-    twice = structure_room(model, 200.0)
+    twice = overbridge_room(model, 200.0)
     assert twice.lift[0] > room.lift[0]
 
 
 def test_wires_of_other_sections_count_and_none_beyond_their_ends(sections_maker, section_maker):
     line = sections_maker(section_maker(0.0, 4, [0.2, -0.2, 0.2]), section_maker(150.0, 4, [-0.2, 0.2, -0.2]))
-    over = [Structure(name=n, start=a, end=b, underside=8.0) for n, a, b in (("a", 10.0, 20.0), ("b", 160.0, 190.0))]
-    static = CatenaryModel(dataclasses.replace(line, structure=tuple(over))).static
+    over = [Overbridge(name=n, start=a, end=b, underside=8.0) for n, a, b in (("a", 10.0, 20.0), ("b", 160.0, 190.0))]
+    static = CatenaryModel(dataclasses.replace(line, overbridge=tuple(over))).static
     found = highest_wires(static, over)
     ends = [c.nodes for c in static.shape.mesh.chains if c.component == "messenger_wire"]
     at = [np.interp(x, *static.positions[nodes][:, [0, 2]].T) for nodes, x in ((ends[0], 10.0), (ends[0], 190.0))]
     assert found[0] == pytest.approx(at[0], abs=0.02)
     assert found[1] >= at[1] - 1e-9
-    beyond = (Structure(name="c", start=500.0, end=501.0, underside=8.0),)
+    beyond = (Overbridge(name="c", start=500.0, end=501.0, underside=8.0),)
     assert np.isnan(highest_wires(static, beyond)).all()

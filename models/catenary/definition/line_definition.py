@@ -13,6 +13,8 @@ from typing import Literal
 
 from models.catenary.definition.calculation_definition import Dynamics, Mesh
 from models.catenary.definition.condition_definition import Fault, Irregularity
+from models.catenary.definition.overbridge_definition import Overbridge
+from models.catenary.definition.surface_definition import RunningSurface
 from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.definition.track_definition import Track
 from models.catenary.definition.wind_definition import Wind
@@ -272,6 +274,8 @@ class Section:
         Specified heights of the contact wire, in place of nominal height minus pre-sag.
     periodic : bool
         Whether the last span ends at the support where the first begins.
+    length_errors : tuple of float or empty
+        What each dropper is longer than designed, in the order of the track [m].
     """
 
     supports: tuple[Support, ...]
@@ -279,6 +283,7 @@ class Section:
     ends: EndSpans
     measured: tuple[tuple[float, float], ...] = ()
     periodic: bool = False
+    length_errors: tuple[float, ...] = ()
 
     @property
     def inner_supports(self) -> tuple[Support, ...]:
@@ -346,6 +351,8 @@ class CatenaryDefinition:
     wind: Wind | None = part(Wind, default=None)
     irregularity: Irregularity = part(Irregularity, default=Irregularity())
     fault: tuple[Fault, ...] = ()
+    overbridge: tuple[Overbridge, ...] = ()
+    running_surface: RunningSurface | None = part(RunningSurface, default=None)
     extrapolation_order: int = count(
         "order of the extrapolation of the strip inside a step: 0 held, 1 velocity, 2 acceleration",
         default=2, minimum=0, maximum=2,

@@ -508,12 +508,16 @@ def _copy(options: argparse.Namespace) -> int:
 def _copy_profile(path: Path, copy: Path) -> None:
     """Have the running surface of a line go along with a copy of its definition."""
     from master.errors import RequestError
+    from master.safety.safe_files import write_atomically
     from models.library import definition_copy
 
     try:
-        definition_copy.copy_profile(path, copy)
+        wanted = definition_copy.profile_of_copy(path, copy)
     except definition_copy.CopyError as error:
         raise RequestError(str(error)) from error
+    if wanted is not None:
+        wanted[0].parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(*wanted, "another folder to work in")
 
 
 def _original(kind: Any, given: str, load: Callable[[str], Any]) -> tuple[Path, str, Any]:

@@ -33,8 +33,10 @@ def checked_name(name: str) -> str:
     return name
 
 
-def copy_profile(path: Path, copy: Path) -> None:
-    """Copy the file of a line's running surface, if it has one, to where a copy of the line's definition looks for it.
+def profile_of_copy(path: Path, copy: Path) -> tuple[Path, bytes] | None:
+    """Return where a copy of a line's definition looks for its running surface, and what must be there.
+
+    None if the line names no file for it, or that is there already.
 
     Parameters
     ----------
@@ -48,12 +50,13 @@ def copy_profile(path: Path, copy: Path) -> None:
     """
     source, target = named_profile(path), named_profile(copy)
     if source is None or target is None or source.resolve() == target.resolve():
-        return
+        return None
     data = source.read_bytes()
-    if target.exists() and target.read_bytes() != data:
+    if not target.exists():
+        return target, data
+    if target.read_bytes() != data:
         raise CopyError(f"{target} is there already, and is not {source}, the running surface of {path.stem}")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(data)
+    return None
 
 
 def renamed(text: str, name: str) -> str:

@@ -13,7 +13,7 @@ from fmus.builder.recipe import BuildError, fingerprint, recipe
 from fmus.builder.watched_places import watched_places
 from master.fmu import fmu_provision
 from models.library.catalogue import load_lumped
-from models.library.definition_copy import CopyError, copy_profile
+from models.library.definition_copy import CopyError, profile_of_copy
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
 from tests.fmus.support import Instance
 from tests.models.rigid_line import SPEED, amplitude, pressing, write_rigid_line
@@ -61,12 +61,13 @@ def test_another_profile_makes_another_fmu(line, fmu, tmp_path):
 def test_a_copy_of_a_definition_takes_the_profile_along(line, tmp_path):
     copy = tmp_path / "copy.toml"
     copy.write_text(line.read_text())
-    copy_profile(line, copy)
-    copy_profile(line, copy)
-    assert (tmp_path / "wave.csv").read_bytes() == (line.parent / "wave.csv").read_bytes()
+    target, data = profile_of_copy(line, copy)
+    assert (target, data) == (tmp_path / "wave.csv", (line.parent / "wave.csv").read_bytes())
+    target.write_bytes(data)
+    assert profile_of_copy(line, copy) is None
     (tmp_path / "wave.csv").write_text("position,height\n0,0\n1,0\n")
     with pytest.raises(CopyError, match=r"wave\.csv is there already, and is not .*wave\.csv, the running surface of"):
-        copy_profile(line, copy)
+        profile_of_copy(line, copy)
 
 
 def test_a_pantograph_presses_on_it_as_on_a_rigid_wave(fmu):

@@ -149,7 +149,11 @@ VERBS: Final[Mapping[str, Verb]] = {
         "static shape, droppers, elasticity and wave figures of a line",
         "models.commands.physics_verbs:add_statics",
         _MODELS,
-        ("statics LN2", "statics demo/lines/demo_LN2.toml --speed 250 --out statics"),
+        (
+            "statics LN2",
+            "statics demo/lines/demo_LN2.toml --speed 250 --out statics",
+            "statics CA160 --wind 29 --head 1950 --out statics",
+        ),
     ),
     "spans": Verb(
         "smallest radius for a span, largest span for a radius, in the wind",

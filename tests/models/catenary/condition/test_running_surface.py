@@ -34,6 +34,8 @@ def test_pieces_are_level_beyond_their_ends_and_add_up():
     both = RunningSurface((bump, worn))
     assert [both.height(x) for x in (0.0, 9.0, 10.0, 11.0, 20.0, 40.0)] == [0.0, -5e-4, 5e-4, -5e-4, -5e-4, 0.0]
     assert [both.slope(x) for x in (0.0, 9.0, 10.0, 11.0, 20.0, 30.0)] == [0.0] * 6
+    whole = both.whole()
+    assert [whole.at(x) for x in (0.0, 9.3, 10.4, 40.0)] == [pytest.approx(both.at(x)) for x in (0.0, 9.3, 10.4, 40.0)]
     x = np.linspace(7.0, 31.0, 2001)
     heights = np.array([both.height(v) for v in x])
     slopes = np.array([both.slope(v) for v in x])

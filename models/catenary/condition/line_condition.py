@@ -9,10 +9,11 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.catenary.condition.faults import active_faults, broken_droppers, slips
+from models.catenary.condition.fitted_lengths import checked_lengths, fitted_errors
 from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
 from models.catenary.condition.tensioning import WireTension, mast_sides, swing, tension_factors, wire_tensions
 from models.catenary.definition.line_definition import CatenaryDefinition
-from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_rest
+from models.catenary.shape.form_finding import StaticState, find_rest
 from models.catenary.shape.line_mesh import CatenaryMesh
 
 
@@ -43,6 +44,7 @@ def _differs(definition: CatenaryDefinition) -> bool:
     """Return whether a line has errors, faults or another temperature at all."""
     errors, tensioning = definition.irregularity, definition.tensioning
     changed = tensioning is not None and not tensioning.is_design
+    changed = changed or any(any(section.length_errors) for section in definition.sections)
     return bool(changed or errors.dropper_length_sigma or errors.support_height_sigma or active_faults(definition))
 
 
@@ -50,14 +52,7 @@ def _lengths(design: StaticState) -> FloatArray:
     """Return the unstrained lengths as found [m], shape (n_droppers,)."""
     definition, mesh = design.shape.definition, design.shape.mesh
     lengths = design.unstrained_length + dropper_length_errors(definition.irregularity, mesh) + slips(definition, mesh)
-    if (lengths <= 0.0).any():
-        worst = int(lengths.argmin())
-        x = mesh.points[mesh.droppers[worst, 0], 0]
-        raise EquilibriumError(
-            f"line '{definition.name}': errors and faults leave the dropper at {x:.2f} m a length of "
-            f"{lengths[worst]:.3g} m, of {design.unstrained_length[worst]:.3g} m in the design"
-        )
-    return lengths
+    return checked_lengths(design, lengths + fitted_errors(definition, mesh))
 
 
 def _held(design: StaticState, raised: FloatArray, wires: Sequence[WireTension]) -> FloatArray:

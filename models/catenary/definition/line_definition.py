@@ -272,6 +272,8 @@ class Section:
         Specified heights of the contact wire, in place of nominal height minus pre-sag.
     periodic : bool
         Whether the last span ends at the support where the first begins.
+    length_errors : tuple of float or empty
+        What each dropper is longer than designed, in the order of the track [m].
     """
 
     supports: tuple[Support, ...]
@@ -279,6 +281,7 @@ class Section:
     ends: EndSpans
     measured: tuple[tuple[float, float], ...] = ()
     periodic: bool = False
+    length_errors: tuple[float, ...] = ()
 
     @property
     def inner_supports(self) -> tuple[Support, ...]:

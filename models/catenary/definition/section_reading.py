@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
+from models.catenary.definition.as_built_reading import read_length_errors
 from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
 from models.catenary.definition.support_reading import listed_stagger, with_own_values
 from models.definition_files.toml_reader import Table
 
 #: Tables of a section.
-SECTION_TABLES: Final = ("spans", "stagger", "ends", "measured", "supports")
+SECTION_TABLES: Final = ("spans", "stagger", "ends", "measured", "supports", "as_built")
 #: Largest numbers of spans in a section, of droppers in a span and of droppers in a section.
 MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 
@@ -53,7 +54,7 @@ def read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
     if periodic and measured and abs(measured[-1][1] - measured[0][1]) > 1e-6:
         text = f"a periodic line ends as it begins: the last height must be the first, {measured[0][1]:g} m"
         table.problem("measured.heights", f"{text}, not {measured[-1][1]:g} m")
-    return Section(supports, spans, ends, measured, periodic)
+    return Section(supports, spans, ends, measured, periodic, read_length_errors(table, spans))
 
 
 def _span(start: float, end: float, droppers: _Hung, hangers: _Hung) -> Span:

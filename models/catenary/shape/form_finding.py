@@ -30,6 +30,7 @@ from models.catenary.shape.line_matrices import (
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.line_shape import LineShape, line_shape
+from models.catenary.shape.steady_arms import arms_without_side, carry_arms, pushing_arms, with_arms_turned
 from models.catenary.shape.wire_intervals import attachments
 
 #: Form finding has converged when no reference point moves by more than this [m].
@@ -97,17 +98,30 @@ class StaticState:
 def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState:
     """Find the dropper lengths for the specified contact-wire profile, or the profile for given lengths.
 
+    A steady arm whose side is not given, and which turns out to push, stands on the other side: each is turned once at
+    most, all that push together. On which side it pulls follows from the place of the wires, but for some 25 N that
+    bending and inclined droppers add.
+
     Returns
     -------
     StaticState
+        With the mesh of the sides on which the arms pull.
 
     Raises
     ------
     EquilibriumError
-        If a dropper would have to push to give the specified profile, if the equations are singular, or if the
-        iteration does not converge.
+        If a dropper would have to push to give the specified profile, or an arm on a side that is given or on both, if
+        the equations are singular, or if the iteration does not converge.
     """
-    return _settled(definition, mesh, mesh.points.copy(), None)
+    turnable = arms_without_side(definition)
+    while True:
+        state = _settled(definition, mesh, mesh.points.copy(), None)
+        turning = turnable & pushing_arms(state.shape, state.arm_force)
+        if not turning.any():
+            _check_arms(state.shape, state.arm_force)
+            return state
+        turnable &= ~turning
+        mesh = with_arms_turned(mesh, turning)
 
 
 def find_rest(design: StaticState, mesh: CatenaryMesh, points: FloatArray) -> StaticState:
@@ -175,7 +189,7 @@ def _settled(
         _straighten(mesh, points, move)
         points = points + move
         if design is None:
-            _carry_arms(mesh, points, move)
+            carry_arms(mesh, points, move)
         if design is not None or iteration >= _TAUT_ITERATIONS:
             slack = now_slack
     search = "form finding of" if design is None else "the search for the condition of"
@@ -234,11 +248,6 @@ def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> Non
     for chain in mesh.chains:
         fixed, x = held[chain.nodes], points[chain.nodes, 0]
         move[chain.nodes, 1] = np.interp(x, x[fixed], move[chain.nodes[fixed], 1])
-
-
-def _carry_arms(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
-    """Move the registration ends with the wire, so that the arms keep their angle and length."""
-    points[mesh.arms[:, 0], 2] += move[mesh.arms[:, 1], 2]
 
 
 @dataclass(frozen=True)
@@ -326,7 +335,8 @@ def _static_state(
         _check_tension(shape, force)
     uncut = None if design is None else design.shape.points
     arm_force = steady_arm_tension(shape.definition, shape.mesh, shape.points, displacement, uncut)
-    _check_arms(shape, arm_force)
+    if design is not None:
+        _check_arms(shape, arm_force)
     droppers = dropper_set(shape.definition, shape.mesh, _displaced(shape.points, displacement))
     stiffness, given = shape.droppers.stiffness, shape.mesh.given_length
     with np.errstate(invalid="ignore"):  # 0 / 0 of a broken dropper, whose length is given
@@ -367,13 +377,8 @@ def _check_tension(shape: LineShape, force: FloatArray) -> None:
 
 
 def _check_arms(shape: LineShape, force: FloatArray) -> None:
-    """Reject steady arms that push by more than their own weight, which says nothing about the pull of the wire."""
-    arm = shape.definition.steady_arm
-    if arm is None:
-        return
-    end, node = shape.mesh.arms.T
-    length = np.linalg.norm(shape.points[node] - shape.points[end], axis=1)
-    pushing = np.flatnonzero(force < -GRAVITY * arm.mass * length)
+    """Reject steady arms that push."""
+    pushing = np.flatnonzero(pushing_arms(shape, force))
     if pushing.size:
         x = shape.points[shape.mesh.arms[pushing, 1], 0]
         listed = ", ".join(

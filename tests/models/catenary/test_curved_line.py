@@ -130,8 +130,7 @@ def test_lines_of_every_kind_lie_in_curves(name):
 
 
 def test_a_ring_in_a_curve_repeats_itself(ring_maker):
-    """Constant radius and cant: after two spans of alternating stagger the line is the same again, also for a strip that
-    passes the place where it closes."""
+    """After two spans of alternating stagger the line is the same again, also for a strip where it closes."""
     ring = ring_maker(track={"positions": [[0.0], "m", "x"], "radius": [[1500], "m", "x"], "cant": [[50], "mm", "x"]})
     model = CatenaryModel(ring)
     force = model.static.arm_force
@@ -140,4 +139,4 @@ def test_a_ring_in_a_curve_repeats_itself(ring_maker):
     (points, pressed, drift, work), (before, pressed_before, _, _) = (passed(model, x, 300) for x in (492.5, 92.5))
     assert drift < 1e-12 * work
     np.testing.assert_allclose(pressed, pressed_before, rtol=1e-6)
-    np.testing.assert_allclose(points, before + [400.0, 0.0, 0.0], atol=1e-8)
+    np.testing.assert_allclose(points, before + np.array([400.0, 0.0, 0.0]), atol=1e-8)

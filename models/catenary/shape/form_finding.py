@@ -18,13 +18,15 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from models.arrays import BoolArray, FloatArray
-from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
+from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.dropper_conditions import DropperConditions, dropper_conditions
 from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set
 from models.catenary.shape.line_matrices import (
     Matrices,
     arm_load,
     axial_stiffness,
+    beam_properties,
     pendulum_stiffness,
     steady_arm_tension,
 )
@@ -163,6 +165,7 @@ def _settled(
     definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, design: StaticState | None
 ) -> StaticState:
     """Move reference points until the line is at rest about them: of the wanted form, or as a design has become."""
+    _check_wires(definition, mesh)
     movable = _movable(mesh, carries_arms=design is None)
     unstretched = np.zeros(mesh.fixed.shape)
     unstretched[:, :3] = movable
@@ -177,7 +180,7 @@ def _settled(
         stretch = axial_stiffness(definition, mesh, points, arms=design is None) @ sp.diags(unstretched.ravel())
         # Likewise the guides act on moves of the reference only, and vanish from the result with them.
         guides = _swing(shape, force, design) @ sp.diags(unstretched.ravel())
-        conditions = _conditions(shape, slack)
+        conditions = dropper_conditions(shape, slack)
         load = matrices.load if design is None else matrices.load + (guides - stretch) @ kept.ravel()
         displacement, force = _solve(shape, matrices.K - stretch + guides, conditions, load)
         move = np.where(movable, (displacement.reshape(-1, NODE_DOFS) - kept)[:, :3], 0.0)
@@ -250,41 +253,6 @@ def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> Non
         move[chain.nodes, 1] = np.interp(x, x[fixed], move[chain.nodes[fixed], 1])
 
 
-@dataclass(frozen=True)
-class _Conditions:
-    """The equation of every dropper: rows @ d - flexibility * N = right.
-
-    Attributes
-    ----------
-    rows : sparse, shape (n_droppers, 6 n)
-    flexibility, right : ndarray, shape (n_droppers,)
-    """
-
-    rows: sp.csr_matrix
-    flexibility: FloatArray
-    right: FloatArray
-
-
-def _conditions(shape: LineShape, slack: np.ndarray) -> _Conditions:
-    """Return the droppers' conditions: height of the lower end, or elongation of a given length by the force."""
-    mesh, droppers = shape.mesh, shape.droppers
-    lower = mesh.droppers[:, 0]
-    n = len(lower)
-    heights = sp.csr_matrix((np.ones(n), (np.arange(n), lower * NODE_DOFS + 2)), shape=(n, mesh.fixed.size))
-    given = ~np.isnan(mesh.given_length)
-    stiffness = np.where(slack, droppers.compression_ratio, 1.0) * droppers.stiffness
-    limp = given & (stiffness == 0.0)
-    stiffness[limp] = 1.0  # N / 1 = 0
-    rows = sp.diags(np.where(given, 0.0, 1.0)) @ heights
-    rows = rows + sp.diags(np.where(given & ~limp, 1.0, 0.0)) @ droppers.rows
-    too_short = np.where(limp, 0.0, np.nan_to_num(mesh.given_length) - droppers.length)
-    return _Conditions(
-        rows.tocsr(),
-        np.where(given, 1.0 / stiffness, 0.0),
-        np.where(given, too_short, mesh.target - shape.points[lower, 2]),
-    )
-
-
 def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
     """Return which droppers of given length are longer than the distance they span."""
     with np.errstate(invalid="ignore"):
@@ -293,7 +261,7 @@ def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
 
 
 def _solve(
-    shape: LineShape, K: sp.csc_matrix, conditions: _Conditions, load: FloatArray
+    shape: LineShape, K: sp.csc_matrix, conditions: DropperConditions, load: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], with R, D and right from the droppers' conditions."""
     mesh = shape.mesh
@@ -360,6 +328,23 @@ def weight(matrices: Matrices) -> float:
     up = np.zeros((matrices.load.size // NODE_DOFS, NODE_DOFS))
     up[:, 2] = 1.0
     return float(GRAVITY * (up.ravel() @ (matrices.M @ up.ravel())))
+
+
+def _check_wires(definition: CatenaryDefinition, mesh: CatenaryMesh) -> None:
+    """Reject wires without tension: beside a stitch wire, or where losses have taken it."""
+    tension = beam_properties(definition, mesh).tension
+    tension[mesh.component == COMPONENTS.index("steady_arm")] = np.inf
+    worst = int(tension.argmin())
+    if tension[worst] > 0.0:
+        return
+    name = COMPONENTS[mesh.component[worst]].replace("_", " ")
+    stitched = mesh.beside_stitch[worst]
+    why = "under a stitch wire, which takes its own tension from it," if stitched else "after its losses"
+    raise EquilibriumError(
+        f"line '{definition.name}': at {mesh.points[mesh.beams[worst, 0], 0]:.2f} m the {name} {why} has a tension of "
+        f"{tension[worst]:.0f} N: a wire must pull; "
+        + ("give the stitch wire less (stitch_wire.tension)" if stitched else "see tensioning")
+    )
 
 
 def _check_tension(shape: LineShape, force: FloatArray) -> None:

@@ -157,6 +157,18 @@ VERBS: Final[Mapping[str, Verb]] = {
         _MODELS,
         ("spans LN2 --wind 29 --limit 0.4", "spans CA160 --pressure 961 --head 1950 --stagger 0.2 0.2 --out spans"),
     ),
+    "import": Verb(
+        "make the definition of a line from its layout, tables as CSV or XLSX",
+        "models.commands.physics_verbs:add_import",
+        _MODELS,
+        ("import layout --out lines/station.toml", "import survey.xlsx --design LN2 --out lines/survey.toml"),
+    ),
+    "export": Verb(
+        "write the layout of a line, with the lengths of its droppers",
+        "models.commands.physics_verbs:add_export",
+        _MODELS,
+        ("export LN2 --out layout", "export lines/station.toml --out workshop --xlsx"),
+    ),
     "pantograph": Verb(
         "statics over height, modes, apparent mass of a pantograph",
         "models.commands.physics_verbs:add_pantograph",
@@ -252,6 +264,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
     known = {
         "scenario": scenario_place.scenario_names(),
         "line": lines,
+        "design": lines,
         "pantograph": pantographs,
         "like": (*lines, *pantographs),
         "name": [study.parent.stem for study in scenario_place.LIBRARY.glob("*.ssp/study.toml")],

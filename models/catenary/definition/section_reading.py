@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
+from models.catenary.definition.section_definition import EndSpans, Section, Span, Support
 from models.catenary.definition.support_reading import listed_stagger, with_own_values
 from models.definition_files.toml_reader import Table
 

@@ -35,6 +35,7 @@ _FORMS: Final = {
     "quantities": "list of values",
     "integer": "whole number",
     "text": "text",
+    "texts": "list of texts",
     "flag": "`true` or `false`",
     "table": "table",
     "required_table": "table",
@@ -223,7 +224,7 @@ def _fields(obj: Any, prefix: str) -> Iterator[tuple[str, str]]:
         value = getattr(obj, declared.name)
         spec = next((s for s in declared.metadata.values() if hasattr(s, "description")), None)
         if spec is not None:
-            yield prefix + declared.name, spec.description
+            yield prefix + declared.name.rstrip("_"), spec.description
         elif dataclasses.is_dataclass(value):
             yield from _fields(value, f"{prefix}{declared.name}.")
         elif isinstance(value, tuple):

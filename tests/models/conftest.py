@@ -15,8 +15,10 @@ from models.pantograph.lumped.lumped_definition import LumpedDefinition
 LIBRARY = Path(models.__file__).parent / "library"
 
 
-def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -> CatenaryDefinition:
-    """Return a simple line of LN2's wires with ``spans`` spans of 50 m; a change to None takes a table away."""
+def make_line(
+    spans: int | None = 6, alpha: float = 0.0272, length: float = 50.0, **changes: object
+) -> CatenaryDefinition:
+    """Return a simple line of LN2's wires with spans of 50 m or another length; a change to None takes a table away."""
     source = "test"
     data = {
         "name": "short",
@@ -29,7 +31,7 @@ def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -
         "spans": {
             "start": [0.0, "m", source],
             "count": spans,
-            "length": [50.0, "m", source],
+            "length": [length, "m", source],
             "droppers": {"first": [4.5, "m", source], "count": 7},
         },
         "stagger": {"amplitude": [0.2, "m", source]},

@@ -18,6 +18,7 @@ from models.catenary.condition.faults import (
     slips,
     tension_left,
 )
+from models.catenary.condition.fitted_lengths import checked_lengths, fitted_errors
 from models.catenary.condition.irregularities import dropper_length_errors, stagger_errors, support_height_errors
 from models.catenary.condition.tensioning import WireTension, mast_sides, swing, tension_factors, wire_tensions
 from models.catenary.definition.line_definition import CatenaryDefinition
@@ -59,6 +60,7 @@ def _differs(definition: CatenaryDefinition) -> bool:
     """Return whether a line has errors, faults or another temperature at all."""
     errors, tensioning = definition.irregularity, definition.tensioning
     changed = tensioning is not None and not tensioning.is_design
+    changed = changed or any(any(section.length_errors) for section in definition.sections)
     sigmas = (
         errors.dropper_length_sigma,
         errors.dropper_position_sigma,
@@ -72,14 +74,7 @@ def _lengths(design: StaticState) -> FloatArray:
     """Return the unstrained lengths as found [m], shape (n_droppers,)."""
     definition, mesh = design.shape.definition, design.shape.mesh
     lengths = design.unstrained_length + dropper_length_errors(definition.irregularity, mesh) + slips(definition, mesh)
-    if (lengths <= 0.0).any():
-        worst = int(lengths.argmin())
-        x = mesh.points[mesh.droppers[worst, 0], 0]
-        raise EquilibriumError(
-            f"line '{definition.name}': errors and faults leave the dropper at {x:.2f} m a length of "
-            f"{lengths[worst]:.3g} m, of {design.unstrained_length[worst]:.3g} m in the design"
-        )
-    return lengths
+    return checked_lengths(design, lengths + fitted_errors(definition, mesh))
 
 
 def _check_relieved(definition: CatenaryDefinition, mesh: CatenaryMesh) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
@@ -10,24 +11,32 @@ from pathlib import Path
 
 from models.catenary.definition.fault_reading import check_faults, read_faults
 from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition
+from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.section_definition import Section
 from models.catenary.definition.section_reading import SECTION_TABLES, read_section
+from models.catenary.definition.surface_reading import with_surface
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
 
 
-def load(path: Path) -> CatenaryDefinition:
+def load(path: Path, *, carried: bool = False) -> CatenaryDefinition:
     """Read a line's definition file.
+
+    Parameters
+    ----------
+    path : Path
+    carried : bool
+        Whether the files that it names lie beside it under the names that they have in an FMU.
 
     Raises
     ------
     DefinitionError
         With every mistake found in the file.
     """
-    return read(Table.load(path))
+    return read(Table.load(path), carried=carried)
 
 
-def read(table: Table) -> CatenaryDefinition:
+def read(table: Table, *, carried: bool = False) -> CatenaryDefinition:
     """Read a line's definition from a parsed table; raises ``DefinitionError``."""
     line = field_schema.read(CatenaryDefinition, table, sections=(), provenance=table.provenance)
     has_arms, has_hangers = line.steady_arm is not None, line.type == "compound"
@@ -36,10 +45,16 @@ def read(table: Table) -> CatenaryDefinition:
         _check_places(table)
     sections = tuple(read_section(t, has_arms=has_arms, has_hangers=has_hangers) for t in tables)
     faults = table.tables("fault")
-    definition = dataclasses.replace(line, sections=sections, fault=read_faults(faults))
+    overbridges = table.tables("overbridge")
+    over = tuple(field_schema.read(Overbridge, t) for t in overbridges)
+    definition = dataclasses.replace(line, sections=sections, fault=read_faults(faults), overbridge=over)
+    if line.running_surface is not None:
+        surface = with_surface(table, line.running_surface, carried=carried)
+        definition = dataclasses.replace(definition, running_surface=surface)
     for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track, _check_tensioning):
         check(table, definition)
     check_faults(faults, definition)
+    _check_overbridges(overbridges, definition)
     table.finish()
     return definition
 
@@ -150,6 +165,21 @@ def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:
     if definition.stitch_wire is not None:
         text = "a periodic line cannot have stitch wires: the one at its first support would lie across the seam"
         table.problem("stitch_wire", f"{text}; take type 'simple' or 'compound'")
+
+
+def _check_overbridges(tables: Sequence[Table], definition: CatenaryDefinition) -> None:
+    """Check that every bridge stands over the line, and no two have one name, by which verdicts call them."""
+    first = min((section.spans[0].start for section in definition.sections if section.spans), default=-math.inf)
+    last = max((section.spans[-1].end for section in definition.sections if section.spans), default=math.inf)
+    seen: dict[str, int] = {}
+    for number, (table, over) in enumerate(zip(tables, definition.overbridge, strict=True), 1):
+        if other := seen.get(over.name):
+            table.problem("name", f"'{over.name}' is that of overbridge[{other}] already: give it another one")
+        seen[over.name or f"overbridge[{number}]"] = number
+        mistaken = table.mistaken(("start", "end"))
+        for key, x in (("start", over.start), ("end", over.end)):
+            if key not in mistaken and not first <= x <= last:
+                table.problem(key, f"{x:g} m lies outside the line, {first:g} ... {last:g} m")
 
 
 def _check_type(table: Table, definition: CatenaryDefinition) -> None:

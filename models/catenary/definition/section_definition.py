@@ -37,7 +37,7 @@ class Support:
     """A support of the messenger wire; with a steady arm where the contact wire is registered.
 
     What is None is line-wide: of the profile, of the steady arms. The messenger wire is then above the contact wire,
-    and the arm on the side from which it pulls.
+    and the arm on the side from which it pulls. ``structure`` names the mast.
     """
 
     x: float
@@ -49,6 +49,7 @@ class Support:
     arm_length: float | None = None
     arm_angle: float | None = None
     arm_side: int | None = None
+    structure: str = ""
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,8 @@ class Section:
         Specified heights of the contact wire, in place of nominal height minus pre-sag.
     periodic : bool
         Whether the last span ends at the support where the first begins.
+    length_errors : tuple of float or empty
+        What each dropper is longer than designed, in the order of the track [m].
     """
 
     supports: tuple[Support, ...]
@@ -100,6 +103,7 @@ class Section:
     ends: EndSpans
     measured: tuple[tuple[float, float], ...] = ()
     periodic: bool = False
+    length_errors: tuple[float, ...] = ()
 
     @property
     def inner_supports(self) -> tuple[Support, ...]:

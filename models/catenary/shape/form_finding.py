@@ -118,7 +118,8 @@ def find_rest(design: StaticState, mesh: CatenaryMesh, points: FloatArray) -> St
     design : StaticState
         The line as designed: its arms have their lengths from there.
     mesh : CatenaryMesh
-        The design's, with the unstrained length of every dropper given; some may be broken, seats of supports moved.
+        The design's, with the unstrained length of droppers given; some may be broken, seats of supports moved. Where
+        no length is given the height of the lower end is, and the force is whatever holds it there, a push as well.
     points : ndarray, shape (n, 3)
         Points of the design, with what holds the line (supports, registration ends) where it is now [m].
 
@@ -128,6 +129,20 @@ def find_rest(design: StaticState, mesh: CatenaryMesh, points: FloatArray) -> St
         If an arm would have to push, if the equations are singular, or if the iteration does not converge.
     """
     return _settled(design.shape.definition, mesh, points.copy(), design)
+
+
+def rest_stiffness(static: StaticState) -> sp.csc_matrix:
+    """Return how a line at rest resists slow changes, shape (6 n, 6 n): its wires keep their tensions as they move.
+
+    Not symmetric: moves off the wires' axes stretch nothing. In motion, with the ends of the wires held, they do.
+    """
+    shape, mesh, droppers = static.shape, static.shape.mesh, static.droppers
+    moves = np.zeros(mesh.fixed.shape)
+    moves[:, :3] = _movable(mesh, carries_arms=False)
+    stretch = axial_stiffness(shape.definition, mesh, shape.points, arms=False) @ sp.diags(moves.ravel())
+    taut = np.where(static.is_slack, droppers.compression_ratio, 1.0) * droppers.stiffness
+    springs = droppers.rows.T @ sp.diags(taut) @ droppers.rows
+    return (shape.matrices.K - stretch + springs + static.pendulum_stiffness()).tocsc()
 
 
 def _settled(
@@ -307,7 +322,8 @@ def _swing(shape: LineShape, force: FloatArray, design: StaticState | None) -> s
 def _static_state(
     shape: LineShape, displacement: FloatArray, force: FloatArray, slack: np.ndarray, design: StaticState | None
 ) -> StaticState:
-    _check_tension(shape, force)
+    if design is None:
+        _check_tension(shape, force)
     uncut = None if design is None else design.shape.points
     arm_force = steady_arm_tension(shape.definition, shape.mesh, shape.points, displacement, uncut)
     _check_arms(shape, arm_force)

@@ -1,0 +1,4 @@
+"""Lines as others write them down: tables as CSV and XLSX, drawings as DXF; read, written, compared with measurements.
+
+Imports the definition files, the catenary and the library; never part of an FMU. `openpyxl` and `ezdxf` are extras.
+"""

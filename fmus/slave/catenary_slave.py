@@ -59,7 +59,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "loads on the wires at rest: offsets between supports are wrong by about (L/2R)^2/6 of themselves, lengths by "
         "y/R; no crossing of two tracks, no inertia of the curve along the track, radii of 150 m and more.",
         "Temperature and tensioning devices act on the line at rest, before the run; in it tensions stay.",
-        "No wind in a run, no wear that grows, no aerodynamic forces; no electrical model.",
+        "No wind in a run, no wear that goes on, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
         "definition.",
         "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: a strip meets the "

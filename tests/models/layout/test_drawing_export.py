@@ -67,8 +67,7 @@ def test_wires_are_chords_in_the_plan_of_a_curve(state):
     inside = (x >= 100.0) & (x <= 150.0)
     sag = 50.0**2 / (8.0 * RADIUS)
     assert arrow(bowed[inside]) == pytest.approx(sag, rel=0.05)
-    assert arrow(line[inside]) < 0.05 * sag
-    assert arrow(bowed[inside]) + arrow(line[inside]) == pytest.approx(sag, rel=0.005)
+    assert arrow(line[inside]) < 0.02 * sag
     (axis,) = points(space, "track")
     np.testing.assert_allclose(np.hypot(axis[:, 0], axis[:, 1] - RADIUS), RADIUS, atol=1e-6)
     assert arrow(axis) > 20.0

@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 
 from models.arrays import FloatArray, Snapshot
-from models.catenary.definition import line_definition, track_definition
+from models.catenary.definition import line_definition, section_definition, track_definition
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_set import dropper_set
@@ -31,6 +31,8 @@ from models.numerics.user_cache import keep_arrays, kept_arrays
 
 #: What of a static state is kept; its shape, its droppers and their matrices follow.
 _KEPT: Final = ("displacement", "dropper_force", "unstrained_length", "arm_force", "elastic_force")
+#: Modules of the definition whose rules a form follows.
+_DEFINING: Final = (line_definition, section_definition, track_definition)
 #: What libraries of linear algebra choose their code by, and with it how they round.
 _CHOICES: Final = ("OPENBLAS_CORETYPE", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -84,7 +86,10 @@ def _key(definition: CatenaryDefinition, mesh: CatenaryMesh) -> str:
     """Return a hash of definition, mesh, code, libraries and processor; empty where the code cannot be read."""
     whole = hashlib.sha256()
     try:
-        for path in (*sorted(Path(__file__).parent.glob("*.py")), *map(_source, (line_definition, track_definition))):
+        for path in (
+            *sorted(Path(__file__).parent.glob("*.py")),
+            *map(_source, (line_definition, section_definition, track_definition)),
+        ):
             whole.update(path.read_bytes())
     except OSError:
         return ""

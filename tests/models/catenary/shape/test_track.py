@@ -44,6 +44,7 @@ def string(line, track, *, spans=6, length=50.0, y=-0.2, z=5.08, elements=100):
         sprung=NO_NODES,
         seat=np.zeros(0),
         tension_factor=np.ones(count - 1),
+        area_factor=np.ones(count - 1),
         clamp_mass=np.zeros(count),
         support_nodes=np.arange(1, count - 1),  # every node, so that the reference follows the wire in plan
         arms=np.zeros((0, 2), dtype=np.int64),

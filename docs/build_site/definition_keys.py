@@ -212,7 +212,7 @@ def _fields(obj: Any, prefix: str) -> Iterator[tuple[str, str]]:
         value = getattr(obj, declared.name)
         spec = next((s for s in declared.metadata.values() if hasattr(s, "description")), None)
         if spec is not None:
-            yield prefix + declared.name, spec.description
+            yield prefix + declared.name.rstrip("_"), spec.description
         elif dataclasses.is_dataclass(value):
             yield from _fields(value, f"{prefix}{declared.name}.")
         elif isinstance(value, tuple):

@@ -11,22 +11,29 @@ from pathlib import Path
 from models.catenary.definition.condition_definition import Fault
 from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition, Section
 from models.catenary.definition.section_reading import SECTION_TABLES, read_section
+from models.catenary.definition.surface_reading import with_surface
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
 
 
-def load(path: Path) -> CatenaryDefinition:
+def load(path: Path, *, carried: bool = False) -> CatenaryDefinition:
     """Read a line's definition file.
+
+    Parameters
+    ----------
+    path : Path
+    carried : bool
+        Whether the files that it names lie beside it under the names that they have in an FMU.
 
     Raises
     ------
     DefinitionError
         With every mistake found in the file.
     """
-    return read(Table.load(path))
+    return read(Table.load(path), carried=carried)
 
 
-def read(table: Table) -> CatenaryDefinition:
+def read(table: Table, *, carried: bool = False) -> CatenaryDefinition:
     """Read a line's definition from a parsed table; raises ``DefinitionError``."""
     line = field_schema.read(CatenaryDefinition, table, sections=(), provenance=table.provenance)
     has_arms, has_hangers = line.steady_arm is not None, line.type == "compound"
@@ -37,6 +44,9 @@ def read(table: Table) -> CatenaryDefinition:
     faults = table.tables("fault")
     listed = tuple(field_schema.read(Fault, t) for t in faults)
     definition = dataclasses.replace(line, sections=sections, fault=listed)
+    if line.running_surface is not None:
+        surface = with_surface(table, line.running_surface, carried=carried)
+        definition = dataclasses.replace(definition, running_surface=surface)
     for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track, _check_tensioning):
         check(table, definition)
     _check_faults(faults, definition)

@@ -158,6 +158,8 @@ def check_design(definition: CatenaryDefinition) -> None:
         raise AsBuiltError(f"{name} closes on itself, which no line does that is measured: give the line with its ends")
     if any(section.length_errors for section in definition.sections):
         raise AsBuiltError(f"{name} has a table [as_built] already: give its design, without that table")
+    if definition.running_surface is not None:
+        raise AsBuiltError(f"{name} has a running surface of its own: give its design, without [running_surface]")
     errors = definition.irregularity
     if errors.dropper_length_sigma or errors.support_height_sigma or any(f.active for f in definition.fault):
         raise AsBuiltError(

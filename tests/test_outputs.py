@@ -39,6 +39,7 @@ WHOLE = {
     "master/report/film_file.py": {"write_film"},
     "master/fmu/kept_fingerprints.py": {"keep_answer"},
     "master/ssp/pack.py": {"pack"},
+    "models/commands/desk/inline_figure.py": {"inline_figure"},
     "models/commands/physics_files.py": {"write_atomically", "write_csv", "write_figure"},
     "models/layout/xlsx_sheets.py": {"workbook_bytes"},
     "models/numerics/kernel_cache.py": None,

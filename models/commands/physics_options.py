@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
@@ -71,6 +72,12 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
         table.add_row(*map(printable, row))
     # Without markup: "[m]" is a unit here.
     Console(width=None if Console().is_terminal else 100, markup=False).print(table)
+
+
+def shown_progress(values: Sequence[float], name: str, is_quiet: bool) -> Iterable[float]:
+    """Return values one by one, and show at a terminal how far that is; nothing of it is left at the end."""
+    console = Console(stderr=True)
+    return track(values, name, console=console, transient=True, disable=is_quiet or not console.is_terminal)
 
 
 def warn(texts: Iterable[str]) -> None:

@@ -36,7 +36,9 @@ def add_statics(verbs: Any) -> None:
         help="temperatures [degC] for a table of tensions, movements and sags, of a line with a table [tensioning]",
     )  # fmt: skip
     add_wind(parser)
-    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
+    text = "folder for the page (statics.html), tables (CSV) and plots (PNG)"
+    parser.add_argument("--out", type=Path, default=None, help=text)
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
     add_settings(parser)
     parser.set_defaults(run=_later("statics_command"))
 
@@ -54,7 +56,8 @@ def add_spans(verbs: Any) -> None:
         help="staggers at both ends of a span, positive to the outside of the curve [m]; may be given several times "
         "(default: the line's, alternating and not)",
     )  # fmt: skip
-    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and the plot (PNG)")
+    text = "folder for the page (spans.html), tables (CSV) and the plot (PNG)"
+    parser.add_argument("--out", type=Path, default=None, help=text)
     add_settings(parser)
     parser.set_defaults(run=_later("spans_command"))
 

@@ -68,6 +68,10 @@ def _heights(axes: Axes, result: LineStatics) -> None:
     _wires(axes, result, "z")
     s = result.supports
     axes.plot(s.x, s.height, "o", color=COLOURS["contact_wire"], markersize=3)
+    for number, over in enumerate(result.model.definition.overbridge, 1):
+        axes.hlines(over.underside, over.start, over.end, color="black", linewidth=3.0)
+        place = 0.5 * (over.start + over.end), over.underside
+        axes.annotate(str(number), place, xytext=(0, 3), textcoords="offset points", fontsize=8, ha="center")
     axes.set_ylabel("height above\nthe rail plane [m]")
     axes.legend(fontsize=8, ncols=4, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
 

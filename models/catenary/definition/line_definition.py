@@ -13,6 +13,7 @@ from typing import Literal
 
 from models.catenary.definition.calculation_definition import Dynamics, Mesh
 from models.catenary.definition.condition_definition import Fault, Irregularity
+from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.surface_definition import RunningSurface
 from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.definition.track_definition import Track
@@ -350,6 +351,7 @@ class CatenaryDefinition:
     wind: Wind | None = part(Wind, default=None)
     irregularity: Irregularity = part(Irregularity, default=Irregularity())
     fault: tuple[Fault, ...] = ()
+    overbridge: tuple[Overbridge, ...] = ()
     running_surface: RunningSurface | None = part(RunningSurface, default=None)
     extrapolation_order: int = count(
         "order of the extrapolation of the strip inside a step: 0 held, 1 velocity, 2 acceleration",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
@@ -10,6 +11,7 @@ from pathlib import Path
 
 from models.catenary.definition.condition_definition import Fault
 from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition, Section
+from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.section_reading import SECTION_TABLES, read_section
 from models.catenary.definition.surface_reading import with_surface
 from models.definition_files import field_schema
@@ -43,13 +45,16 @@ def read(table: Table, *, carried: bool = False) -> CatenaryDefinition:
     sections = tuple(read_section(t, has_arms=has_arms, has_hangers=has_hangers) for t in tables)
     faults = table.tables("fault")
     listed = tuple(field_schema.read(Fault, t) for t in faults)
-    definition = dataclasses.replace(line, sections=sections, fault=listed)
+    overbridges = table.tables("overbridge")
+    over = tuple(field_schema.read(Overbridge, t) for t in overbridges)
+    definition = dataclasses.replace(line, sections=sections, fault=listed, overbridge=over)
     if line.running_surface is not None:
         surface = with_surface(table, line.running_surface, carried=carried)
         definition = dataclasses.replace(definition, running_surface=surface)
     for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track, _check_tensioning):
         check(table, definition)
     _check_faults(faults, definition)
+    _check_overbridges(overbridges, definition)
     table.finish()
     return definition
 
@@ -173,6 +178,21 @@ def _check_faults(tables: Sequence[Table], definition: CatenaryDefinition) -> No
             table.problem(
                 "dropper", f"dropper {fault.dropper} of span {fault.span} has a fault already, fault[{other}]"
             )
+
+
+def _check_overbridges(tables: Sequence[Table], definition: CatenaryDefinition) -> None:
+    """Check that every bridge stands over the line, and no two have one name, by which verdicts call them."""
+    first = min((section.spans[0].start for section in definition.sections if section.spans), default=-math.inf)
+    last = max((section.spans[-1].end for section in definition.sections if section.spans), default=math.inf)
+    seen: dict[str, int] = {}
+    for number, (table, over) in enumerate(zip(tables, definition.overbridge, strict=True), 1):
+        if other := seen.get(over.name):
+            table.problem("name", f"'{over.name}' is that of overbridge[{other}] already: give it another one")
+        seen[over.name or f"overbridge[{number}]"] = number
+        mistaken = table.mistaken(("start", "end"))
+        for key, x in (("start", over.start), ("end", over.end)):
+            if key not in mistaken and not first <= x <= last:
+                table.problem(key, f"{x:g} m lies outside the line, {first:g} ... {last:g} m")
 
 
 def _missing_part(definition: CatenaryDefinition, fault: Fault) -> tuple[str, str] | None:

@@ -53,8 +53,7 @@ def heights(found: AsBuiltOutcome) -> Figure:
     for axes in panels:
         for d in b.deviations:
             if d is not None:
-                course = np.interp(d.x, d.knots, d.value) + d.left
-                axes.plot(d.x, mm * course, ".", color=_GREY, markersize=1.5, zorder=0, rasterized=len(d.x) > 5000)
+                axes.plot(d.x, mm * d.deviation, ".", color=_GREY, markersize=1.5, zorder=0, rasterized=len(d.x) > 5000)
         axes.plot([], [], ".", color=_GREY, label="measured")
         of = b.design.shape.mesh.section[b.design.shape.mesh.droppers[b.droppers, 0]]
         for section in np.unique(of):
@@ -96,4 +95,4 @@ def _rows(x: FloatArray) -> tuple[Figure, list[Axes]]:
 
 
 def _legend(axes: Axes) -> None:
-    axes.legend(fontsize=8, ncols=5, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+    axes.legend(fontsize=8, ncols=3, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)

@@ -15,8 +15,8 @@ from models.layout.as_built.as_built_outcome import AGREEMENT, AsBuiltOutcome
 
 #: Columns of what is printed and shown of a dropper.
 COLUMNS: Final = (
-    "span", "dropper", "x [m]", "error [mm]", "+- [mm]", "verdict", "change [mm]", "cut to [m]", "height, before [mm]",
-    "after [mm]", "force, before [N]", "after [N]",
+    "span", "dropper", "x [m]", "error [mm]", "std. error [mm]", "verdict", "change [mm]", "cut to [m]",
+    "height, before [mm]", "after [mm]", "force, before [N]", "after [N]",
 )  # fmt: skip
 #: Those that fit a terminal, by their places.
 PRINTED: Final = (0, 1, 2, 3, 4, 5, 6, 8, 9)
@@ -135,9 +135,10 @@ def _alignment(found: AsBuiltOutcome) -> str:
     a = found.built.alignment
     if not a.by:
         return "none: positions as they are (the run has neither staggers nor structures of the design)"
-    scale = f", longer by {1e2 * a.scale:+.4f} % ({a.scale * found.built.run.way:+.2f} m)" if a.scale else ""
+    scale = f", stretched by {1e2 * a.scale:+.4f} % ({a.scale * found.built.run.way:+.2f} m)" if a.scale else ""
     how = f", correlation {a.correlation:.4f}" if math.isfinite(a.correlation) else f", {len(a.design)} of them"
-    return f"by {a.by}: shifted by {a.shift:+.2f} m in its middle{scale}{how}"
+    sure = f" (+- {a.standard_error:.2f} m, by the heights)" if math.isfinite(a.standard_error) else ""
+    return f"by {a.by}: shifted by {a.shift:+.2f} m in its middle{sure}{scale}{how}"
 
 
 def _scatter(found: AsBuiltOutcome) -> Iterator[tuple[str, str]]:

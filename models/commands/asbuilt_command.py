@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from models.commands import as_built_plots, as_built_tables
+from models.commands.desk.as_built_page import page
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import check_folder, new_folder, print_table, warn
 from models.definition_files.parameter import ParameterError
@@ -44,14 +45,16 @@ def run(arguments: argparse.Namespace) -> int:
     allowed = Allowed(1e-3 * arguments.step, arguments.only, support_limits().shortest_dropper)
     with _progress(quiet=arguments.quiet) as tell:
         found = judge_as_built(definition, measured, 1e-3 * arguments.tolerance, allowed, tell)
-    warn(_doubts(found))
+    doubtful = tuple(_doubts(found))
+    warn(doubtful)
     print_table(f"{arguments.line} as built", ("quantity", "value"), as_built_tables.summary(found))
     if rows := as_built_tables.worst_rows(found):
         columns, *lines = ([row[k] for k in as_built_tables.PRINTED] for row in (as_built_tables.COLUMNS, *rows))
         print_table("Droppers beyond the tolerance", columns, lines)
     folder = new_folder(arguments.out)
     write(folder, found, design_path, measured.source)
-    print(f"definitions, tables, figures: {folder}")
+    write_text(folder / PAGE, page(found, str(design_path), doubtful))
+    print(f"page: {folder / PAGE}, with definitions, tables and figures beside it")
     return 0
 
 

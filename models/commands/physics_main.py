@@ -12,7 +12,9 @@ from models.commands.physics_options import show_log
 from models.commands.physics_verbs import (
     add_asbuilt,
     add_couple,
+    add_export,
     add_identify,
+    add_import,
     add_lanes,
     add_pantograph,
     add_spans,
@@ -25,7 +27,17 @@ from models.library.catalogue import UnknownNameError
 from models.numerics.kernel_cache import KernelError
 from models.pantograph.multibody.mechanism import MechanismError
 
-_VERBS = (add_couple, add_statics, add_spans, add_asbuilt, add_pantograph, add_identify, add_lanes)
+_VERBS = (
+    add_couple,
+    add_statics,
+    add_spans,
+    add_import,
+    add_export,
+    add_asbuilt,
+    add_pantograph,
+    add_identify,
+    add_lanes,
+)
 #: What a user can cause; everything else is a defect and keeps its traceback.
 _USER_ERRORS = (
     DefinitionError,

@@ -182,6 +182,29 @@ def add_couple(verbs: Any) -> None:
     parser.set_defaults(run=_later("couple_command"))
 
 
+def add_import(verbs: Any) -> None:
+    """Declare ``import``."""
+    parser = verbs.add_parser("import", help="make the definition of a line from its layout, tables as CSV or XLSX")
+    text = "folder of CSV files (supports, droppers, wires), or a workbook with these sheets (.xlsx)"
+    parser.add_argument("layout", type=Path, metavar="LAYOUT", help=text)
+    parser.add_argument("--design", metavar="LINE", help="line, by name or file, that gives what the layout does not")
+    text = "definition file to write; the line has its name"
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.toml", help=text)
+    parser.set_defaults(run=_later("import_command"))
+
+
+def add_export(verbs: Any) -> None:
+    """Declare ``export``."""
+    parser = verbs.add_parser("export", help="write the layout of a line, with the lengths of its droppers")
+    parser.add_argument("line", metavar="LINE", help="name in the library, or a definition file")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the tables (CSV)")
+    text = "write the tables as one workbook, LINE.xlsx (needs openpyxl: pip install 'openpanto[xlsx]')"
+    parser.add_argument("--xlsx", action="store_true", help=text)
+    text = "draw profile.dxf and plan.dxf as well (needs ezdxf: pip install 'openpanto[dxf]')"
+    parser.add_argument("--dxf", action="store_true", help=text)
+    parser.set_defaults(run=_later("export_command"))
+
+
 def add_lanes(verbs: Any) -> None:
     """Declare ``lanes``."""
     parser = verbs.add_parser("lanes", help="make many runs of one line side by side (a sweep's engine)")

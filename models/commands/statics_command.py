@@ -83,8 +83,8 @@ def _in_wind(result: LineStatics, arguments: argparse.Namespace) -> LineInWind:
 
 def _over_temperature(result: LineStatics, asked: Sequence[float], is_quiet: bool) -> LineOverTemperature:
     """Return the line at some temperatures [K]; at a terminal a bar shows how far that is."""
-    bar = shown_progress(asked, "temperatures", is_quiet)
-    return at_temperatures(result.model.definition, bar, result.section, result.waves.train_speed)
+    with shown_progress(asked, "temperatures", is_quiet) as one_by_one:
+        return at_temperatures(result.model.definition, one_by_one, result.section, result.waves.train_speed)
 
 
 def _asked(result: LineStatics, arguments: argparse.Namespace) -> Iterator[tuple[str, str]]:
@@ -199,7 +199,10 @@ def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
     arm = int(at[0])
     return [
         (f"steady arm at {result.span.start:g} m, lateral load [N]", f"{result.arms.lateral[arm]:.1f}"),
-        (f"steady arm at {result.span.start:g} m, lift by its tension [N]", f"{result.arms.lift[arm]:.1f}"),
+        (
+            f"steady arm at {result.span.start:g} m, lift by its tension [N]",
+            f"{round(result.arms.lift[arm], 1) + 0.0:.1f}",
+        ),
         (f"steady arm at {result.span.start:g} m, stiffness N/l [N/m]", f"{result.arms.pendulum[arm]:.1f}"),
     ]
 

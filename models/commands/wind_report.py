@@ -44,7 +44,7 @@ def summary(wind: LineInWind) -> list[tuple[str, str]]:
     ]
     if found.lift.size:
         arm = int(np.abs(found.lift).max(axis=1).argmax())
-        text = " and ".join(f"{1e3 * v:+.0f}" for v in found.lift[arm])
+        text = " and ".join(f"{round(1e3 * v):+d}" for v in found.lift[arm].tolist())
         result.append(("largest rise of the wire at an arm, wind to the left and to the right [mm]",
                        f"{text} at {found.arm_x[arm]:g} m"))  # fmt: skip
     return result

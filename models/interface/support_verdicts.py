@@ -102,6 +102,7 @@ def _clearance(name: str, state: str, left: float, own: float | None, norm: floa
 def _gradient_verdicts(
     supports: SupportLoads, steepness: FloatArray, gradients: tuple[GradientLimits, ...], speed: float
 ) -> Iterator[Judgement]:
+    sources = norm_sources("gradient")
     rows = (("steepest gradient", steepness, 1.0), ("largest change of gradient", supports.change, None))
     for what, values, share in rows:
         if not np.isfinite(values).any():
@@ -114,7 +115,7 @@ def _gradient_verdicts(
                 f"{1e3 * values[worst]:.2f} at {supports.x[worst]:g} m",
                 kept(is_kept=bool(values[worst] <= limit + _LEVEL)),
                 f"{1e3 * limit:g} at {3.6 * speed:g} km/h",
-                norm.name,
+                sources[norm.name],
             )
 
 

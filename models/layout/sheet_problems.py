@@ -51,14 +51,26 @@ class SheetProblems:
     def add(self, place: Place, text: str) -> None:
         """Record what is wrong at a place, once."""
         problem = Problem(self.file, str(place), text)
-        if problem not in self._seen:
-            self._seen.add(problem)
+        if problem not in self._places:
+            self._places[problem] = place
             self.found.append(problem)
 
+    def has(self, sheet: str) -> bool:
+        """Return whether a problem of a sheet has been recorded."""
+        return any(p.key == sheet or p.key.startswith(f"{sheet},") for p in self.found)
+
     def finish(self) -> None:
-        """Raise ``LayoutError`` with all problems, if there are any."""
-        if self.found:
-            raise LayoutError(tuple(self.found))
+        """Raise ``LayoutError`` with all problems, row after row of a sheet, if there are any."""
+        if not self.found:
+            return
+        sheets = list(dict.fromkeys(place.sheet for place in self._places.values()))
+        ordered = sorted(self._places.items(), key=lambda item: (sheets.index(item[1].sheet), *_order(item[1])))
+        raise LayoutError(tuple(problem for problem, _ in ordered))
 
     def __post_init__(self) -> None:
-        self._seen = set(self.found)
+        self._places: dict[Problem, Place] = {}
+
+
+def _order(place: Place) -> tuple[int, int, str]:
+    letters = place.column.partition(" ")[0]
+    return place.row, len(letters), letters

@@ -55,15 +55,16 @@ class Clearances:
 
 
 def norm_sources(name: str) -> dict[str, str]:
-    """Return where the numbers of a file of norms are from, by key.
+    """Return where the numbers of a file of norms are from, by key; of tables where their first list is, by name.
 
     Examples
     --------
-    >>> norm_sources("supports")["shortest_dropper"]
-    'ADIF: length of a dropper'
+    >>> norm_sources("supports")["shortest_dropper"], norm_sources("gradient")["IFE 6.3"]
+    ('ADIF: length of a dropper', 'Orden TMA/135/2023, IFE 6.3')
     """
-    whole = Table.load(LIBRARY / "norms" / f"{name}.toml")
-    return {key: str(entry[2]) for key, entry in whole.data.items() if isinstance(entry, list) and len(entry) > 2}
+    whole = Table.load(LIBRARY / "norms" / f"{name}.toml").data
+    found = {key: entry[2] for key, entry in whole.items() if isinstance(entry, list) and isinstance(entry[-1], str)}
+    return found | {table["name"]: table["speeds"][2] for table in whole.get("table", [])}
 
 
 def clearances() -> Clearances:

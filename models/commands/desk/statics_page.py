@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Span
 from models.catenary.shape.track import track_at
 from models.catenary.statics.rest_profile import Droppers
 from models.commands import route_plots, statics_plots, temperature_report, wind_report
@@ -72,8 +73,14 @@ def _parts(found: Found) -> Iterator[Part]:
     yield Part("verdicts", "Verdicts", (markup.verdicts(found.judgements),) if found.judgements else ())
     yield _figures(result)
     chart = inline_figure(route_plots.profile(result), "route", "track, plan, heights and gradients along the line")
-    remark = "Black: undersides of the bridges, by their number." if result.model.definition.overbridge else ""
-    yield Part("route", "Plan, profile and gradients", (markup.figure("The line along its track", chart, remark),))
+    remarks = []
+    if result.model.definition.overbridge:
+        remarks.append("Black: undersides of the bridges, by their number.")
+    if result.others:
+        remarks.append("Thin grey: the wires of other sections.")
+    yield Part(
+        "route", "Plan, profile and gradients", (markup.figure("The line along its track", chart, " ".join(remarks)),)
+    )
     yield Part("supports", "Supports", tuple(_supports(result)))
     yield Part("overbridges", "Bridges over the line", tuple(_overbridges(result)))
     yield Part("span", f"Span {result.number} in detail", tuple(_span(result)))
@@ -280,4 +287,4 @@ def _sheet(d: Droppers, spans: Sequence[Span]) -> Iterator[tuple[str, ...]]:
 
 
 def _cell(value: float, digits: int) -> str:
-    return NOTHING if math.isnan(value) else f"{value:.{digits}f}"
+    return NOTHING if math.isnan(value) else f"{round(float(value), digits) + 0.0:.{digits}f}"

@@ -7,7 +7,7 @@ staggers do, which are laid on the design's so that they correlate best.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -24,7 +24,9 @@ LARGEST_SCALE: Final = 0.002
 #: Staggers that correlate less lie on no line that is meant.
 LEAST_CORRELATION: Final = 0.8
 #: A span may differ by this share from the design's, as structures are seen from a running vehicle.
-_LARGEST_STRETCH: Final = 0.02
+_LARGEST_STRETCH: Final = 0.03
+#: Structures whose places are straight within this need no course of their own between them [m]: so well they are seen.
+_SEEN: Final = 0.6
 #: Staggers are compared at places this far apart [m]; two fits farther apart than _APART are two.
 _GRID: Final = 0.5
 _APART: Final = 10.0
@@ -49,12 +51,15 @@ class Alignment:
         Pairs, in rising order [m]; one pair is a shift alone, none leaves positions as they are.
     correlation : float
         Of the staggers; NaN if they were not used.
+    standard_error : float
+        Of the positions, as far as scattering heights leave them open [m]; NaN if heights did not take part.
     """
 
     by: str
     measured: FloatArray
     design: FloatArray
     correlation: float = float("nan")
+    standard_error: float = float("nan")
 
     def position(self, x: FloatArray) -> FloatArray:
         """Return the design's positions of places of the run, shape (n,) [m]."""
@@ -65,6 +70,17 @@ class Alignment:
         k = np.clip(np.searchsorted(self.measured, x, side="right") - 1, 0, len(self.measured) - 2)
         slope = np.diff(self.design) / np.diff(self.measured)
         return np.asarray(self.design[k] + slope[k] * (x - self.measured[k]))
+
+    def moved(self, shift: float, scale: float, standard_error: float) -> Alignment:
+        """Return the same with design positions shifted [m], and stretched about their middle, by a little more."""
+        middle = 0.5 * (self.design[0] + self.design[-1])
+        design = self.design + shift + scale * (self.design - middle)
+        return replace(self, design=design, standard_error=standard_error)
+
+    @property
+    def is_straight(self) -> bool:
+        """Return whether it is one shift and one scale for all of the run."""
+        return len(self.measured) == 2
 
     @property
     def shift(self) -> float:
@@ -119,6 +135,11 @@ def _by_structures(run: MeasuredRun, known: dict[str, float]) -> Alignment:
                 f"{run.source}: from structure '{a}' to '{b}' it is {way:.2f} m, and {wanted:.2f} m in the design: "
                 "correct the positions or the names"
             )
+    ends = measured[[0, -1]]
+    if len(names) > 2:
+        line = np.polynomial.Polynomial.fit(measured, design, 1)
+        if np.abs(line(measured) - design).max() <= _SEEN:
+            return Alignment("structures", ends, line(ends))
     return Alignment("structures", measured, design)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,7 +17,7 @@ from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.statics.dropper_influence import dropper_influence
-from models.catenary.statics.wire_course import WireCourse, section_alone, wire_courses
+from models.catenary.statics.wire_course import HeldShapes, WireCourse, held_shapes, section_alone, wire_courses
 from models.layout.as_built.alignment import Alignment, align
 from models.layout.as_built.measured_run import AsBuiltError, MeasuredRun
 from models.layout.as_built.wire_deviation import WireDeviation, wire_deviation
@@ -28,6 +28,11 @@ _ANOTHER_LINE: Final = 0.3
 COMPARED: Final = 0.0101
 #: Near a slack dropper heights do not follow lengths in proportion [m].
 _NEAR: Final = 120.0
+#: How often the alignment is refined by the heights, and the farthest that this may move a row [m].
+_REFINED: Final = 2
+_FARTHEST: Final = 1.0
+#: Heights whose equations are worse than this say nothing of the positions.
+_BLIND: Final = 1e8
 #: Droppers that carry more are not slack, however the heights were measured [N].
 _LIGHT: Final = 30.0
 #: Rows solved for at a time.
@@ -115,8 +120,13 @@ def find_as_built(definition: CatenaryDefinition, run: MeasuredRun, tell: Tell =
     design = kept_form(definition, build_mesh(definition))
     courses = wire_courses(design)
     tell("alignment", 0, 1)
+    held = [held_shapes(design, s, _held_nodes(design, s)) for s in range(len(courses))]
     alignment = align(run, definition, courses)
-    deviations = tuple(_deviations(design, run, alignment.position(run.position), courses))
+    deviations = tuple(_deviations(design, run, alignment.position(run.position), courses, held))
+    for _ in range(_REFINED):
+        if (way := _way(alignment, deviations, courses)) is not None:
+            alignment = _moved(alignment, way)
+            deviations = tuple(_deviations(design, run, alignment.position(run.position), courses, held))
     droppers = np.concatenate([droppers_along(design.shape.mesh, s) for s in range(len(courses))])
     lower = design.shape.mesh.droppers[droppers, 0]
     x, wanted = design.positions[lower, 0], design.positions[lower, 2]
@@ -144,7 +154,7 @@ def find_as_built(definition: CatenaryDefinition, run: MeasuredRun, tell: Tell =
         wanted=wanted,
         height=height,
         error=error,
-        uncertainty=_uncertainty(deviations, section, x, error, influence, tell),
+        uncertainty=_uncertainty(deviations, _way(alignment, deviations, courses), section, x, error, influence, tell),
         is_slack=fitted.is_slack[droppers] | _nearly_slack(fitted.state, deviations, droppers, measured),
         influence=influence,
         difference=_difference(height - wanted, error, x, fitted.is_slack[droppers], influence),
@@ -173,7 +183,11 @@ def check_design(definition: CatenaryDefinition) -> None:
 
 
 def _deviations(
-    design: StaticState, run: MeasuredRun, x: FloatArray, courses: tuple[WireCourse, ...]
+    design: StaticState,
+    run: MeasuredRun,
+    x: FloatArray,
+    courses: tuple[WireCourse, ...],
+    held: Sequence[HeldShapes],
 ) -> Iterator[WireDeviation | None]:
     """Yield how far the measured wire is from the design's, section by section, where a wire is alone."""
     which = np.where(np.isfinite(run.height), section_alone(courses, x), -1)
@@ -195,7 +209,63 @@ def _deviations(
                 f"{run.source}: the heights differ by {typical:+.2f} m from those of the design: is this the line, and "
                 "are they metres above the rails?"
             )
-        yield wire_deviation(x[here], deviation, _knots(design, index, course))
+        yield wire_deviation(x[here], deviation, held[index].knots, held[index].at(x[here]))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """How errors of the positions enter: a shift and a stretch about the middle, both in metres (at the ends).
+
+    Attributes
+    ----------
+    courses : tuple of ndarray, shape (k, 2), or None
+        What a metre of each adds to the courses of the sections' wires [m].
+    found : ndarray, shape (2,)
+        What heights say of them [m].
+    covariance : ndarray, shape (2, 2)
+        [m^2].
+    """
+
+    courses: tuple[FloatArray | None, ...]
+    found: FloatArray
+    covariance: FloatArray
+
+
+def _way(
+    alignment: Alignment, deviations: tuple[WireDeviation | None, ...], courses: tuple[WireCourse, ...]
+) -> _Way | None:
+    """Return what the heights say of the positions: where the wire has its kinks, beside where its droppers are.
+
+    A row that was taken a little too far back shows the height there plus the way times the slope of the wire, whose
+    jumps at the droppers no change of lengths explains.
+    """
+    if not alignment.is_straight:
+        return None
+    middle, half = 0.5 * (alignment.design[0] + alignment.design[-1]), 0.5 * np.ptp(alignment.design)
+    explained: list[FloatArray | None] = []
+    normal, right, sigma = np.zeros((2, 2)), np.zeros(2), []
+    for deviation, course in zip(deviations, courses, strict=True):
+        if deviation is None or not np.isfinite(deviation.sigma):
+            explained.append(None)
+            continue
+        slope = course.slope(deviation.x)
+        own, rest = deviation.course_of(np.stack([slope, slope * (deviation.x - middle) / half], axis=1))
+        explained.append(own)
+        normal += rest.T @ rest
+        right += rest.T @ deviation.left
+        sigma.append(deviation.sigma)
+    if not sigma or np.linalg.cond(normal) > _BLIND:
+        return None
+    covariance = float(np.mean(sigma)) ** 2 * np.asarray(np.linalg.inv(normal), dtype=np.float64)
+    return _Way(tuple(explained), np.asarray(np.linalg.solve(normal, right), dtype=np.float64), covariance)
+
+
+def _moved(alignment: Alignment, way: _Way) -> Alignment:
+    """Return the alignment with what the heights say of it, unless that is far."""
+    shift, stretch = way.found.tolist()
+    if max(abs(shift), abs(stretch)) > _FARTHEST:
+        return alignment
+    return alignment.moved(shift, stretch / (0.5 * np.ptp(alignment.design)), float(np.sqrt(way.covariance[0, 0])))
 
 
 def worn_depth(definition: CatenaryDefinition, run: MeasuredRun) -> FloatArray:
@@ -218,13 +288,13 @@ def worn_depth(definition: CatenaryDefinition, run: MeasuredRun) -> FloatArray:
     return np.asarray(definition.contact_wire.diameter - thickness)
 
 
-def _knots(design: StaticState, section: int, course: WireCourse) -> FloatArray:
-    """Return where something holds the contact wire of a section: droppers, arms, anchors [m]."""
-    mesh: CatenaryMesh = design.shape.mesh
-    nodes = np.concatenate([mesh.droppers[droppers_along(mesh, section), 0], _arm_nodes(mesh, section)])
-    places = np.concatenate([design.positions[nodes, 0], course.x[[0, -1]]])
-    places.sort()
-    return places[np.append(True, np.diff(places) > 1e-3)]
+def _held_nodes(design: StaticState, section: int) -> IntArray:
+    """Return the nodes where something holds the contact wire of a section, along the track, its ends among them."""
+    mesh = design.shape.mesh
+    ends = mesh.contact_chains()[section].nodes[[0, -1]]
+    hung = mesh.droppers[droppers_along(mesh, section), 0]
+    nodes = np.unique(np.concatenate([hung, _arm_nodes(mesh, section), ends]))
+    return np.asarray(nodes[np.argsort(design.positions[nodes, 0], kind="stable")])
 
 
 def _arm_nodes(mesh: CatenaryMesh, section: int) -> IntArray:
@@ -250,13 +320,14 @@ def _nearest(knots: FloatArray, x: FloatArray) -> IntArray:
 
 def _uncertainty(
     deviations: tuple[WireDeviation | None, ...],
+    way: _Way | None,
     section: IntArray,
     x: FloatArray,
     error: FloatArray,
     influence: sp.csc_matrix,
     tell: Tell,
 ) -> FloatArray:
-    """Return the standard errors of the lengths [m], shape (k,): those of the heights through J^-1.
+    """Return the standard errors of the lengths [m], shape (k,): those of heights and positions through J^-1.
 
     Droppers that were not measured have errors like the others', which reach a little into the heights beside them.
     """
@@ -277,7 +348,11 @@ def _uncertainty(
             through = inverse.solve(unit)
             rows[:, knots] = through.T
             others = usual * np.sum((from_others @ through) ** 2, axis=0)
-            result[here[some]] = np.sqrt(deviation.covariance(rows) + others)
+            variance = deviation.covariance(rows) + others
+            if way is not None and (own := way.courses[index]) is not None:
+                by_way = rows @ own
+                variance += np.einsum("ma,ab,mb->m", by_way, way.covariance, by_way)
+            result[here[some]] = np.sqrt(variance)
             tell("uncertainty", int(here[some[-1]]) + 1, len(x))
     return result
 

@@ -1,18 +1,18 @@
-"""How far the measured wire is from the designed one: a straight course between droppers and arms, and what is left.
+"""How far the measured wire is from the designed one: what droppers and arms have done, and what is left.
 
 What moves a wire against its design acts at droppers, arms and anchors. Between these its load is the design's, so that
-the difference is straight there. It is fitted to all measured heights by least squares, which gives it at each knot
-with a standard error, and leaves noise and the wire's own unevenness.
+the difference is straight there, but for the wire's bending. Such a course is fitted to all measured heights by least
+squares, which gives it at each knot with a standard error, and leaves noise and the wire's own unevenness.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import solveh_banded
+from scipy.sparse.linalg import splu
 
 from models.arrays import BoolArray, FloatArray
 from models.layout.as_built.measured_run import AsBuiltError
@@ -26,6 +26,8 @@ _FAR: Final = 0.02
 _MANY: Final = 8.0
 #: A normal deviation that half of the samples are within, over their median.
 _MEDIAN_TO_SIGMA: Final = 1.4826
+#: Knots whose errors are computed at a time.
+_AT_A_TIME: Final = 64
 
 
 @dataclass(frozen=True)
@@ -35,27 +37,29 @@ class WireDeviation:
     Attributes
     ----------
     knots, value : ndarray, shape (k,)
-        Places along the track, and the straight course there [m].
+        Places along the track, and the course there [m].
     error : ndarray, shape (k,)
         Standard error of ``value`` for a standard deviation of 1 m of a height.
-    x, left : ndarray, shape (n,)
-        Measured places, and what is left there [m].
+    x, deviation, left : ndarray, shape (n,)
+        Measured places, the deviation there, and what the course leaves of it [m].
     is_outlier : ndarray, shape (n,)
         Heights that were left out.
     sigma : float
         Standard deviation of a height about the course [m]; NaN if there are no more heights than knots.
-    normal : ndarray, shape (2, k)
-        The equations' matrix in banded form, of which ``sigma``^2 times the inverse is the covariance of ``value``.
     """
 
     knots: FloatArray
     value: FloatArray
     error: FloatArray
     x: FloatArray
+    deviation: FloatArray
     left: FloatArray
     is_outlier: BoolArray
     sigma: float
-    normal: FloatArray
+    #: The wire's shapes at the places that count, and the factor of the equations: the inverse of their matrix times
+    #: ``sigma``^2 is the covariance of ``value``.
+    _shapes: sp.csr_matrix = field(repr=False, compare=False)
+    _factor: Any = field(repr=False, compare=False)
 
     @property
     def is_measured(self) -> BoolArray:
@@ -76,6 +80,15 @@ class WireDeviation:
         count = max(int((~self.is_outlier).sum()), 1)
         return self.likeness <= 3.0 / np.sqrt(count)
 
+    def course_of(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the courses, shape (k, m), of some quantities at the measured places, shape (n, m), and what is left.
+
+        Both as of heights: without outliers.
+        """
+        counted = np.where(self.is_outlier[:, None], 0.0, columns)
+        courses = np.asarray(self._factor.solve(np.asarray(self._shapes.T @ counted)))
+        return courses, np.asarray(counted - self._shapes @ courses)
+
     def covariance(self, rows: FloatArray) -> FloatArray:
         """Return the variances of sums of ``value`` [m^2], shape (m,), with the weights ``rows``, shape (m, k).
 
@@ -83,19 +96,20 @@ class WireDeviation:
         """
         alike = 0.0 if self.is_noise else min(self.likeness, 0.95)
         variance = self.sigma**2 * (1.0 + alike) / (1.0 - alike)
-        solved = solveh_banded(self.normal, rows.T, lower=False)
-        return np.asarray(variance * np.einsum("mk,km->m", rows, solved))
+        return np.asarray(variance * np.einsum("mk,km->m", rows, self._factor.solve(np.ascontiguousarray(rows.T))))
 
 
-def wire_deviation(x: FloatArray, deviation: FloatArray, knots: FloatArray) -> WireDeviation:
-    """Fit a course that is straight between knots to heights above the design's.
+def wire_deviation(x: FloatArray, deviation: FloatArray, knots: FloatArray, shapes: sp.csr_matrix) -> WireDeviation:
+    """Fit a course to heights above the design's.
 
     Parameters
     ----------
     x, deviation : ndarray, shape (n,)
         Places in rising order, and measured minus designed height [m].
     knots : ndarray, shape (k,)
-        In rising order; heights are between the first and the last of them.
+        In rising order.
+    shapes : sparse, shape (n, k)
+        Of the wire at the places, by unit rises at the knots.
 
     Raises
     ------
@@ -105,51 +119,30 @@ def wire_deviation(x: FloatArray, deviation: FloatArray, knots: FloatArray) -> W
     if not len(x):
         raise AsBuiltError("no measured height lies on the line")
     outlier = np.zeros(len(x), dtype=np.bool_)
-    hats = _hats(x, knots)
     value = left = np.zeros(0)
-    normal = np.zeros((2, len(knots)))
+    factor, kept = None, shapes
     for _ in range(3):
-        kept = sp.diags((~outlier).astype(float)) @ hats
-        normal = _banded((kept.T @ kept).tocsr())
-        value = solveh_banded(normal, kept.T @ deviation, lower=False)
-        left = deviation - hats @ value
+        kept = sp.diags((~outlier).astype(float)) @ shapes
+        factor = splu(sp.csc_matrix(kept.T @ kept + _HOLD * sp.identity(len(knots))))
+        value = factor.solve(np.asarray(kept.T @ deviation))
+        left = deviation - shapes @ value
         spread = _MEDIAN_TO_SIGMA * float(np.median(np.abs(left[~outlier])))
         now = np.abs(left) > max(_FAR, _MANY * spread)
         if np.array_equal(now, outlier) or now.all():
             break
         outlier = now
-    error = np.sqrt(_diagonal_of_inverse(normal))
+    error = np.sqrt(_diagonal_of_inverse(factor, len(knots)))
     held = int((error <= _LARGEST_ERROR).sum())
     free = int((~outlier).sum()) - held
     sigma = float(np.sqrt(left[~outlier] @ left[~outlier] / free)) if free > 0 else float("nan")
-    return WireDeviation(knots, value, error, x, left, outlier, sigma, normal)
+    return WireDeviation(knots, value, error, x, deviation, left, outlier, sigma, sp.csr_matrix(kept), factor)
 
 
-def _hats(x: FloatArray, knots: FloatArray) -> sp.csr_matrix:
-    """Return the shares of the knots on both sides in the straight course at each place, shape (n, k)."""
-    before = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(knots) - 2)
-    share = (x - knots[before]) / (knots[before + 1] - knots[before])
-    rows = np.repeat(np.arange(len(x)), 2)
-    columns = np.stack([before, before + 1], axis=1).ravel()
-    values = np.stack([1.0 - share, share], axis=1).ravel()
-    return sp.csr_matrix((values, (rows, columns)), shape=(len(x), len(knots)))
-
-
-def _banded(matrix: sp.csr_matrix) -> FloatArray:
-    """Return a tridiagonal matrix as the solver wants it, knots without heights held by a little."""
-    n = matrix.shape[0]
-    result = np.zeros((2, n))
-    result[1] = matrix.diagonal() + _HOLD
-    result[0, 1:] = matrix.diagonal(1)
+def _diagonal_of_inverse(factor: Any, count: int) -> FloatArray:
+    result = np.empty(count)
+    for start in range(0, count, _AT_A_TIME):
+        some = np.arange(start, min(start + _AT_A_TIME, count))
+        unit = np.zeros((count, len(some)))
+        unit[some, np.arange(len(some))] = 1.0
+        result[some] = factor.solve(unit)[some, np.arange(len(some))]
     return result
-
-
-def _diagonal_of_inverse(banded: FloatArray) -> FloatArray:
-    """Return the diagonal of the inverse of a symmetric tridiagonal matrix: from the pivots from both ends."""
-    beside, diagonal = banded[0, 1:], banded[1]
-    n = len(diagonal)
-    down, up = diagonal.copy(), diagonal.copy()
-    for k in range(1, n):
-        down[k] -= beside[k - 1] ** 2 / down[k - 1]
-        up[n - 1 - k] -= beside[n - 1 - k] ** 2 / up[n - k]
-    return np.asarray(1.0 / (down + up - diagonal))

@@ -52,8 +52,26 @@ def test_the_summary_can_be_read_whatever_a_bridge_is_called(statics_folder):
 
 
 def test_progress_is_for_terminals(capsys):
-    assert [*shown_progress([1.0, 2.0], "temperatures", is_quiet=False)] == [1.0, 2.0]
+    with shown_progress([1.0, 2.0], "temperatures", is_quiet=False) as one_by_one:
+        assert [*one_by_one] == [1.0, 2.0]
     assert capsys.readouterr() == ("", "")
+
+
+def test_the_bar_is_gone_before_an_error_is_told(capsys, monkeypatch):
+    """At a terminal it is wiped away, and with it the line above, if that came first."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+
+    def interrupted():
+        with shown_progress([1.0], "temperatures", is_quiet=False) as one_by_one:
+            for _ in one_by_one:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as kept:
+        interrupted()
+    drawn = capsys.readouterr().err
+    assert "temperatures" in drawn
+    del kept
+    assert capsys.readouterr().err == ""
 
 
 def test_an_interrupted_list_of_temperatures_leaves_no_half_results(capsys, monkeypatch, tmp_path):

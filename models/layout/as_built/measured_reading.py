@@ -50,6 +50,9 @@ def read_measured_run(path: Path) -> MeasuredRun:
 
 
 def _grid(path: Path, problems: SheetProblems) -> SheetGrid | None:
+    if path.exists() and not path.is_file():
+        problems.add(Place(""), "is no file: name the table with the run, CSV or XLSX")
+        return None
     if path.suffix.lower() not in (".xlsx", ".xlsm"):
         return read_csv(path, "", problems)
     sheets = read_xlsx(path, problems)

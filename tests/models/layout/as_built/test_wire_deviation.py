@@ -31,17 +31,17 @@ def test_heights_without_noise_give_the_course():
 
 
 def test_errors_are_those_of_many_runs():
-    """Of the values, and of sums of them with any weights, against the scatter of 400 runs with noise of 1 mm."""
+    """Of the values, and of sums of them with any weights, against the scatter of 100 runs with noise of 1 mm."""
     rng = np.random.default_rng(3)
     rows = rng.standard_normal((3, len(KNOTS)))
-    runs = [fitted(X, course(X) + 1e-3 * rng.standard_normal(len(X))) for _ in range(400)]
+    runs = [fitted(X, course(X) + 1e-3 * rng.standard_normal(len(X))) for _ in range(100)]
     values = np.array([run.value for run in runs])
     assert np.mean([run.sigma for run in runs]) == pytest.approx(1e-3, rel=0.02)
-    assert values.mean(axis=0) == pytest.approx(VALUE, abs=2e-4)
-    assert values.std(axis=0) == pytest.approx(1e-3 * runs[0].error, rel=0.15)
+    assert values.mean(axis=0) == pytest.approx(VALUE, abs=3e-4)
+    assert values.std(axis=0) == pytest.approx(1e-3 * runs[0].error, rel=0.25)
     stated = np.mean([run.covariance(rows) for run in runs if run.is_noise], axis=0)
-    assert (values @ rows.T).var(axis=0) == pytest.approx(stated, rel=0.25)
-    assert sum(run.is_noise for run in runs) > 390
+    assert (values @ rows.T).var(axis=0) == pytest.approx(stated, rel=0.4)
+    assert sum(run.is_noise for run in runs) > 96
 
 
 def test_a_knot_in_a_gap_is_not_measured():

@@ -92,6 +92,7 @@ ONLY_IN = {
     "matplotlib": lambda name: name.startswith(
         ("models.commands.", "models.layout.", "master.report.", "master.interface.")
     ),
+    "ezdxf": lambda name: name == "models.layout.drawing_export",
     "openpyxl": lambda name: name == "models.layout.xlsx_sheets",
     "pandas": lambda name: name.startswith(("models.interface.", "master.interface.")),
 }

@@ -8,6 +8,7 @@ from pathlib import Path
 from models.commands.physics_files import write_atomically, write_text
 from models.commands.physics_options import check_folder, new_folder, warn
 from models.definition_files.parameter import ParameterError
+from models.layout.drawing_export import plan_drawing, profile_drawing
 from models.layout.layout_export import ExportedLine, csv_text, export_line
 from models.layout.layout_sheets import SHEETS
 from models.layout.xlsx_sheets import workbook_bytes
@@ -21,6 +22,8 @@ def run(arguments: argparse.Namespace) -> int:
     exported = export_line(line_path(arguments.line))
     warn([*doubts("lines", arguments.line), *exported.notes])
     files = _files(exported, as_workbook=arguments.xlsx)
+    if arguments.dxf:
+        files |= {"profile.dxf": profile_drawing(exported.state), "plan.dxf": plan_drawing(exported.state)}
     if not arguments.xlsx:
         _check_leftovers(folder, exported)
     new_folder(folder)

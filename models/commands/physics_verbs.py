@@ -173,6 +173,8 @@ def add_export(verbs: Any) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the tables (CSV)")
     text = "write the tables as one workbook, LINE.xlsx (needs openpyxl: pip install 'openpanto[xlsx]')"
     parser.add_argument("--xlsx", action="store_true", help=text)
+    text = "draw profile.dxf and plan.dxf as well (needs ezdxf: pip install 'openpanto[dxf]')"
+    parser.add_argument("--dxf", action="store_true", help=text)
     parser.set_defaults(run=_later("export_command"))
 
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Span
 from models.catenary.definition.tensioning_definition import COLDEST, HOTTEST
 from models.catenary.statics.temperature_table import LineAtTemperature, ruling, temperature_table
 from models.catenary.statics.wire_waves import OPERATION_LIMIT

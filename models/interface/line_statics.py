@@ -11,8 +11,9 @@ import numpy as np
 
 from models.arrays import BoolArray, FloatArray
 from models.catenary import line_advice
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.overbridge_definition import Overbridge
+from models.catenary.definition.section_definition import Span
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics import elasticity as under_force

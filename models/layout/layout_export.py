@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from models.catenary.definition import line_reading
-from models.catenary.definition.line_definition import CatenaryDefinition, Section, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section, Span
 from models.catenary.definition.section_reading import SECTION_TABLES
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.kept_form import kept_form

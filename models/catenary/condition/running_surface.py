@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, Section
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.surface_definition import RunningSurface as Surface
 from models.numerics.random_numbers import uniform_numbers
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any, Final
 
-from models.catenary.definition.line_definition import Support
+from models.catenary.definition.section_definition import Support
 from models.definition_files.toml_reader import Table
 
 #: Key of the table -> unit and range; the field of a support has the same name.

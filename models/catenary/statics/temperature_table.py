@@ -11,7 +11,8 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.condition.line_condition import find_condition
 from models.catenary.condition.tensioning import WireTension, ruling_span, swing, wire_tensions
-from models.catenary.definition.line_definition import CatenaryDefinition, Section, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section, Span
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh

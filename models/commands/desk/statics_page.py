@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Span
 from models.catenary.shape.track import track_at
 from models.catenary.statics.rest_profile import Droppers
 from models.commands import route_plots, statics_plots, temperature_report, wind_report

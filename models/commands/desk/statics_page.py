@@ -168,8 +168,8 @@ def _supports(result: LineStatics) -> Iterator[str]:
              "N [N]", "N/l [N/m]", "gradient [\u2030]", "change [\u2030]")  # fmt: skip
     rows = [
         (
-            names[k] or str(k + 1), f"{s.x[k]:.2f}", f"{s.height[k]:.3f}", f"{s.encumbrance[k]:.3f}", f"{1e3 * s.stagger[k]:.0f}",
-            _SIDES.get(float(s.side[k]), NOTHING), _cell(s.lateral[k], 0), _cell(s.lift[k], 0),
+            names[k] or str(k + 1), f"{s.x[k]:.2f}", f"{s.height[k]:.3f}", f"{s.encumbrance[k]:.3f}",
+            f"{1e3 * s.stagger[k]:.0f}", _SIDES.get(float(s.side[k]), NOTHING), _cell(s.lateral[k], 0), _cell(s.lift[k], 0),
             _cell(s.tension[k], 0), _cell(s.pendulum[k], 0), _cell(1e3 * s.gradient[k], 2), _cell(1e3 * s.change[k], 2),
         )
         for k in range(len(s.x))

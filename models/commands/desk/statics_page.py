@@ -169,8 +169,9 @@ def _supports(result: LineStatics) -> Iterator[str]:
     rows = [
         (
             names[k] or str(k + 1), f"{s.x[k]:.2f}", f"{s.height[k]:.3f}", f"{s.encumbrance[k]:.3f}",
-            f"{1e3 * s.stagger[k]:.0f}", _SIDES.get(float(s.side[k]), NOTHING), _cell(s.lateral[k], 0), _cell(s.lift[k], 0),
-            _cell(s.tension[k], 0), _cell(s.pendulum[k], 0), _cell(1e3 * s.gradient[k], 2), _cell(1e3 * s.change[k], 2),
+            f"{1e3 * s.stagger[k]:.0f}", _SIDES.get(float(s.side[k]), NOTHING), _cell(s.lateral[k], 0),
+            _cell(s.lift[k], 0), _cell(s.tension[k], 0), _cell(s.pendulum[k], 0), _cell(1e3 * s.gradient[k], 2),
+            _cell(1e3 * s.change[k], 2),
         )
         for k in range(len(s.x))
     ]  # fmt: skip

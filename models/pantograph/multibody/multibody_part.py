@@ -189,12 +189,11 @@ class MultibodyPantographPart:
         if watch is None or not watch.is_due(self.time, force):
             return
         x, z = (0.5 * (self.strip.item(k) + self.strip.item(6 + k)) for k in (0, 2))
-        watch.look(
-            self._y if self._reduced is None else self._reduced.posture(self._base.now),
-            Place(self.time, x, z),
-            force,
-            point.item(2),
-        )
+        watch.look_at_contact(force, Place(self.time, x, point.item(2)))
+        if self._reduced is None:
+            watch.look(self._y, Place(self.time, x, z), force)
+        elif not self._reduced.is_free(*watch.cam_range):
+            watch.look(self._reduced.posture(self._base.now), Place(self.time, x, z), force)
         self.told += watch.told
         watch.told.clear()
 

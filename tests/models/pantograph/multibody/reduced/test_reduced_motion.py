@@ -11,8 +11,10 @@ import pytest
 from models.library.catalogue import load_pantograph
 from models.numerics.cubic_curve import CubicCurve
 from models.pantograph.multibody.analysis.posture import take_posture
+from models.pantograph.multibody.elements.angle_elements import PointDistance
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble, project
+from models.pantograph.multibody.mechanism_definition import BumpStop
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from models.pantograph.multibody.reduced import reduced_equations
 from models.pantograph.multibody.reduced.reduced_motion import ReducedModel, ReducedMotion
@@ -116,9 +118,30 @@ def test_kernels_give_the_plain_numbers(case, monkeypatch):
         assert np.abs(strips[0] - strips[1]).max() < 1e-12
     assert np.abs(plain.bodies((0.0, 0.0, 0.0)) - compiled.bodies((0.0, 0.0, 0.0))).max() < 1e-9
     assert compiled.lift_value() == pytest.approx(plain.lift_value(), rel=1e-12)
+    assert compiled.is_free(-np.inf, np.inf) == plain.is_free(-np.inf, np.inf)
     # What one leaves the other continues.
     compiled.restore(plain.snapshot())
     assert compiled.snapshot()["reduced"].tobytes() == plain.snapshot()["reduced"].tobytes()
+
+
+def test_it_is_free_where_no_stop_of_the_bodies_is_reached(case):
+    definition, model, _ = case
+    motion, mechanism, seen = ReducedMotion(model), model.mechanism, []
+    bumps = [(f, PointDistance(f, mechanism.numbers)) for f in definition.forces if isinstance(f, BumpStop)]
+    for y in random_states(model, np.random.default_rng(8), 12):
+        y[2 : model.size] *= 0.5
+        motion.memory[0][:] = y.tolist()
+        kinematics = mechanism.kinematics(model.cartesian(y, np.zeros(2)))
+        lengths = [(f.shortest, distance.at(kinematics), f.longest) for f, distance in bumps]
+        inside = [(low is None or length >= low) and (high is None or length <= high) for low, length, high in lengths]
+        free = not mechanism.forces.stops.touched(kinematics.frames) and all(inside)
+        assert motion.is_free(-np.inf, np.inf) == free
+        seen.append(free)
+        if mechanism.forces.lift_place is not None and free:
+            place = mechanism.forces.lift_place.at(kinematics)
+            assert motion.is_free(place - 1e-6, place + 1e-6)
+            assert not motion.is_free(place + 1e-6, np.inf)
+    assert any(seen) or any(f.name == "b1" for f, _ in bumps)  # with everything, some stop or other always is
 
 
 def test_the_strip_is_where_its_body_is(case):

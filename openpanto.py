@@ -149,13 +149,29 @@ VERBS: Final[Mapping[str, Verb]] = {
         "static shape, droppers, elasticity and wave figures of a line",
         "models.commands.physics_verbs:add_statics",
         _MODELS,
-        ("statics LN2", "statics demo/lines/demo_LN2.toml --speed 250 --out statics"),
+        (
+            "statics LN2",
+            "statics demo/lines/demo_LN2.toml --speed 250 --out statics",
+            "statics CA160 --wind 29 --head 1950 --out statics",
+        ),
     ),
     "spans": Verb(
         "smallest radius for a span, largest span for a radius, in the wind",
         "models.commands.physics_verbs:add_spans",
         _MODELS,
         ("spans LN2 --wind 29 --limit 0.4", "spans CA160 --pressure 961 --head 1950 --stagger 0.2 0.2 --out spans"),
+    ),
+    "import": Verb(
+        "make the definition of a line from its layout, tables as CSV or XLSX",
+        "models.commands.physics_verbs:add_import",
+        _MODELS,
+        ("import layout --out lines/station.toml", "import survey.xlsx --design LN2 --out lines/survey.toml"),
+    ),
+    "export": Verb(
+        "write the layout of a line, with the lengths of its droppers",
+        "models.commands.physics_verbs:add_export",
+        _MODELS,
+        ("export LN2 --out layout", "export lines/station.toml --out workshop --xlsx"),
     ),
     "pantograph": Verb(
         "statics over height, modes, apparent mass of a pantograph",
@@ -252,6 +268,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
     known = {
         "scenario": scenario_place.scenario_names(),
         "line": lines,
+        "design": lines,
         "pantograph": pantographs,
         "like": (*lines, *pantographs),
         "name": [study.parent.stem for study in scenario_place.LIBRARY.glob("*.ssp/study.toml")],
@@ -417,7 +434,7 @@ def _new(options: argparse.Namespace) -> int:
     from master.scenario.project import new_project as projects
     from master.scenario.project.stretch import Wire, check_speed
     from models.library import definition_facts as facts
-    from models.library.catalogue import load_line, load_pantograph
+    from models.library.catalogue import line_path, load_line, load_pantograph
 
     projects.check_folder(options.folder)
     check_speed(options.speed / 3.6)
@@ -445,6 +462,8 @@ def _new(options: argparse.Namespace) -> int:
         (options.supply, SUPPLIES[options.supply]), raised,
     )  # fmt: skip
     projects.new_project(request)
+    if wire is not None:
+        _copy_profile(line_path(options.line), options.folder / "lines" / f"{line.name}.toml")
     if doubt := projects.doubt(request):
         print(f"note: {doubt}", file=sys.stderr)
     print(f"{options.speed:g} km/h; {options.folder / 'README.md'} says what each file is and what was chosen")
@@ -482,11 +501,27 @@ def _copy(options: argparse.Namespace) -> int:
     copy = (project or Path()) / options.kind / f"{name}.toml"
     copy.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(copy, text.encode(), "another folder to work in")
+    _copy_profile(path, copy)
     print(copy)
     if project is None:
         text = f"for other folders, add {Path().resolve()} to {places.VARIABLE}"
         print(f"note: this folder lies in no project, so '{name}' is found from here alone; {text}", file=sys.stderr)
     return 0
+
+
+def _copy_profile(path: Path, copy: Path) -> None:
+    """Have the running surface of a line go along with a copy of its definition."""
+    from master.errors import RequestError
+    from master.safety.safe_files import write_atomically
+    from models.library import definition_copy
+
+    try:
+        wanted = definition_copy.profile_of_copy(path, copy)
+    except definition_copy.CopyError as error:
+        raise RequestError(str(error)) from error
+    if wanted is not None:
+        wanted[0].parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(*wanted, "another folder to work in")
 
 
 def _original(kind: Any, given: str, load: Callable[[str], Any]) -> tuple[Path, str, Any]:

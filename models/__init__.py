@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from models.definition_files.toml_reader import DefinitionError
     from models.interface.coupled_run import CoupledRun, couple
     from models.interface.line_and_pantograph import Line, Pantograph, open_line, open_pantograph
+    from models.interface.line_in_wind import LineInWind, in_wind
+    from models.interface.line_over_temperature import LineOverTemperature, over_temperature
+    from models.interface.line_spans import SpanTable, span_table
     from models.interface.line_statics import LineStatics, statics
     from models.library.catalogue import UnknownNameError, line_names, pantograph_names
 
@@ -18,16 +21,22 @@ __all__ = [
     "CoupledRun",
     "DefinitionError",
     "Line",
+    "LineInWind",
+    "LineOverTemperature",
     "LineStatics",
     "Pantograph",
     "Parameter",
     "ParameterError",
+    "SpanTable",
     "UnknownNameError",
     "couple",
+    "in_wind",
     "line_names",
     "open_line",
     "open_pantograph",
+    "over_temperature",
     "pantograph_names",
+    "span_table",
     "statics",
 ]
 
@@ -37,6 +46,9 @@ if not TYPE_CHECKING:  # a type checker shall notice a name that is not there
         "definition_files.toml_reader": ("DefinitionError",),
         "interface.coupled_run": ("CoupledRun", "couple"),
         "interface.line_and_pantograph": ("Line", "Pantograph", "open_line", "open_pantograph"),
+        "interface.line_in_wind": ("LineInWind", "in_wind"),
+        "interface.line_over_temperature": ("LineOverTemperature", "over_temperature"),
+        "interface.line_spans": ("SpanTable", "span_table"),
         "interface.line_statics": ("LineStatics", "statics"),
         "library.catalogue": ("UnknownNameError", "line_names", "pantograph_names"),
     }

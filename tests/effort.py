@@ -10,9 +10,9 @@ from typing import Final
 IS_LONG: Final = os.environ.get("OPENPANTO_LONG") == "1"
 #: Lines and pantographs that are in the library for long, of which a sample is enough.
 ESTABLISHED: Final = {
-    "C270", "CA160", "CA220", "EN50318_2002", "EN50318_2018_AC_simple", "LN1", "LN2", "LN2_overlap", "LN2_ring",
-    "LN2_supports", "LN6", "Re330", "Shinkansen", "generic_simple", "ATR95", "CX", "CX_multibody", "DSA380",
-    "EN50318_2018", "generic", "generic_multibody", "generic_multibody_cam",
+    "AC_curve", "AC_mixed", "C270", "CA160", "CA220", "EN50318_2002", "EN50318_2018_AC_simple", "LN1", "LN2",
+    "LN2_overlap", "LN2_ring", "LN2_supports", "LN6", "Re330", "Shinkansen", "generic_simple", "ATR95", "CX",
+    "CX_multibody", "DSA380", "EN50318_2018", "generic", "generic_multibody", "generic_multibody_cam",
 }  # fmt: skip
 
 

@@ -28,7 +28,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"definition_files", "numerics", "contact_law"},
         {"catenary", "pantograph", "signals"},
         {"library", "coupled"},
-        {"interface"},
+        {"interface", "layout"},
         {"commands"},
         {"__main__"},
     ],
@@ -90,11 +90,15 @@ ONLY_IN = {
     "dask": lambda name: name in ("master.batch.sweep.dask_engine", "master.batch.sweep.local_cluster"),
     "distributed": lambda name: name in ("master.batch.sweep.dask_engine", "master.batch.sweep.local_cluster"),
     "SALib": lambda name: name == "master.batch.sweep.sensitivity",
-    "matplotlib": lambda name: name.startswith(("models.commands.", "master.report.", "master.interface.")),
+    "matplotlib": lambda name: name.startswith(
+        ("models.commands.", "models.layout.", "master.report.", "master.interface.")
+    ),
+    "ezdxf": lambda name: name == "models.layout.drawing_export",
+    "openpyxl": lambda name: name == "models.layout.xlsx_sheets",
     "pandas": lambda name: name.startswith(("models.interface.", "master.interface.")),
 }
 #: What runs inside an FMU: all of models but these, and fmus/slave.
-OUTSIDE_FMU = ("models.commands", "models.interface", "models.__main__")
+OUTSIDE_FMU = ("models.commands", "models.interface", "models.layout", "models.__main__")
 
 
 @cache

@@ -78,6 +78,9 @@ COMMANDS: Final = (
     "signal s.csv --standalone --runtime {in:d}",
     "spans {in:toml} --wind 29 --limit 0.5",
     "spans EN50318_2002 --wind 29 --limit 0.5 --out {dir}",
+    "import {in:xlsx} --out mine.toml",
+    "import lay --design EN50318_2002 --out {file:toml}",
+    "export EN50318_2002 --out {dir}",
     "pantograph {in:toml}",
     "pantograph CX --out {dir}",
     "identify {in:csv}",
@@ -115,6 +118,9 @@ def workplace(tmp_path, monkeypatch, request):
     (tmp_path / "empty").mkdir()
     (tmp_path / "r.csv").write_text("".join(f"{f / 2},{100 - f},{3 * f}\n" for f in range(1, 41)))
     (tmp_path / "s.csv").write_text("time [s],base.z [m]\n0,0\n1,0.01\n")
+    (tmp_path / "lay").mkdir()
+    (tmp_path / "lay" / "supports.csv").write_text("position\n0\n60\n120\n")
+    (tmp_path / "lay" / "droppers.csv").write_text("span,position\n1,30\n2,30\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path

@@ -30,7 +30,7 @@ USER_SCRIPT = """
 from pathlib import Path
 
 from master import MasterError, Results, Scenario, calibrate, compare, open_scenario, optimise, read_results, run, sweep
-from models import Line, couple, open_line, open_pantograph, statics
+from models import Line, couple, in_wind, open_line, open_pantograph, over_temperature, span_table, statics
 
 
 def mean(results: Results) -> float:
@@ -53,6 +53,11 @@ found = optimise(scenario, minimise="sigma", vary={"static_force": "100:200 N"},
 print(found.best["static_force [N]"] + 1.0, found.at_bounds, found.table.head(), sweep(scenario).sensitivity.head())
 line: Line = open_line("LN2").set({"contact_wire.tension": 22e3})
 print(statics(line, span=3).elasticity.maximum + 1.0, line.spans[0].length + 1.0)
+rest = statics(line, section=1)
+blown = in_wind(rest, speed="29 m/s", head=1600)
+print(blown.offset.max() + 1.0, blown.frame().head(), rest.judgements[0].source.upper(), rest.verdicts[0][1].upper())
+print(over_temperature(rest, ["-20 degC", 288.15]).frame("tension").head())
+print(span_table(line, pressure=961.0, limit="0.4 m", radii=[800], staggers=[(0.2, "-20 cm")]).smallest_radius.min())
 run_of = couple(line, open_pantograph("CX").set(static_force="160 N"), speed=83.3)
 print(run_of.force.max(), run_of.warnings[0].upper())
 """

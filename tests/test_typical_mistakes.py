@@ -29,7 +29,7 @@ class Mistake(NamedTuple):
 
 
 LINE_ENGINEER = {
-    "a line by another name": Mistake("statics LN22", 1, "known: C270, CA160"),
+    "a line by another name": Mistake("statics LN22", 1, "C270, CA160"),
     "a file for a name": Mistake("statics LN2.toml", 1, "called by its name, without .toml"),
     "a span that the line has not": Mistake("statics LN2 --span 40", 1, "the line has spans 1 to 24"),
     "no part before the parameter": Mistake(
@@ -111,7 +111,7 @@ FMI_ENGINEER = {
     "a port without its variable": Mistake(
         "new project --line LN2 --pantograph X.fmu --speed 300 --map contact.force", 2, "must be written PORT=VARIABLE"
     ),
-    "an FMU of another name": Mistake("build LN3", 1, "known are Catenary_C270"),
+    "an FMU of another name": Mistake("build LN3", 1, "known are Catenary_AC_curve"),
 }
 DATA_SCIENTIST = {
     "a parameter without its component": Mistake(

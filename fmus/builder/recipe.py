@@ -15,6 +15,7 @@ from fmus.builder.fault_list import fault_tables, split_faults
 from fmus.builder.source_bundle import BundleError, Module, collect
 from fmus.loader.loader_build import sources
 from fmus.loader.pythonfmu_repair import repaired
+from models.catenary.definition.surface_reading import CARRIED, named_profile
 from models.definition_files.message_text import hint, said
 from models.library import search_path
 from models.library.search_path import Kind, definition_files
@@ -214,8 +215,19 @@ def _place(name: str, pantographs: int | None) -> tuple[Kind | None, str, int]:
 def _line_recipe(path: Path, title: str, ports: int, is_own: bool = False) -> Recipe:
     name = f"Catenary_{path.stem}" + (f"_P{ports}" if ports > 1 else "")
     title = title or f"Overhead contact line {path.stem}"
-    settings = {"pantographs": ports}
-    return Recipe(name, title, "fmus.slave.catenary_slave", "CatenarySlave", path, settings, is_own=is_own)
+    slave = "fmus.slave.catenary_slave", "CatenarySlave"
+    settings, resources = {"pantographs": ports}, _carried(path)
+    return Recipe(name, title, *slave, path, settings, is_own=is_own, resources=resources)
+
+
+def _carried(path: Path) -> dict[str, bytes]:
+    """Return what a line's FMU carries beside its definition, by the names that it has there."""
+    profile = named_profile(path)
+    try:
+        return {CARRIED: profile.read_bytes()} if profile is not None else {}
+    except OSError as error:
+        text = f"{path}: running_surface.profile: {profile} cannot be read ({said(error)})"
+        raise BuildError(text) from error
 
 
 def _pantograph_recipe(path: Path, title: str, adapter: tuple[str, str], is_own: bool = False) -> Recipe:

@@ -17,6 +17,7 @@ from models.catenary.line_advice import (
     slack_warning,
     speed_warning,
     step_warning,
+    surface_warning,
     track_warning,
 )
 from models.catenary.line_part import CatenaryPart
@@ -50,14 +51,15 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "What a slack dropper does is the definition's slack_law: with tension it carries nothing, with elastic_only, "
         "the form of the 2012 thesis, its damper goes on acting. dropper[...].force is all that a dropper carries, the "
         "damper's part included; dropper[...].slack says whether it is slack.",
-        "The contact is unilateral, without friction along the strip.",
+        "The contact is unilateral, without friction along the strip. A running surface is the same over the wire's "
+        "width, and what it takes from the train's traction is in no output.",
         "Errors of assembly and faults are there from the start of a run; uplift "
-        "counts from where they have left the line, not from the design.",
+        "counts from where they have left the line, not from the design. No wire breaks.",
         "On a curved or canted track x is the length of the track's axis, y and z lie in the rail plane. Curves act as "
         "loads on the wires at rest: offsets between supports are wrong by about (L/2R)^2/6 of themselves, lengths by "
         "y/R; no crossing of two tracks, no inertia of the curve along the track, radii of 150 m and more.",
         "Temperature and tensioning devices act on the line at rest, before the run; in it tensions stay.",
-        "No wind in a run, no wear, no aerodynamic forces; no electrical model.",
+        "No wind in a run, no wear that goes on, no aerodynamic forces; no electrical model.",
         "Parameters that change how many elements or droppers there are need another FMU, built from an edited "
         "definition.",
         "A strip beyond the modelled length finds no wire. A line that closes on itself has no end: a strip meets the "
@@ -66,7 +68,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
     )
 
     def _read_definition(self, path: Path) -> CatenaryDefinition:
-        return load(path)
+        return load(path, carried=True)
 
     def _make_part(self, definition: CatenaryDefinition) -> CatenaryPart:
         return CatenaryPart(definition, pantographs=self.pantographs)
@@ -101,7 +103,9 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         yield slack_warning(part.droppers, part.model.static.is_slack)
         yield slack_law_warning(part.definition)
         yield track_warning(part.definition)
-        yield speed_warning(part.definition, float(abs(along_track).max()))
+        speed = float(abs(along_track).max())
+        yield speed_warning(part.definition, speed)
+        yield surface_warning(part.definition, speed, part.definition.time_step)
 
     def _step_warning(self, part: CatenaryPart, step: float) -> str:
         return step_warning(part.definition, step)

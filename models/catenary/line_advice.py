@@ -9,7 +9,9 @@ import math
 from collections.abc import Sequence
 from typing import Final, Protocol
 
-from models.arrays import BoolArray
+import numpy as np
+
+from models.arrays import BoolArray, FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition, Contact
 from models.catenary.statics.wire_waves import OPERATION_LIMIT, contact_wire_wave_speed
 
@@ -23,6 +25,11 @@ _NAMED: Final = 8
 #: Longest delay of slack [s], and the rate of elongation of a dropper at which the warning quotes its effect [m/s].
 _LONGEST_DELAY: Final = 1e-3
 _STRETCHING: Final = 0.5
+#: Fewest steps within a wave of the running surface, the share of a measured one in shorter waves that goes without a
+#: word, and the number of places at which it is looked at.
+_STEPS_PER_WAVE: Final = 8.0
+_SHORT_SHARE: Final = 0.1
+_LONGEST_PROFILE: Final = 2**18
 #: Curvature up to which the equations of curves are meant [1/m], and cant beyond which a track deserves a look [m].
 _TIGHTEST: Final = 1.0 / 150.0
 _HIGHEST_CANT: Final = 0.18
@@ -145,6 +152,54 @@ def track_warning(definition: CatenaryDefinition) -> str:
         x, D = max(high, key=lambda knot: abs(knot[1]))
         found.append(f"at {x:g} m the cant is {1e3 * abs(D):.0f} mm: tracks have {1e3 * _HIGHEST_CANT:.0f} mm at most")
     return f"track: {'; '.join(found)}" if found else ""
+
+
+def surface_warning(definition: CatenaryDefinition, speed: float, step: float) -> str:
+    """Return a warning if the running surface has waves that steps pass over.
+
+    A wave that a strip passes within fewer than eight steps loses force, and is heard at another frequency. Of a
+    measured surface the part in such waves counts, found on its own points, if it is more than a tenth of the whole.
+
+    Parameters
+    ----------
+    definition : CatenaryDefinition
+    speed : float
+        Speed of the train in either direction [m/s].
+    step : float
+        Longest step of the line [s].
+    """
+    surface, shortest = definition.running_surface, _STEPS_PER_WAVE * abs(speed) * step
+    if surface is None or shortest == 0.0:
+        return ""
+    if surface.sigma and surface.to is not None and surface.to * shortest > 1.0:
+        what = f"the running surface has waves down to {1.0 / surface.to:.3g} m"
+    elif surface.points and short_waves(np.array(surface.points), shortest) > _SHORT_SHARE:
+        what = f"the running surface of {surface.profile} has waves"
+    else:
+        return ""
+    return (
+        f"{what}, and steps of {1e3 * step:.3g} ms at {3.6 * abs(speed):.0f} km/h follow none below {shortest:.2g} m: "
+        "take a smaller time_step"
+    )
+
+
+def short_waves(points: FloatArray, shortest: float) -> float:
+    """Return which share of a profile's height, in root mean squares, is in waves shorter than ``shortest`` [m].
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Position and height [m].
+    """
+    x, r = points.T
+    count = min(math.ceil((x[-1] - x[0]) / min(0.25 * shortest, float(np.diff(x).min()))), _LONGEST_PROFILE)
+    places = np.linspace(x[0], x[-1], max(count, 2))
+    heights = np.interp(places, x, r)
+    heights -= np.linspace(heights[0], heights[-1], len(heights))  # what is left closes on itself
+    power = np.abs(np.fft.rfft(heights))[1:] ** 2
+    waves = np.arange(1, len(power) + 1) / (x[-1] - x[0])
+    total = float(power.sum())
+    return math.sqrt(float(power[waves * shortest > 1.0].sum()) / total) if total else 0.0
 
 
 def slack_law_warning(definition: CatenaryDefinition) -> str:

@@ -9,8 +9,8 @@ import numpy as np
 
 from models.arrays import BoolArray, FloatArray
 from models.catenary.condition.line_condition import find_condition
+from models.catenary.condition.running_surface import running_surfaces
 from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval, put_in_lap
-from models.catenary.contact_and_slack.crossing import penetration
 from models.catenary.contact_and_slack.dropper_law import DropperLaw
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.definition.line_definition import CatenaryDefinition
@@ -166,7 +166,7 @@ class CatenaryModel:
                 interval = wire.interval(found.element)
                 local, (row, height) = interval.local(state.motion), interval.lift(found.element, found.xi)
                 rise, speed = local.dot(row).tolist()
-                delta, rate = penetration(found.share, height + rise, speed, strip, self._line.gap)
+                delta, rate = wire.penetration(found.share, height + rise, speed, strip, self._line.gap)
                 law = self._line.law(delta, rate, max(rate, 0.0), self.definition.contact)
                 result.force[p, s] = law.scaled(found.engagement).force
                 result.point[p, s] = *interval.at(found, local[0]), height + rise
@@ -229,12 +229,13 @@ class CatenaryModel:
             ) from error
 
     def _wires(self, by_wire: Sequence[Sequence[Interval]]) -> Iterator[ContactWire]:
-        spans = iter(self.modes.spans)
+        spans, surfaces = iter(self.modes.spans), running_surfaces(self.definition)
         for chain, parts in zip(self.mesh.chains, by_wire, strict=True):
             own = [(part, next(spans)) for part in parts]
             if chain.component == "contact_wire":
                 period = self.definition.sections[chain.section].period
-                yield ContactWire(chain, own, self.static, self.modes, self._angles, period)
+                surface = surfaces[chain.section]
+                yield ContactWire(chain, own, self.static, self.modes, self._angles, period, surface)
 
     def _engine(self, step: float) -> StepEngine:
         found = self._engines.get(step)

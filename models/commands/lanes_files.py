@@ -74,7 +74,7 @@ def read_job(path: Path) -> LaneJob:
 
 
 def _job(path: Path, data: Mapping[str, Any]) -> LaneJob:
-    line = load_line(path.parent / data["line"]).with_values(_values(data["line_values"]))
+    line = load_line(path.parent / data["line"], carried=True).with_values(_values(data["line_values"]))
     given = [load_lumped(path.parent / name) for name in data["pantographs"]]
     plan = LanePlan(float(data["start"]), float(data["step"]), int(data["every"]), bool(data["dropper_forces"]))
     if not plan.step > 0.0 or plan.every < 0:

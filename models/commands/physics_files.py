@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from models.arrays import FloatArray
+from models.arrays import BoolArray, FloatArray
 from models.definition_files.message_text import said
 from models.definition_files.parameter import ParameterError
 
@@ -62,7 +62,7 @@ def write_text(path: Path, text: str) -> None:
     write_atomically(path, text.encode())
 
 
-def write_csv(path: Path, names: Sequence[str], columns: Sequence[FloatArray], digits: int = 9) -> None:
+def write_csv(path: Path, names: Sequence[str], columns: Sequence[FloatArray | BoolArray], digits: int = 9) -> None:
     """Write columns of numbers under their names, with so many significant digits."""
     text = io.StringIO()
     np.savetxt(text, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt=f"%.{digits}g")

@@ -9,7 +9,16 @@ from collections.abc import Sequence
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
 from models.commands.physics_options import show_log
-from models.commands.physics_verbs import add_couple, add_identify, add_lanes, add_pantograph, add_spans, add_statics
+from models.commands.physics_verbs import (
+    add_couple,
+    add_export,
+    add_identify,
+    add_import,
+    add_lanes,
+    add_pantograph,
+    add_spans,
+    add_statics,
+)
 from models.definition_files.message_text import empty_argument, printable, said
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError
@@ -17,7 +26,16 @@ from models.library.catalogue import UnknownNameError
 from models.numerics.kernel_cache import KernelError
 from models.pantograph.multibody.mechanism import MechanismError
 
-_VERBS = (add_couple, add_statics, add_spans, add_pantograph, add_identify, add_lanes)
+_VERBS = (
+    add_couple,
+    add_statics,
+    add_spans,
+    add_import,
+    add_export,
+    add_pantograph,
+    add_identify,
+    add_lanes,
+)
 #: What a user can cause; everything else is a defect and keeps its traceback.
 _USER_ERRORS = (
     DefinitionError,

@@ -7,10 +7,12 @@ import errno
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from master.evaluation.filters import DEFAULT, ForceFilter
@@ -71,6 +73,19 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
         table.add_row(*map(printable, row))
     # Without markup: "[m]" is a unit here.
     Console(width=None if Console().is_terminal else 100, markup=False).print(table)
+
+
+@contextmanager
+def shown_progress(values: Sequence[float], name: str, is_quiet: bool) -> Iterator[Iterable[float]]:
+    """Hand out values one by one, and show at a terminal how far that is; nothing of it is left at the end.
+
+    The bar is gone when the context is left, by an error too: one that went later would take its message along.
+    """
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    hidden = is_quiet or not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as bar:
+        yield bar.track(values, description=name)
 
 
 def warn(texts: Iterable[str]) -> None:

@@ -36,7 +36,9 @@ def add_statics(verbs: Any) -> None:
         help="temperatures [degC] for a table of tensions, movements and sags, of a line with a table [tensioning]",
     )  # fmt: skip
     add_wind(parser)
-    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and plots (PNG)")
+    text = "folder for the page (statics.html), tables (CSV) and plots (PNG)"
+    parser.add_argument("--out", type=Path, default=None, help=text)
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
     add_settings(parser)
     parser.set_defaults(run=_later("statics_command"))
 
@@ -54,7 +56,8 @@ def add_spans(verbs: Any) -> None:
         help="staggers at both ends of a span, positive to the outside of the curve [m]; may be given several times "
         "(default: the line's, alternating and not)",
     )  # fmt: skip
-    parser.add_argument("--out", type=Path, default=None, help="folder for tables (CSV) and the plot (PNG)")
+    text = "folder for the page (spans.html), tables (CSV) and the plot (PNG)"
+    parser.add_argument("--out", type=Path, default=None, help=text)
     add_settings(parser)
     parser.set_defaults(run=_later("spans_command"))
 
@@ -150,6 +153,29 @@ def add_couple(verbs: Any) -> None:
     add_filter(parser)
     add_settings(parser)
     parser.set_defaults(run=_later("couple_command"))
+
+
+def add_import(verbs: Any) -> None:
+    """Declare ``import``."""
+    parser = verbs.add_parser("import", help="make the definition of a line from its layout, tables as CSV or XLSX")
+    text = "folder of CSV files (supports, droppers, wires), or a workbook with these sheets (.xlsx)"
+    parser.add_argument("layout", type=Path, metavar="LAYOUT", help=text)
+    parser.add_argument("--design", metavar="LINE", help="line, by name or file, that gives what the layout does not")
+    text = "definition file to write; the line has its name"
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.toml", help=text)
+    parser.set_defaults(run=_later("import_command"))
+
+
+def add_export(verbs: Any) -> None:
+    """Declare ``export``."""
+    parser = verbs.add_parser("export", help="write the layout of a line, with the lengths of its droppers")
+    parser.add_argument("line", metavar="LINE", help="name in the library, or a definition file")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the tables (CSV)")
+    text = "write the tables as one workbook, LINE.xlsx (needs openpyxl: pip install 'openpanto[xlsx]')"
+    parser.add_argument("--xlsx", action="store_true", help=text)
+    text = "draw profile.dxf and plan.dxf as well (needs ezdxf: pip install 'openpanto[dxf]')"
+    parser.add_argument("--dxf", action="store_true", help=text)
+    parser.set_defaults(run=_later("export_command"))
 
 
 def add_lanes(verbs: Any) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from models.catenary.definition.track_definition import Track
 from models.catenary.shape.track import track_at
+from models.catenary.statics import rest_profile
 from models.commands.statics_plots import COLOURS, GREY
 from models.interface.line_statics import LineStatics
 from models.library.norm_tables import gradient_limits
@@ -38,7 +39,7 @@ def profile(result: LineStatics) -> Figure:
     _heights(heights, result)
     _gradients(gradients, result)
     gradients.set_xlim(result.profiles[0].x[0], result.profiles[0].x[-1])
-    gradients.set_xlabel("position along the track [m]")
+    gradients.set_xlabel(f"position along the track [m]; grey in plan: strips' reach, {_REACH:g} m")
     return figure
 
 
@@ -51,7 +52,7 @@ def _track(axes: Axes, track: Track, start: float, end: float) -> None:
     axes.set_ylabel("curvature [1/km]\nleft > 0", color=COLOURS["messenger_wire"])
     cant = axes.twinx()
     cant.plot(x, 1e3 * track.base * np.sin(place.cant), color=COLOURS["contact_wire"], linestyle="--")
-    cant.set_ylabel("cant [mm]\nright rail higher > 0", color=COLOURS["contact_wire"])
+    cant.set_ylabel("cant [mm]\nright rail > 0", color=COLOURS["contact_wire"])
     for each in (axes, cant):
         each.margins(y=0.15)
 
@@ -61,13 +62,18 @@ def _plan(axes: Axes, result: LineStatics) -> None:
     _wires(axes, result, "y")
     s = result.supports
     axes.plot(s.x, s.stagger, "o", color=COLOURS["contact_wire"], markersize=3)
-    axes.set_ylabel(f"plan [m], left > 0\ngrey: strips' reach, {_REACH:g} m")
+    axes.set_ylabel("plan [m]\nleft > 0")
 
 
 def _heights(axes: Axes, result: LineStatics) -> None:
     _wires(axes, result, "z")
     s = result.supports
     axes.plot(s.x, s.height, "o", color=COLOURS["contact_wire"], markersize=3)
+    axes.margins(y=0.1)
+    for number, over in enumerate(result.model.definition.overbridge, 1):
+        axes.hlines(over.underside, over.start, over.end, color="black", linewidth=3.0)
+        place = 0.5 * (over.start + over.end), over.underside
+        axes.annotate(str(number), place, xytext=(0, 3), textcoords="offset points", fontsize=8, ha="center")
     axes.set_ylabel("height above\nthe rail plane [m]")
     axes.legend(fontsize=8, ncols=4, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
@@ -89,6 +95,10 @@ def _gradients(axes: Axes, result: LineStatics) -> None:
 
 
 def _wires(axes: Axes, result: LineStatics, coordinate: str) -> None:
+    """Draw the wires of the section, and thin those of others beside it."""
+    others = [s for s in range(len(result.model.definition.sections)) if s != result.section]
+    for p in (p for s in others for p in rest_profile.profiles(result.model, s)):
+        axes.plot(p.x, getattr(p, coordinate), color=GREY, linewidth=0.6)
     named = set()
     for p in result.profiles:
         label = None if p.component in named else p.component.replace("_", " ")

@@ -3,53 +3,60 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from models.catenary.statics import rest_profile
-from models.catenary.statics.temperature_table import LineAtTemperature, ruling, temperature_table
 from models.commands import route_plots, statics_plots, temperature_report, wind_report
+from models.commands.desk import statics_page
+from models.commands.desk.statics_page import Found
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import (
     check_folder,
     new_folder,
     print_table,
     settings,
+    shown_progress,
     warn,
 )
 from models.definition_files.parameter import ParameterError
+from models.interface.line_in_wind import LineInWind, asked_wind, in_the_wind
+from models.interface.line_over_temperature import LineOverTemperature, at_temperatures
 from models.interface.line_statics import LineStatics, at_rest
-from models.library.catalogue import doubts, load_line
+from models.library.catalogue import doubts, line_path, load_line
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
     check_folder(arguments.out)
-    result = analyse(arguments)
     blows = arguments.wind is not None or arguments.pressure is not None
     if not blows and (arguments.limit is not None or arguments.head is not None):
         raise ParameterError("--limit and --head are limits in the wind: give --wind, in m/s, or --pressure, in Pa")
-    wind = wind_report.in_the_wind(result, arguments) if blows else None
     asked = [*map(temperature_report.kelvin, arguments.temperature)]
-    states = temperature_table(result.model.definition, asked, result.section) if asked else ()
-    print_table(f"{arguments.line}: {result.model.definition.title}", ("quantity", "value"), summary(result))
-    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
-    if states:
-        _print_temperatures(result, states)
-    if wind is not None:
-        print_table("In the wind", ("quantity", "value"), wind_report.summary(wind))
-        print_table("Offsets of the contact wire", wind_report.COLUMNS, wind_report.rows(wind))
+    result = analyse(arguments)
+    wind = _in_wind(result, arguments) if blows else None
+    over = _over_temperature(result, asked, arguments.quiet) if asked else None
+    found = Found(result, over, wind, str(line_path(arguments.line)), tuple(_asked(result, arguments)))
+    show(arguments.line, found)
     if arguments.out is not None:
-        folder = new_folder(arguments.out)
-        write(folder, result)
-        if wind is not None:
-            wind_report.write(folder, wind)
-        if states:
-            temperature_report.write(folder, states)
-        print(f"tables and plots: {folder}")
+        write(new_folder(arguments.out), found)
+        print(f"page, tables and plots: {arguments.out}")
     return 0
+
+
+def show(name: str, found: Found) -> None:
+    """Print figures and tables."""
+    result, over, wind = found.result, found.over, found.wind
+    print_table(f"{name}: {result.model.definition.title}", ("quantity", "value"), summary(result))
+    print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
+    if over is not None:
+        _print_temperatures(over)
+    if wind is not None:
+        rows = [*wind_report.summary(wind), *((j.what, j.text) for j in wind.judgements)]
+        print_table("In the wind", ("quantity", "value"), rows)
+        print_table("Offsets of the contact wire", wind_report.COLUMNS, wind_report.rows(wind))
 
 
 def analyse(arguments: argparse.Namespace) -> LineStatics:
@@ -68,14 +75,48 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     return found
 
 
-def _print_temperatures(result: LineStatics, states: Sequence[LineAtTemperature]) -> None:
-    wanted, span = ruling(result.model.definition.sections[result.section])
+def _in_wind(result: LineStatics, arguments: argparse.Namespace) -> LineInWind:
+    names = ("--wind", "--pressure")
+    _, pressure = asked_wind(result.model.definition, arguments.wind, arguments.pressure, names)
+    return in_the_wind(result.model, result.section, pressure, arguments.limit, arguments.head)
+
+
+def _over_temperature(result: LineStatics, asked: Sequence[float], is_quiet: bool) -> LineOverTemperature:
+    """Return the line at some temperatures [K]; at a terminal a bar shows how far that is."""
+    with shown_progress(asked, "temperatures", is_quiet) as one_by_one:
+        return at_temperatures(result.model.definition, one_by_one, result.section, result.waves.train_speed)
+
+
+def _asked(result: LineStatics, arguments: argparse.Namespace) -> Iterator[tuple[str, str]]:
+    """Yield what was asked for: what, value with unit."""
+    sections = len(result.model.definition.sections)
+    if sections > 1:
+        yield "section", f"{result.section + 1} of {sections}"
+    yield "speed of the train, force of the elasticity", f"{arguments.speed:g} km/h, {arguments.force:g} N"
+    if arguments.temperature:
+        yield "temperatures", ", ".join(f"{t:g}" for t in arguments.temperature) + " \u00b0C"
+    if arguments.wind is not None:
+        yield "wind", f"{arguments.wind:g} m/s from either side"
+    if arguments.pressure is not None:
+        yield "wind", f"{arguments.pressure:g} Pa from either side"
+    if arguments.limit is not None:
+        yield "permissible offset from the middle of the track", f"{arguments.limit:g} m"
+    if arguments.head is not None:
+        yield "pantograph head", f"{arguments.head} mm"
+    for given in arguments.set:
+        if given.part == "line":
+            yield "changed", f"{given.parameter} = {given.value}"
+
+
+def _print_temperatures(over: LineOverTemperature) -> None:
+    wanted, span = over.ruling
     print_table(
         f"Temperatures; sag in the span {span.start:g} ... {span.end:g} m, the ruling span is {wanted:.2f} m",
         temperature_report.COLUMNS,
-        temperature_report.rows(states),
+        temperature_report.rows(over.states),
     )
-    print_table("Movements", ("quantity", "value"), temperature_report.swings(states))
+    rows = [*((j.what, j.text) for j in over.judgements), *temperature_report.swings(over.states)]
+    print_table("Movements and waves", ("quantity", "value"), rows)
 
 
 def summary(result: LineStatics) -> list[tuple[str, str]]:
@@ -99,11 +140,12 @@ def summary(result: LineStatics) -> list[tuple[str, str]]:
     ]
 
 
-def write(folder: Path, result: LineStatics) -> None:
-    """Write tables as CSV and plots as PNG, the strip chart of the line as SVG too."""
+def write(folder: Path, found: Found) -> None:
+    """Write the page, tables as CSV and plots as PNG, the strip chart of the line as SVG too."""
+    result = found.result
     for name, (titles, columns) in result.tables.items():
         write_csv(folder / f"{name}.csv", titles, [column.astype(float) for column in columns])
-    lines = [f'"{name}","{value}"' for name, value in summary(result)]
+    lines = [f"{_quoted(name)},{_quoted(value)}" for name, value in summary(result)]
     write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
     plots = {
         "span": statics_plots.span_profile(result.profiles, result.droppers, result.span),
@@ -114,6 +156,16 @@ def write(folder: Path, result: LineStatics) -> None:
         write_figure(folder / f"{name}.png", figure, 150)
     for ending in ("png", "svg"):
         write_figure(folder / f"profile.{ending}", route_plots.profile(result), 150)
+    if found.wind is not None:
+        wind_report.write(folder, found.wind)
+    if found.over is not None:
+        temperature_report.write(folder, found.over)
+    write_text(folder / "statics.html", statics_page.page(found))
+
+
+def _quoted(text: str) -> str:
+    """Return a text as CSV has it."""
+    return '"' + text.replace('"', '""') + '"'
 
 
 _DROPPER_COLUMNS = ("x [m]", "from the support [m]", "unstrained length [m]", "tension [N]")
@@ -147,7 +199,10 @@ def _arm_rows(result: LineStatics) -> list[tuple[str, str]]:
     arm = int(at[0])
     return [
         (f"steady arm at {result.span.start:g} m, lateral load [N]", f"{result.arms.lateral[arm]:.1f}"),
-        (f"steady arm at {result.span.start:g} m, lift by its tension [N]", f"{result.arms.lift[arm]:.1f}"),
+        (
+            f"steady arm at {result.span.start:g} m, lift by its tension [N]",
+            f"{round(result.arms.lift[arm], 1) + 0.0:.1f}",
+        ),
         (f"steady arm at {result.span.start:g} m, stiffness N/l [N/m]", f"{result.arms.pendulum[arm]:.1f}"),
     ]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from models.catenary.definition.line_definition import Span
+from models.catenary.definition.section_definition import Span
 from models.catenary.statics.elasticity import Elasticity
 from models.catenary.statics.rest_profile import Droppers, Profile, within
 
@@ -62,7 +62,8 @@ def elasticity(result: Elasticity, span: Span) -> Figure:
     for value, name, above in ((result.minimum, "minimum", -11), (result.maximum, "maximum", 3)):
         axes.axhline(1e3 * value, color=GREY, linewidth=0.6, linestyle="--")
         label, place = f"{name} {1e3 * value:.3f}", (span.start, 1e3 * value)
-        axes.annotate(label, place, xytext=(4, above), textcoords="offset points", fontsize=8)
+        paper = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+        axes.annotate(label, place, xytext=(4, above), textcoords="offset points", fontsize=8, bbox=paper)
     axes.set_ylim(0.0, 1.15e3 * result.maximum)
     axes.set_xlim(span.start, span.end)
     axes.set_xlabel("position along the track [m]; grey: droppers")

@@ -7,21 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from models.catenary.definition.tensioning_definition import COLDEST, HOTTEST
 from models.catenary.statics.temperature_table import LineAtTemperature
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.statics_plots import COLOURS
-from models.definition_files.parameter import ParameterError
-from models.definition_files.si_units import OFFSETS
-from models.library.norm_tables import support_limits
+from models.interface.line_over_temperature import ZERO, LineOverTemperature, checked_temperature
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: 0 degC [K].
-ZERO: Final = OFFSETS["degC"]
 #: Lines of the wires' colours, from the coldest to the hottest.
 _DASHES: Final = (":", "-.", "--", "-")
 COLUMNS: Final = (
@@ -37,10 +30,7 @@ def kelvin(temperature: float) -> float:
     ParameterError
         If no line is as cold or hot.
     """
-    if not COLDEST <= temperature + ZERO <= HOTTEST:
-        span = f"{COLDEST - ZERO:g} ... {HOTTEST - ZERO:g}"
-        raise ParameterError(f"--temperature {temperature:g}: is outside {span} degC, in which wires can be")
-    return temperature + ZERO
+    return checked_temperature(temperature + ZERO, f"--temperature {temperature:g}")
 
 
 def rows(states: Sequence[LineAtTemperature]) -> list[Sequence[str]]:
@@ -51,9 +41,9 @@ def rows(states: Sequence[LineAtTemperature]) -> list[Sequence[str]]:
             f"{state.temperature - ZERO:g}",
             f"{each.wire.at_tensioner:.0f}",
             f"{each.wire.at_fixed_point:.0f}",
-            f"{1e3 * each.wire.movement:.1f}",
-            "" if math.isnan(each.weight_movement) else f"{1e3 * each.weight_movement:.1f}",
-            f"{1e3 * each.sag:.1f}",
+            _millimetres(each.wire.movement),
+            "" if math.isnan(each.weight_movement) else _millimetres(each.weight_movement),
+            _millimetres(each.sag),
         )
         for state in states
         for each in state.wires
@@ -61,10 +51,8 @@ def rows(states: Sequence[LineAtTemperature]) -> list[Sequence[str]]:
 
 
 def swings(states: Sequence[LineAtTemperature]) -> list[tuple[str, str]]:
-    """Return the rows of what follows from movements: what, value with unit; first the loss of tension, judged."""
+    """Return the rows of what follows from movements and tensions: what, value with unit."""
     return [
-        ("largest loss of tension [% of nominal]", _verdict(states)),
-        *(
         row
         for state in states
         for row in (
@@ -73,38 +61,18 @@ def swings(states: Sequence[LineAtTemperature]) -> list[tuple[str, str]]:
             (f"largest change of stagger at {state.temperature - ZERO:g} degC [mm]",
              f"{1e3 * state.stagger_change:.1f}"),
             (f"largest slant of a dropper at {state.temperature - ZERO:g} degC [1]", f"{state.dropper_slant:.4f}"),
+            (f"slowest waves of the contact wire at {state.temperature - ZERO:g} degC [km/h]",
+             f"{3.6 * state.waves.speed:.1f}"),
         )
-        ),
     ]  # fmt: skip
 
 
-def write(folder: Path, states: Sequence[LineAtTemperature]) -> None:
+def write(folder: Path, found: LineOverTemperature) -> None:
     """Write ``temperature.csv``, and figures of tensions along the track and of sags over temperature."""
-    names = [each.wire.component for each in states[0].wires]
-    titles, columns = ["temperature [degC]"], [[s.temperature - ZERO for s in states]]
-    for k, name in enumerate(names):
-        wires = [s.wires[k] for s in states]
-        titles += [
-            f"{name} {what}"
-            for what in ("at the tensioner [N]", "at the fixed point [N]", "loss [N]", "D [m]", "D_v [m]", "sag [m]")
-        ]
-        columns += [
-            [w.wire.at_tensioner for w in wires],
-            [w.wire.at_fixed_point for w in wires],
-            [w.wire.loss for w in wires],
-            [w.wire.movement for w in wires],
-            [w.weight_movement for w in wires],
-            [w.sag for w in wires],
-        ]
-    titles += ["cantilever angle [deg]", "stagger change [m]", "dropper slant [1]"]
-    columns += [
-        [math.degrees(s.cantilever_angle) for s in states],
-        [s.stagger_change for s in states],
-        [s.dropper_slant for s in states],
-    ]
-    write_csv(folder / "temperature.csv", titles, [np.array(column) for column in columns])
-    write_figure(folder / "tension.png", tension(states), 150)
-    write_figure(folder / "sag.png", sag(states), 150)
+    titles, columns = found.tables["temperature"]
+    write_csv(folder / "temperature.csv", titles, columns)
+    write_figure(folder / "tension.png", tension(found.states), 150)
+    write_figure(folder / "sag.png", sag(found.states), 150)
 
 
 def tension(states: Sequence[LineAtTemperature]) -> Figure:
@@ -148,10 +116,6 @@ def sag(states: Sequence[LineAtTemperature]) -> Figure:
     return figure
 
 
-def _verdict(states: Sequence[LineAtTemperature]) -> str:
-    losses = [(w.wire.loss / w.wire.nominal, s.temperature - ZERO, w.wire.component) for s in states for w in s.wires]
-    share, temperature, component = max(losses)
-    largest = support_limits().largest_loss
-    kept = "within" if share <= largest else "beyond"
-    where = f"{component.replace('_', ' ')} at {temperature:g} degC"
-    return f"{100.0 * share:.1f}, {where}: {kept} {100.0 * largest:g} (TB 10009-2016)"
+def _millimetres(value: float) -> str:
+    """Return a length in m as text in mm, without a sign where nothing is left of it."""
+    return f"{round(1e3 * value, 1) + 0.0:.1f}"

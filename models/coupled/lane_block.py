@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from models.arrays import BoolArray, FloatArray, IntArray
+from models.catenary.condition.running_surface import RunningSurface
 from models.catenary.line_model import CatenaryModel
 from models.coupled.lane_matrices import LaneMatrices
+from models.definition_files.parameter import ParameterError
 from models.numerics.kernel_cache import joined, load_kernels
 from models.numerics.newmark import Newmark, steps_within
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
@@ -41,6 +43,23 @@ _FAILURES: Final = {
 def kernels(part: str) -> ModuleType:
     """Return compiled kernels of lanes: ``linear``, ``contact`` or ``train``; raises ``ImportError`` without numba."""
     return load_kernels(f"lanes_{part}", joined(_KERNEL_FILES[part]))
+
+
+def _common_surface(model: CatenaryModel) -> RunningSurface | None:
+    """Return the running surface of the one contact wire, None if there is none.
+
+    Raises
+    ------
+    ParameterError
+        If there are several wires: each has its own.
+    """
+    surfaces = [wire.surface for wire in model.wires]
+    if len(surfaces) > 1 and any(surfaces):
+        raise ParameterError(
+            f"line '{model.definition.name}' has several contact wires with running surfaces, and runs side by side "
+            "take a line of one section then: run scenarios one by one, or leave the running surface out"
+        )
+    return surfaces[0]
 
 
 class LaneBlock:
@@ -85,6 +104,7 @@ class LaneBlock:
         self.lanes: int = self._linear.BLOCK
         self._allocate(pantographs, len(model.wires), len(model.modes.attached))
         self._trains = self._new_trains(pantographs, masses)
+        self._surface = _common_surface(model)
 
     def enter(self, lane: int, pantographs: Sequence[LumpedDefinition]) -> None:
         """Begin a run in a lane: line and pantographs at rest, contacts found."""
@@ -105,7 +125,7 @@ class LaneBlock:
         self._train.continue_strips(trains, self._only(lane), self.times, 0.0, 0, self._strips)
         m = self._matrices
         self._contact.stand(
-            lane, self._strips[lane], m.law, m.loads, m.wires, memory, state, self._work, self.contact[lane]
+            lane, self._on_surface()[lane], m.law, m.loads, m.wires, memory, state, self._work, self.contact[lane]
         )
         self._train.start(trains, lane, self._start, self.contact[lane, :, 0].copy())
         memory.active[lane] = 1
@@ -125,7 +145,7 @@ class LaneBlock:
             self._train.continue_strips(trains, memory.active, times, k * self._h, self._order, self._strips)
             self._begin()
             self._linear.pull_droppers(m.linear, m.droppers, self._motion)
-            self._contact.meet_all(self._strips, m.law, m.unilateral, m.wires, memory, state, self._work)
+            self._contact.meet_all(self._on_surface(), m.law, m.unilateral, m.wires, memory, state, self._work)
             self._linear.finish(m.linear, self._motion)
             self._contact.conclude(self._strips, m.loads, m.wires, memory, state, self._work, self.contact)
         self._train.step_trains(trains, memory.active, times, self._start, self._step, before)
@@ -182,6 +202,17 @@ class LaneBlock:
         else:
             self._linear.load(m.linear, self._motion)
             self._state.change[...] = m.factor.solve(self._state.change)
+
+    def _on_surface(self) -> FloatArray:
+        """Return the strips as wires meet them, of whose running surface the kernels know nothing: so much lower."""
+        if self._surface is None:
+            return self._strips
+        strips, speed = self._strips.copy(), self._trains.setting[:, :, self._train.SPEED]
+        for strip, v in zip(strips.reshape(-1, strips.shape[-1]), speed.ravel().tolist(), strict=True):
+            height, slope = self._surface.at(float(strip[0]))
+            strip[3] -= height
+            strip[4] -= v * slope
+        return strips
 
     def _only(self, lane: int) -> IntArray:
         result = np.zeros(self.lanes, dtype=np.int64)

@@ -9,8 +9,9 @@ report prints it. A definition declares what it consists of, numbers and the tab
         mesh: Mesh = part(Mesh, default=Mesh())                 # [mesh]
         bodies: tuple[Body, ...] = named("body", Body)          # [body.NAME]
 
-and `read` fills it, `parameters` lists its tunable numbers, `with_values` changes them. Conditions on more than one
-field go into a method ``problems()``, which yields pairs of a key (possibly empty) and a text.
+and `read` fills it, `parameters` lists its tunable numbers, `with_values` changes them. A key that is a word of Python
+has a field with an underscore after it (``from_``). Conditions on more than one field go into a method ``problems()``,
+which yields pairs of a key (possibly empty) and a text.
 """
 
 from __future__ import annotations
@@ -288,7 +289,7 @@ def read(cls: type[T], table: Table, **given: Any) -> T:
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         spec: _Spec | None = field.metadata.get(_META)
         if spec is not None and field.name not in values:
-            values[field.name] = spec.read(table, field.name, field.default)
+            values[field.name] = spec.read(table, _key(field), field.default)
     result = cls(**values)
     if isinstance(result, Checked) and not unread(cls, table):
         mistaken = _mistaken(cls, table)
@@ -300,7 +301,7 @@ def read(cls: type[T], table: Table, **given: Any) -> T:
 
 def _mistaken(cls: type[Any], table: Table) -> set[str]:
     """Return the fields that could not be read; of a table of columns all of them, which are to fit one another."""
-    fields = {f.name: f.metadata.get(_META) for f in dataclasses.fields(cls)}
+    fields = {_key(f): f.metadata.get(_META) for f in dataclasses.fields(cls)}
     found = table.mistaken(fields)
     is_columns = all(isinstance(spec, _Series) for spec in fields.values())
     return set(fields) if found and is_columns else found
@@ -340,7 +341,7 @@ def parameters(obj: Any, provenance: Mapping[str, Quantity], prefix: str = "") -
         if isinstance(spec, _Number):
             if spec.tunable and value is not None:
                 description = spec.description.replace("{name}", getattr(obj, "name", ""))
-                yield from _listed(_joined(prefix, field.name), value, spec, description, provenance)
+                yield from _listed(_joined(prefix, _key(field)), value, spec, description, provenance)
         else:
             for name, item in _inside(field, value):
                 yield from parameters(item, provenance, _joined(prefix, name))
@@ -364,6 +365,11 @@ def with_values(obj: T, values: Mapping[str, float]) -> T:
     if found := [": ".join(filter(None, problem)) for problem in _problems(obj) if values]:
         raise ParameterError("\n".join(found))
     return obj
+
+
+def _key(field: dataclasses.Field[Any]) -> str:
+    """Return the key of a field; no key ends with an underscore."""
+    return field.name.rstrip("_")
 
 
 def _joined(*names: str) -> str:
@@ -414,9 +420,9 @@ def _replaced(obj: Any, path: str, name: str, value: float) -> Any:
     for field in dataclasses.fields(obj):
         spec, old = field.metadata.get(_META), getattr(obj, field.name)
         if isinstance(spec, _Number):
-            if path in spec.names(field.name) and not (spec.labels and old is None):
+            if path in spec.names(_key(field)) and not (spec.labels and old is None):
                 _check(name, value, spec)
-                return dataclasses.replace(obj, **{field.name: spec.replaced(old, field.name, path, value)})
+                return dataclasses.replace(obj, **{field.name: spec.replaced(old, _key(field), path, value)})
             continue
         for index, (inner, item) in enumerate(_inside(field, old)):
             if path.startswith(f"{inner}."):
@@ -426,7 +432,7 @@ def _replaced(obj: Any, path: str, name: str, value: float) -> Any:
                 if isinstance(old, tuple):
                     new = (*old[:index], new, *old[index + 1 :])
                 return dataclasses.replace(obj, **{field.name: new})
-    if any(path == field.name for field in dataclasses.fields(obj)):
+    if any(path == _key(field) for field in dataclasses.fields(obj)):
         raise ParameterError(f"parameter '{name}': is not a number that can be set")
     return None
 

@@ -280,6 +280,16 @@ class Table:
             self.problem(name, f"'{entry}' is none of {', '.join(allowed)}{hint(entry, allowed)}")
         return entry
 
+    def texts(self, name: str) -> tuple[str, ...]:
+        """Read a list of strings, empty if it is absent."""
+        entry = self._entry(name, required=False)
+        if entry is None:
+            return ()
+        if not isinstance(entry, list) or not all(isinstance(e, str) for e in entry):
+            self.problem(name, f"{shown_value(entry)} is not a list of texts in quotation marks")
+            return ()
+        return tuple(entry)
+
     def flag(self, name: str, *, default: bool | None = None) -> bool:
         """Read ``true`` or ``false``."""
         entry = self._entry(name, required=default is None)

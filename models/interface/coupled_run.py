@@ -210,6 +210,7 @@ def advice(line: CatenaryModel, pantograph: LumpedDefinition, step: float) -> tu
         limits.slack_warning(CatenaryPart(line.definition).droppers, line.static.is_slack),
         limits.slack_law_warning(line.definition),
         limits.track_warning(line.definition),
+        limits.surface_warning(line.definition, pantograph.speed, step),
     )
 
 

@@ -11,17 +11,22 @@ import numpy as np
 
 from models.arrays import BoolArray, FloatArray
 from models.catenary import line_advice
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.overbridge_definition import Overbridge
+from models.catenary.definition.section_definition import Span
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics import elasticity as under_force
 from models.catenary.statics import rest_profile, wire_waves
+from models.catenary.statics.found_tension import found_tension
+from models.catenary.statics.overbridge_room import OverbridgeRoom, overbridge_room
 from models.catenary.statics.support_loads import SupportLoads, support_loads
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.interface.column_frames import column_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.support_verdicts import support_verdicts
+from models.interface.norm_judgement import Judgement
+from models.interface.support_verdicts import overbridge_verdicts, support_verdicts
 from models.library.norm_tables import gradient_limits, support_limits
 
 if TYPE_CHECKING:
@@ -53,8 +58,11 @@ class LineStatics:
         ``x`` [m], ``lateral``, ``lift`` [N] of every steady arm.
     supports : SupportLoads
         ``x``, ``height`` [m], ``lateral`` [N] (left > 0), ``gradient`` and more of every support between the anchors.
-    verdicts : tuple of (str, str)
-        What norms say of supports, droppers and gradients.
+    overbridges : OverbridgeRoom
+        ``highest``, ``clearance``, ``encumbrance``, ``lift`` [m] of every bridge over the line.
+    judgements : tuple of Judgement
+        What norms say of supports, droppers, gradients and overbridges: ``what``, ``figure``, ``word``, ``limit``,
+        ``source``, ``is_kept``.
     elasticity : Elasticity
         ``x`` [m], ``value`` [m/N] along the span, ``minimum``, ``maximum``, ``non_uniformity``.
     others : dict
@@ -73,7 +81,8 @@ class LineStatics:
     droppers: rest_profile.Droppers
     arms: rest_profile.ArmLoads
     supports: SupportLoads
-    verdicts: tuple[tuple[str, str], ...]
+    overbridges: OverbridgeRoom
+    judgements: tuple[Judgement, ...]
     elasticity: under_force.Elasticity
     others: dict[int, tuple[int, under_force.Elasticity]]
     waves: wire_waves.Waves
@@ -83,13 +92,21 @@ class LineStatics:
         return f"<LineStatics of {self.model.definition.name}, span {self.number}>"
 
     @property
+    def verdicts(self) -> tuple[tuple[str, str], ...]:
+        """Return what was judged, and figure, verdict and limit in a line."""
+        return tuple((judged.what, judged.text) for judged in self.judgements)
+
+    @property
     def span_droppers(self) -> rest_profile.Droppers:
         """Return the droppers (and hangers) of the span in detail."""
         return rest_profile.droppers(self.model, self.span.start, self.span.end, self.section)
 
     @property
     def tables(self) -> dict[str, Table]:
-        """Columns by name: ``droppers``, ``elasticity``, ``steady_arms``, ``supports``, and every kind of wire."""
+        """Columns by name: ``droppers``, ``elasticity``, ``steady_arms``, ``supports``, and every kind of wire.
+
+        Of a line with bridges over it, ``overbridges`` too, in the order of the file.
+        """
         d, a = self.droppers, self.arms
         all_sections = {self.section: self.elasticity} | {section: other for section, (_, other) in self.others.items()}
         parts = [(np.full_like(e.x, section + 1), e.x, 1e3 * e.value) for section, e in sorted(all_sections.items())]
@@ -100,6 +117,8 @@ class LineStatics:
             "steady_arms": (("x [m]", "lateral load [N]", "lift [N]"), (a.x, a.lateral, a.lift)),
         }
         found["supports"] = _support_table(self.supports)
+        if self.model.definition.overbridge:
+            found["overbridges"] = _overbridge_table(self.model.definition.overbridge, self.overbridges)
         for component in dict.fromkeys(p.component for p in self.profiles):
             same = [(p.x, p.y, p.z) for p in self.profiles if p.component == component]  # stitch wires one by one
             found[component] = (("x [m]", "y [m]", "z [m]"), _joined(same))
@@ -157,8 +176,12 @@ def statics(
     return at_rest(found.definition, span, section, **values)
 
 
-def given(name: str, value: float | str, unit: str) -> float:
-    """Return a quantity greater than 0 that was given from Python, in SI.
+#: Highest speed of a train that is meant in m/s: above it km/h were [m/s].
+FASTEST = 200.0
+
+
+def given(name: str, value: float | str, unit: str, fastest: float = FASTEST) -> float:
+    """Return a quantity greater than 0 that was given from Python, in SI; a speed of trains unless it may be faster.
 
     Raises
     ------
@@ -171,13 +194,9 @@ def given(name: str, value: float | str, unit: str) -> float:
         raise ParameterError(str(error)) from error
     if found <= 0.0:
         raise ParameterError(f"{name}: {value} must be greater than 0 {unit}")
-    if unit == "m/s" and found > FASTEST:
+    if unit == "m/s" and found > fastest:
         raise ParameterError(f"{name}: {found:g} m/s is faster than any train; give it with its unit ('{value} km/h')")
     return found
-
-
-#: Highest speed that is meant in m/s: above it km/h were [m/s].
-FASTEST = 200.0
 
 
 def at_rest(definition: CatenaryDefinition, span: int | None, section: int, speed: float, force: float) -> LineStatics:
@@ -205,7 +224,7 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         line_advice.track_warning(definition),
     )
     hung = rest_profile.droppers(model, section=index)
-    supports = support_loads(model, index)
+    supports, room = support_loads(model, index), overbridge_room(model, force)
     return LineStatics(
         model=model,
         section=index,
@@ -215,16 +234,43 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
         droppers=hung,
         arms=rest_profile.arm_loads(model, index),
         supports=supports,
-        verdicts=tuple(support_verdicts(supports, hung, support_limits(), gradient_limits(), speed)),
+        overbridges=room,
+        judgements=(
+            *support_verdicts(supports, hung, support_limits(), gradient_limits(), speed),
+            *overbridge_verdicts(definition.overbridge, room, force),
+        ),
         elasticity=_elasticity(model, index, number, force),
         others={
             other: (middle := (len(s.spans) + 1) // 2, _elasticity(model, other, middle, force))
             for other, s in enumerate(definition.sections)
             if other != index
         },
-        waves=wire_waves.waves(definition, speed, chosen.length),
+        waves=_waves(model, index, chosen, speed),
         warnings=tuple(filter(None, warnings)),
     )
+
+
+def _waves(model: CatenaryModel, section: int, span: Span, speed: float) -> wire_waves.Waves:
+    """Return the wave figures in a span, with the tensions that the wires have there as the line is found."""
+    middle, definition = np.array([0.5 * (span.start + span.end)]), model.definition
+    upper = "messenger_wire" if definition.auxiliary_wire is None else "auxiliary_wire"
+    above, below = (float(found_tension(model.static, w, section, middle)[0]) for w in (upper, "contact_wire"))
+    return wire_waves.waves(definition, speed, span.length, below, above)
+
+
+def _overbridge_table(overbridges: Sequence[Overbridge], room: OverbridgeRoom) -> Table:
+    columns = {
+        "bridge": np.arange(1.0, len(overbridges) + 1.0),
+        "from [m]": np.array([s.start for s in overbridges]),
+        "to [m]": np.array([s.end for s in overbridges]),
+        "underside [m]": np.array([s.underside for s in overbridges]),
+        "highest wire [m]": room.highest,
+        "encumbrance left [m]": room.encumbrance,
+        "clearance at rest [m]": room.clearance,
+        "lift [m]": room.lift,
+        "clearance lifted [m]": room.clearance_lifted,
+    }
+    return tuple(columns), tuple(columns.values())
 
 
 def _support_table(s: SupportLoads) -> Table:

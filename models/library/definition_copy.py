@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 import tomllib
+from pathlib import Path
 from typing import Final
+
+from models.catenary.definition.surface_reading import named_profile
 
 _NAME: Final = re.compile(r"""^(\s*name\s*=\s*)("[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
 _TABLE: Final = re.compile(r"^\s*\[", re.MULTILINE)
@@ -28,6 +31,32 @@ def checked_name(name: str) -> str:
             f"'{name}' cannot name a definition, its file and its FMU: take letters, digits and _ (1 to 60)"
         )
     return name
+
+
+def profile_of_copy(path: Path, copy: Path) -> tuple[Path, bytes] | None:
+    """Return where a copy of a line's definition looks for its running surface, and what must be there.
+
+    None if the line names no file for it, or that is there already.
+
+    Parameters
+    ----------
+    path, copy : Path
+        The definition and its copy, both there.
+
+    Raises
+    ------
+    CopyError
+        If another file is there already.
+    """
+    source, target = named_profile(path), named_profile(copy)
+    if source is None or target is None or source.resolve() == target.resolve():
+        return None
+    data = source.read_bytes()
+    if not target.exists():
+        return target, data
+    if target.read_bytes() != data:
+        raise CopyError(f"{target} is there already, and is not {source}, the running surface of {path.stem}")
+    return None
 
 
 def renamed(text: str, name: str) -> str:

@@ -1,4 +1,4 @@
-"""Limits by norms, read from `norms/*.toml`: gradients of the contact wire, loads of supports."""
+"""Limits by norms, read from `norms/*.toml`: gradients of the contact wire, loads of supports, clearances."""
 
 from __future__ import annotations
 
@@ -44,6 +44,35 @@ class SupportLimits:
     smallest_lateral: float = quantity("N", "lateral load below which an arm comes loose", positive=True)
     shortest_dropper: float = quantity("m", "length of a dropper", positive=True)
     largest_loss: float = quantity("1", "loss of tension over that of the design", positive=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clearances:
+    """Distances between live wires and what stands over them."""
+
+    at_rest: float = quantity("m", "distance of wires at rest", positive=True)
+    lifted: float = quantity("m", "distance of wires that a pantograph lifts", positive=True)
+
+
+def norm_sources(name: str) -> dict[str, str]:
+    """Return where the numbers of a file of norms are from, by key; of tables where their first list is, by name.
+
+    Examples
+    --------
+    >>> norm_sources("supports")["shortest_dropper"], norm_sources("gradient")["IFE 6.3"]
+    ('ADIF: length of a dropper', 'Orden TMA/135/2023, IFE 6.3')
+    """
+    whole = Table.load(LIBRARY / "norms" / f"{name}.toml").data
+    found = {key: entry[2] for key, entry in whole.items() if isinstance(entry, list) and isinstance(entry[-1], str)}
+    return found | {table["name"]: table["speeds"][2] for table in whole.get("table", [])}
+
+
+def clearances() -> Clearances:
+    """Return the distances that are wanted under structures."""
+    whole = Table.load(LIBRARY / "norms" / "clearance.toml")
+    found = read(Clearances, whole)
+    whole.finish()
+    return found
 
 
 def gradient_limits() -> tuple[GradientLimits, ...]:

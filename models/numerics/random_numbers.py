@@ -1,4 +1,4 @@
-"""Seeded normal numbers that are the same bits everywhere: on every machine, under every numpy and Python.
+"""Seeded random numbers that are the same bits everywhere: on every machine, under every numpy and Python.
 
 Both methods stand here without the modules that have them as well (numpy's Philox, NormalDist of statistics): these
 would bring OpenSSL and a dozen other generators into every standalone FMU, 2 MB of its 20.
@@ -47,8 +47,30 @@ def normal_numbers(seed: int, stream: int, count: int) -> FloatArray:
     ----------
     .. [1] J. Salmon et al., Parallel random numbers: as easy as 1, 2, 3 (2011), table 2.
     """
-    shares = (min(((word >> 11) + 0.5) / 2.0**53, _BELOW_ONE) for word in islice(_words(seed, stream), count))
+    shares = _shares(seed, stream, count)
     return np.array([round(_normal_dist_inv_cdf(u, 0.0, 1.0), _DECIMALS) for u in shares], dtype=np.float64)
+
+
+def uniform_numbers(seed: int, stream: int, count: int) -> FloatArray:
+    """Return numbers that are spread evenly between 0 and 1, shape (count,); see `normal_numbers`.
+
+    Parameters
+    ----------
+    seed, stream, count : int
+        As there.
+
+    Examples
+    --------
+    >>> uniform_numbers(1, 5, 2).round(6).tolist()
+    [0.798855, 0.67244]
+    """
+    return np.array(list(_shares(seed, stream, count)), dtype=np.float64)
+
+
+def _shares(seed: int, stream: int, count: int) -> Iterator[float]:
+    """Yield numbers between 0 and 1, neither of them."""
+    for word in islice(_words(seed, stream), count):
+        yield min(((word >> 11) + 0.5) / 2.0**53, _BELOW_ONE)
 
 
 def _words(seed: int, stream: int) -> Iterator[int]:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import models
+from models.catenary.definition.fault_definition import FAULT_KINDS, Fault
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import read
 from models.definition_files.toml_reader import Table
@@ -14,8 +15,10 @@ from models.pantograph.lumped.lumped_definition import LumpedDefinition
 LIBRARY = Path(models.__file__).parent / "library"
 
 
-def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -> CatenaryDefinition:
-    """Return a simple line of LN2's wires with ``spans`` spans of 50 m; a change to None takes a table away."""
+def make_line(
+    spans: int | None = 6, alpha: float = 0.0272, length: float = 50.0, **changes: object
+) -> CatenaryDefinition:
+    """Return a simple line of LN2's wires with spans of 50 m or another length; a change to None takes a table away."""
     source = "test"
     data = {
         "name": "short",
@@ -28,7 +31,7 @@ def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -
         "spans": {
             "start": [0.0, "m", source],
             "count": spans,
-            "length": [50.0, "m", source],
+            "length": [length, "m", source],
             "droppers": {"first": [4.5, "m", source], "count": 7},
         },
         "stagger": {"amplitude": [0.2, "m", source]},
@@ -69,6 +72,11 @@ def make_line(spans: int | None = 6, alpha: float = 0.0272, **changes: object) -
     if spans is None:
         del data["spans"]
     return read(Table.from_dict({k: v for k, v in data.items() if v is not None}, "short.toml"))
+
+
+def make_fault(kind: str, **values: object) -> Fault:
+    """Return a fault of some kind, active unless it is said not to be."""
+    return FAULT_KINDS[kind](kind=kind, **values)
 
 
 def make_section(

@@ -142,7 +142,7 @@ SIGNED = {"start", "end", "angle", "listed", "anchor", "strip_offset", "position
           "positions", "point_i", "point_j", "axis_i", "axis_j", "euler", "height", "start_position", "force", "moment",
           "static_force", "static_moment", "free_length", "shortest", "longest", "direction", "gravity", "rise",
           "minimum", "maximum", "spans", "beta", "messenger_stagger", "arm_angle", "mast_side",
-          "fixed_point"}  # fmt: skip
+          "fixed_point", "value"}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", FILES)

@@ -22,6 +22,8 @@ from master.system.pantograph_motion import USE_TRAIN
 #: Version of the job; see ``models/commands/lanes_files.py``.
 _FORMAT: Final = 1
 _DEFINITION: Final = "resources/definition.toml"
+#: What an FMU has beside it, where the line's running surface was measured.
+_PROFILE: Final = "running_surface.csv"
 _DROPPER: Final = "dropper["
 #: Parameters of pantographs that runs side by side do not know, if they are there at all or are not 0.
 _NOT_IN_LANES: Final = ("lowest_height", "highest_height", "start_height")
@@ -51,6 +53,8 @@ class LaneGroup:
         names = [f"pantograph_{i}.toml" for i in range(1, len(trains) + 1)]
         for name, component in (("line.toml", line), *zip(names, trains, strict=True)):
             (folder / name).write_bytes(_definition(component.fmu))
+        if (profile := _profile(line.fmu)) is not None:
+            (folder / _PROFILE).write_bytes(profile)
         plans = recording_plans(system)
         data = {
             "format": _FORMAT,
@@ -174,6 +178,12 @@ def _chosen(component: Component, name: str) -> bool:
     """Whether a parameter that is 0 or 1 is not 0; False if there is none."""
     variable = component.fmu.variables.get(name)
     return variable is not None and bool(float(component.parameters.get(name, variable.start or 0.0)))
+
+
+def _profile(fmu: Fmu) -> bytes | None:
+    with zipfile.ZipFile(fmu.path) as file:
+        place = f"resources/{_PROFILE}"
+        return file.read(place) if place in file.namelist() else None
 
 
 def _definition(fmu: Fmu) -> bytes:

@@ -15,10 +15,12 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition, Section, Wire
+from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition, Wire
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState
+from models.catenary.shape.line_mesh import CatenaryMesh
 
 #: Wires with a tensioning device of their own, and what droppers and hangers hang from what.
 WIRES: Final = ("contact_wire", "messenger_wire", "auxiliary_wire")
@@ -175,9 +177,8 @@ def wire_tensions(design: StaticState) -> tuple[WireTension, ...]:
     return tuple(wire for index, section in enumerate(definition.sections) for wire in _section(design, section, index))
 
 
-def tension_factors(design: StaticState, wires: Sequence[WireTension]) -> FloatArray:
+def tension_factors(mesh: CatenaryMesh, wires: Sequence[WireTension]) -> FloatArray:
     """Return the tension of every beam element over that of the design, shape (n_beams,)."""
-    mesh = design.shape.mesh
     result = np.ones(len(mesh.beams))
     middle = mesh.points[mesh.beams, 0].mean(axis=1)
     of_section = mesh.section[mesh.beams[:, 0]]

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray, IntArray
-from models.catenary.contact_and_slack.crossing import Crossing, crossing, engagement
+from models.catenary.condition.running_surface import RunningSurface
+from models.catenary.contact_and_slack.crossing import Crossing, crossing, engagement, penetration
 from models.catenary.linear_motion.interval_modes import IntervalModes, IntervalMotion
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
@@ -111,12 +112,16 @@ class ContactWire:
         Direction of the nodal axes in plan [rad].
     period : float
         Length after which the wire is met again, because it closes on itself [m]; 0 for one that ends.
+    surface : RunningSurface, optional
+        What strips run on, where its underside does not follow its static shape.
 
     Attributes
     ----------
     starts : list of float
         Where its elements begin along the track, and where the last one ends [m].
     intervals : tuple of WireInterval
+    period, surface
+        The parameters.
     """
 
     def __init__(
@@ -127,8 +132,9 @@ class ContactWire:
         modes: IntervalModes,
         angles: FloatArray,
         period: float = 0.0,
+        surface: RunningSurface | None = None,
     ) -> None:
-        self.period = period
+        self.period, self.surface = period, surface
         self.starts: list[float] = static.positions[chain.nodes, 0].tolist()
         self.intervals = _intervals(parts, static, modes, angles)
         self._of_element = [i for i in self.intervals for _ in i.height]
@@ -221,6 +227,20 @@ class ContactWire:
         x = start + xi * (end - start)
         from_wire_end = math.inf if self.period else min(x - self.starts[0], self.starts[-1] - x)
         return Crossing(element, xi, share, engagement(min(share, 1.0 - share) * math.dist(a, b), from_wire_end))
+
+    def penetration(
+        self, share: float, height: float, rate: float, strip: FloatArray, gap: float
+    ) -> tuple[float, float]:
+        """Return penetration and its velocity of a strip that crosses the wire [m, m/s]; see `crossing.penetration`.
+
+        A running surface r that stands up leaves less of them, by r and by v dr/dx with the speed v of the strip.
+        """
+        delta, velocity = penetration(share, height, rate, strip, gap)
+        if self.surface is None:
+            return delta, velocity
+        (x, v), (x_b, v_b) = strip[:, :, 0].tolist()
+        r, slope = self.surface.at(x + share * (x_b - x))
+        return delta - r, velocity - (v + share * (v_b - v)) * slope
 
     def start(self, guess: int, x: float) -> int:
         """Return where to begin walking; a guess that is far off (first step, reset) is replaced by a search."""

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
+from models.catenary.definition.as_built_reading import read_length_errors
+from models.catenary.definition.section_definition import EndSpans, Section, Span, Support
 from models.catenary.definition.support_reading import listed_stagger, with_own_values
 from models.definition_files.toml_reader import Table
 
 #: Tables of a section.
-SECTION_TABLES: Final = ("spans", "stagger", "ends", "measured", "supports")
+SECTION_TABLES: Final = ("spans", "stagger", "ends", "measured", "supports", "as_built")
 #: Largest numbers of spans in a section, of droppers in a span and of droppers in a section.
 MAX_SPANS, MAX_HUNG, MAX_DROPPERS = 10_000, 1000, 100_000
 
@@ -53,7 +54,7 @@ def read_section(table: Table, *, has_arms: bool, has_hangers: bool) -> Section:
     if periodic and measured and abs(measured[-1][1] - measured[0][1]) > 1e-6:
         text = f"a periodic line ends as it begins: the last height must be the first, {measured[0][1]:g} m"
         table.problem("measured.heights", f"{text}, not {measured[-1][1]:g} m")
-    return Section(supports, spans, ends, measured, periodic)
+    return Section(supports, spans, ends, measured, periodic, read_length_errors(table, spans))
 
 
 def _span(start: float, end: float, droppers: _Hung, hangers: _Hung) -> Span:
@@ -215,7 +216,7 @@ def _read_ring(
     stagger = _stagger_table(table, listed)
     if stagger.has("anchor"):
         stagger.problem("anchor", "a periodic line has no anchors: remove this value")
-        stagger.quantity("anchor", "m")
+        stagger.quantities("anchor", "m")
     if stagger.has("amplitude") and len(inner) % 2:
         text = f"changes sides at every support, and after {len(inner)} spans the line would close on the other side:"
         stagger.problem("amplitude", f"{text} take an even number of spans, or list the stagger of every support")
@@ -250,10 +251,19 @@ def _read_stagger(
     inner = [i for i, ok in enumerate(registered) if ok]
     values = dict(zip(inner, _registered_stagger(table, len(inner), [own[i - 1] for i in inner if own]), strict=True))
     values |= dict(enumerate(own, 1))
-    anchors = table.quantity("anchor", "m", default=0.0, minimum=-10.0, maximum=10.0)
-    known = {0: anchors, len(boundaries) - 1: anchors} | values
+    first, last = _read_anchors(table)
+    known = {0: first, len(boundaries) - 1: last} | values
     held = sorted(known)
     return [_straight(known, held, boundaries, i) for i in range(len(boundaries))]
+
+
+def _read_anchors(table: Table) -> tuple[float, float]:
+    """Return the wire's place at the first and the last anchor, one value for both or one for each [m]."""
+    anchors = table.quantities("anchor", "m", default=(0.0,), minimum=-10.0, maximum=10.0)
+    if len(anchors) not in (1, 2):
+        table.problem("anchor", f"gives {len(anchors)} values: give one for both anchors, or one for each")
+        return math.nan, math.nan
+    return anchors[0], anchors[-1]
 
 
 def _registered_stagger(table: Table, count: int, own: Sequence[float]) -> tuple[float, ...]:

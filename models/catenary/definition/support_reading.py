@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any, Final
 
-from models.catenary.definition.line_definition import Support
+from models.catenary.definition.section_definition import Support
 from models.definition_files.toml_reader import Table
 
 #: Key of the table -> unit and range; the field of a support has the same name.
@@ -34,6 +34,7 @@ def with_own_values(own: Table, supports: Sequence[Support], *, periodic: bool, 
 
     Anchors have the heights of the supports beside them, from which the wires rise.
     """
+    supports = _named(own, supports, periodic=periodic)
     inner = supports if periodic else supports[1:-1]
     for name in (*_QUANTITIES, "stagger", "arm_side"):
         own.offers(name)
@@ -46,13 +47,31 @@ def with_own_values(own: Table, supports: Sequence[Support], *, periodic: bool, 
     columns = {name: values for name, values in columns.items() if values}
     if not has_arms and (named := [name for name in _OF_ARMS if own.has(name)]):
         own.problem(named[0], "the line has no steady arms: it needs a table [steady_arm]")
-    if not set(own.names()) & {*_QUANTITIES, "arm_side", "stagger"}:
+    if not set(own.names()) & {*_QUANTITIES, "arm_side", "stagger", "structure"}:
         own.problem("", "gives nothing of any support: fill it, or remove it")
     changed = [_changed(s, {name: values[i] for name, values in columns.items()}) for i, s in enumerate(inner)]
     if periodic or not changed:
         return tuple(changed or supports)
     first, last = (_anchor(s, beside) for s, beside in ((supports[0], changed[0]), (supports[-1], changed[-1])))
     return first, *changed, last
+
+
+def _named(own: Table, supports: Sequence[Support], *, periodic: bool) -> tuple[Support, ...]:
+    """Return the supports with the names of their structures, as far as these are given."""
+    names = own.texts("structure")
+    if not names:
+        return tuple(supports)
+    inner = len(supports) if periodic else len(supports) - 2
+    if len(names) not in (inner, len(supports)):
+        also = "" if periodic else f", or {len(supports)} with the anchors"
+        own.problem("structure", f'gives {len(names)} names for {inner} supports{also}; an unknown one is ""')
+        return tuple(supports)
+    known = [name for name in names if name]
+    if repeated := next((name for name in known if known.count(name) > 1), ""):
+        own.problem("structure", f"'{repeated}' is the name of two supports: names tell them apart")
+    if len(names) < len(supports):
+        names = ("", *names, "")
+    return tuple(dataclasses.replace(s, structure=name) for s, name in zip(supports, names, strict=True))
 
 
 def _changed(support: Support, values: dict[str, float]) -> Support:

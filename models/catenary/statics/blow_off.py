@@ -18,6 +18,7 @@ from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.line_matrices import axial_stiffness, element_dofs
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.track import mean_curvature
+from models.catenary.statics.found_tension import found_tension
 from models.catenary.statics.span_table import String
 
 #: Wires that the wind blows; the drag of droppers and of stitch wires is left out.
@@ -81,7 +82,7 @@ def blow_off(model: CatenaryModel, pressure: float, section: int = 0) -> BlowOff
     if definition.sections[section].periodic:
         held = np.append(held[1:-1], held[1])
     apart = ~(held[1:] & held[:-1])
-    tension = _tensions(static, section, middle)
+    tension = found_tension(static, "contact_wire", section, middle)
     strings = [
         _string(definition, String(T, wind), *span)
         for T, *span in zip(tension.tolist(), ends[:-1], ends[1:], places[:-1], places[1:], strict=True)
@@ -148,15 +149,6 @@ def _farthest(x: FloatArray, still: FloatArray, aside: FloatArray, start: float,
     """Return the largest distance from the middle of the track in a span under either wind [m]."""
     inside = (x >= start - 0.01) & (x <= end + 0.01)
     return float((np.abs(still) + np.abs(aside))[inside].max())
-
-
-def _tensions(static: StaticState, section: int, x: FloatArray) -> FloatArray:
-    """Return the tension that the contact wire has as the line is found, at places along a section [N]."""
-    mesh, definition = static.shape.mesh, static.shape.definition
-    chosen = (mesh.component == COMPONENTS.index("contact_wire")) & (mesh.section[mesh.beams[:, 0]] == section)
-    along = mesh.points[mesh.beams[chosen], 0].mean(axis=1)
-    order = along.argsort()
-    return definition.contact_wire.tension * np.interp(x, along[order], mesh.tension_factor[chosen][order])
 
 
 def _string(

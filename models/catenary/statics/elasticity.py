@@ -15,10 +15,11 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire
 from models.catenary.contact_and_slack.local_problem import LocalProblem
-from models.catenary.definition.line_definition import Span
+from models.catenary.definition.section_definition import Span
 from models.catenary.line_model import CatenaryModel
 from models.catenary.linear_motion.attachment_solver import factorised
 from models.catenary.linear_motion.compliance import Compliance
+from models.catenary.shape.beam_elements import NODE_DOFS
 from models.contact_law import CONTACT_LAWS
 
 
@@ -78,6 +79,36 @@ def elasticity(model: CatenaryModel, x: FloatArray, force: float, section: int =
     return Elasticity(x, np.array([response.uplift(wire, float(at), force) / force for at in x]), force)
 
 
+def rise_of_nodes(model: CatenaryModel, x: FloatArray, force: float, section: int = 0) -> FloatArray:
+    """Return how far nodes rise under a force on the contact wire; those between attachments of the pushed wire less.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Positions along the track [m].
+    force : float
+        Vertical force, applied at one position after the other [N].
+    section : int
+        Section of the contact wire.
+
+    Returns
+    -------
+    ndarray, shape (n, n_nodes)
+        [m].
+
+    Raises
+    ------
+    LocalSolutionError
+        If the set of slack droppers under the force is not found.
+    """
+    response, still = _StaticResponse(model), np.zeros(model.modes.coupling.shape[0])
+    rises = np.zeros((len(x), len(model.mesh.points)))
+    for row, place in zip(rises, x.tolist(), strict=True):
+        _, attached = response.under(model.wires[section], place, force)
+        row[:] = model.modes.nodal(still, attached).reshape(-1, NODE_DOFS)[model.mesh.owner, 2]
+    return rises
+
+
 def positions_in_span(span: Span, between: int = 6) -> FloatArray:
     """Return the positions of supports, droppers and points that divide every gap into ``between`` intervals [m]."""
     breaks = [span.start, *span.droppers, span.end]
@@ -108,6 +139,10 @@ class _StaticResponse:
 
     def uplift(self, wire: ContactWire, x: float, force: float) -> float:
         """Return the rise of a contact wire under a vertical force on it [m]."""
+        return self.under(wire, x, force)[0]
+
+    def under(self, wire: ContactWire, x: float, force: float) -> tuple[float, FloatArray]:
+        """Return the rise of a contact wire under a vertical force on it [m], and displacements of all attachments."""
         model = self._model
         element, xi = wire.locate(x)
         interval = wire.interval(element)
@@ -121,4 +156,4 @@ class _StaticResponse:
             column = self._columns[int(j)]
             displacement[column.rows] -= compensation * column.values[:, 0]
         inside = force * modal @ (modal / model.modes.eigenvalue[interval.modes])
-        return float(ends @ displacement[interval.ends] + inside)
+        return float(ends @ displacement[interval.ends] + inside), displacement

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import Section
+from models.catenary.definition.section_definition import Section
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.line_mesh import contact_wire_height
 from models.catenary.shape.support_places import SupportPlaces

@@ -11,10 +11,13 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.condition.line_condition import find_condition
 from models.catenary.condition.tensioning import WireTension, ruling_span, swing, wire_tensions
-from models.catenary.definition.line_definition import CatenaryDefinition, Section, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section, Span
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.statics.overbridge_room import highest_wires
+from models.catenary.statics.wire_waves import Waves, waves
 from models.definition_files.parameter import ParameterError
 
 
@@ -52,6 +55,10 @@ class LineAtTemperature:
         Largest movement of a registration end towards its mast [m].
     dropper_slant : float
         Largest slant of droppers along the track, difference of movements over mean length.
+    waves : Waves
+        In the span where the contact wire's waves are slowest, with the tensions that the wires have there.
+    highest : ndarray, shape (n_overbridges,)
+        Height of the highest wire under each of the line's bridges [m]; NaN where there is none.
     """
 
     temperature: float
@@ -59,12 +66,16 @@ class LineAtTemperature:
     cantilever_angle: float
     stagger_change: float
     dropper_slant: float
+    waves: Waves
+    highest: FloatArray
 
 
 def temperature_table(
-    definition: CatenaryDefinition, temperatures: Iterable[float], section: int = 0
+    definition: CatenaryDefinition, temperatures: Iterable[float], section: int = 0, speed: float = 0.0
 ) -> tuple[LineAtTemperature, ...]:
-    """Return a section of a line at some temperatures [K].
+    """Return a section of a line at some temperatures [K], with the wave figures at a train speed [m/s].
+
+    Temperatures are asked for one by one, each when the one before is done.
 
     Raises
     ------
@@ -79,7 +90,7 @@ def temperature_table(
             "least temperature and reference_temperature there"
         )
     design = kept_form(definition, build_mesh(definition))
-    return tuple(_at(design, temperature, section) for temperature in temperatures)
+    return tuple(_at(design, temperature, section, speed) for temperature in temperatures)
 
 
 def ruling(section: Section) -> tuple[float, Span]:
@@ -96,7 +107,7 @@ def ruling(section: Section) -> tuple[float, Span]:
     return wanted, min(alike, key=lambda span: abs(0.5 * (span.start + span.end) - middle))
 
 
-def _at(design: StaticState, temperature: float, index: int) -> LineAtTemperature:
+def _at(design: StaticState, temperature: float, index: int, speed: float) -> LineAtTemperature:
     definition = design.shape.definition.with_values({"tensioning.temperature": temperature})
     tensioning, section = definition.tensioning, definition.sections[index]
     assert tensioning is not None
@@ -116,7 +127,18 @@ def _at(design: StaticState, temperature: float, index: int) -> LineAtTemperatur
         cantilever_angle=math.asin(min(1.0, moved / tensioning.cantilever_length)),
         stagger_change=float(swing(np.array(moved), tensioning.cantilever_length)),
         dropper_slant=float(slant / _mean_length(design, index)),
+        waves=_slowest(definition, contact, upper, speed),
+        highest=highest_wires(state, definition.overbridge),
     )
+
+
+def _slowest(definition: CatenaryDefinition, contact: WireTension, upper: WireTension, speed: float) -> Waves:
+    """Return the wave figures in the span in which waves are slowest, at a train speed [m/s]."""
+    every = [
+        waves(definition, speed, float(length), float(below), float(above))
+        for length, below, above in zip(np.diff(contact.ends), contact.tension, upper.tension, strict=True)
+    ]
+    return min(every, key=lambda each: each.speed)
 
 
 def _weight_movement(definition: CatenaryDefinition, wire: WireTension) -> float:

@@ -8,7 +8,7 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from models.catenary.definition.line_definition import CatenaryDefinition, Wire
 
@@ -72,11 +72,27 @@ def reflection_factor(upper: Wire, contact: Wire) -> float:
     return above / (above + below)
 
 
-def waves(definition: CatenaryDefinition, speed: float, length: float) -> Waves:
-    """Return the wave figures of a line at a train speed [m/s] in a span of some ``length`` [m].
+def waves(
+    definition: CatenaryDefinition,
+    speed: float,
+    length: float,
+    contact: float | None = None,
+    upper: float | None = None,
+) -> Waves:
+    """Return the wave figures of a line at a train speed in a span.
 
     The upper wire of the droppers is the messenger wire, or in a compound line the auxiliary wire.
+
+    Parameters
+    ----------
+    definition : CatenaryDefinition
+    speed, length : float
+        Speed of the train [m/s], length of the span [m].
+    contact, upper : float, optional
+        Tensions that contact wire and upper wire have there [N]; by default those of the design.
     """
-    C = wave_speed(definition.contact_wire, length)
-    upper = definition.auxiliary_wire or definition.messenger_wire
-    return Waves(C, speed, reflection_factor(upper, definition.contact_wire), (C - speed) / (C + speed))
+    below, above = definition.contact_wire, definition.auxiliary_wire or definition.messenger_wire
+    below = below if contact is None else replace(below, tension=contact)
+    above = above if upper is None else replace(above, tension=upper)
+    C = wave_speed(below, length)
+    return Waves(C, speed, reflection_factor(above, below), (C - speed) / (C + speed))

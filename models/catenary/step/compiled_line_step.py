@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
+from models.catenary.contact_and_slack.contact_wire import ContactWire
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError, not_settled
 from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.attachment_solver import Sparse
@@ -29,6 +30,8 @@ _NO_STRIPS = np.zeros((0, 2, 2, 3)), np.zeros(0)
 #: No droppers.
 _NONE, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
 
+#: What is known of the knots of a running surface.
+_KNOTS = ("position", "height", "slope")
 #: Displacements of attachments from which on a solution about a load takes less time than a whole one.
 _LONG = 12000
 
@@ -78,11 +81,12 @@ class CompiledLineStep:
         self._records = StepRecords(line.wires, matrices, compliance, self.units.slots)
         contact, n_attached, n_droppers = line.contact, len(modes.attached), len(droppers.stiffness)
         numbers = np.array([newmark.a1, contact.stiffness, contact.exponent, contact.restitution, line.gap])
-        #: As named tuples of the kernels: `Lanes`, `LanesWork`, `Modes`, `Droppers`, `Wires`.
+        #: As named tuples of the kernels: `Lanes`, `LanesWork`, `Modes`, `Droppers`, `Wires`, `Surfaces`.
         self._line = (
             *(*lanes.arrays, *lanes.work, *self.units.arrays, *_by_rows(droppers.B), droppers.elastic_at_rest),
             *(droppers.stiffness, droppers.slack_delay, droppers.unilateral, 2.0 * droppers.rest_load),
             *self._records.wires,
+            *_surfaces(line.wires),
         )
         intervals = [interval for wire in line.wires for interval in wire.intervals]
         self._sizes = max(i.size for i in intervals), max(len(i.ends) for i in intervals)
@@ -173,6 +177,15 @@ class CompiledLineStep:
         prepared = motion.prepared
         motion.packed = packed = PackedMotion(self.units, *motion.plain(), prepared)
         return packed
+
+
+def _surfaces(wires: Sequence[ContactWire]) -> tuple[Any, ...]:
+    """Return the running surfaces of contact wires: `Surfaces` of the kernels."""
+    of_wires = [wire.surface.pieces if wire.surface is not None else () for wire in wires]
+    pieces = [piece for own in of_wires for piece in own]
+    numbers = [np.concatenate([getattr(p, name) for p in pieces] or [np.zeros(0)]) for name in _KNOTS]
+    counts = [len(own) for own in of_wires], [len(piece.position) for piece in pieces]
+    return *(np.cumsum([0, *count]) for count in counts), *numbers
 
 
 def _by_rows(matrix: sp.spmatrix) -> tuple[Any, Any, FloatArray]:

@@ -19,6 +19,10 @@ NOWHERE = -1
 #: of its wire that each interval ``begins`` with.
 Wires = namedtuple("Wires", "first starts period interval begins")
 wires_of = reader(Wires, "iffii")
+#: Running surfaces, piece after piece: ``first`` piece of each wire, and one more; first ``knot`` of each piece, and
+#: one more; ``position``, ``height`` and ``slope`` of the knots; see `models.catenary.condition.running_surface`.
+Surfaces = namedtuple("Surfaces", "first knot position height slope")
+surfaces_of = reader(Surfaces, "iifff")
 #: What is known of intervals and droppers: ``data``, record after record; ``whole``, the same memory as whole numbers;
 #: where in it the record of each of the ``intervals`` and ``droppers`` begins, below 0 if it is not there.
 Records = namedtuple("Records", "data whole intervals droppers")
@@ -192,6 +196,34 @@ def _crossing(strip, shift, records, record, element, local):
         return math.inf, 0.0
     dx, dy = x - (strip[0, 0, 0] - shift), y - strip[0, 0, 1]
     return (dy * wire_x - dx * wire_y) / determinant, (strip_x * dy - strip_y * dx) / determinant
+
+
+@part
+def surface_at(surfaces, wires, section, x):
+    """Return height and slope of a wire's running surface at a place along the track; see `RunningSurface.at`."""
+    period = wires.period[section]
+    if period > 0.0:
+        x -= math.floor((x - wires.starts[wires.first[section] + section]) / period) * period
+    height = slope = 0.0
+    for piece in range(surfaces.first[section], surfaces.first[section + 1]):
+        low, high = surfaces.knot[piece], surfaces.knot[piece + 1] - 1
+        if x < surfaces.position[low]:
+            height += surfaces.height[low]
+        elif x >= surfaces.position[high]:
+            height += surfaces.height[high]
+        else:
+            while high - low > 1:
+                middle = (low + high) // 2
+                if surfaces.position[middle] <= x:
+                    low = middle
+                else:
+                    high = middle
+            h, d = surfaces.position[high] - surfaces.position[low], surfaces.height[high] - surfaces.height[low]
+            t = (x - surfaces.position[low]) / h
+            a, b = h * surfaces.slope[low] - d, d - h * surfaces.slope[high]
+            height += surfaces.height[low] + t * (d + (1.0 - t) * (a * (1.0 - t) + b * t))
+            slope += (d + (1.0 - 2.0 * t) * (a * (1.0 - t) + b * t) + t * (1.0 - t) * (b - a)) / h
+    return height, slope
 
 
 @part

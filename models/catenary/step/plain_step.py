@@ -9,7 +9,6 @@ import scipy.sparse as sp
 
 from models.arrays import FloatArray
 from models.catenary.contact_and_slack.contact_wire import put_in_lap
-from models.catenary.contact_and_slack.crossing import penetration
 from models.catenary.contact_and_slack.local_problem import ContactCandidate, LocalForces, LocalProblem
 from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.contact_and_slack.wire_response import WirePoint, interval_response
@@ -113,7 +112,7 @@ class PlainStep:
                 crossing, point, rise, speed = met
                 state.element[p, s] = crossing.element
                 self._points[s, crossing.element, crossing.xi] = point
-                delta, rate = penetration(crossing.share, point.height + rise, speed, strip, self._line.gap)
+                delta, rate = wire.penetration(crossing.share, point.height + rise, speed, strip, self._line.gap)
                 impact = float(state.impact_velocity[p, s])
                 candidates.append(ContactCandidate(p, s, crossing, point, delta, rate, impact))
                 self._responses.prepare(wire.next_interval(crossing.element))

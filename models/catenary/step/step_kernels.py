@@ -23,6 +23,8 @@ from models.catenary.step.contact_kernels import (
     press,
     put_place,
     records_of,
+    surface_at,
+    surfaces_of,
     wires_of,
 )
 from models.catenary.step.local_kernels import LACKING, SINGULAR, SOLVED, solve_local
@@ -54,7 +56,8 @@ def step(book, moving, state, strips, given, out):
     Parameters
     ----------
     book : ndarray of int
-        Of Lanes, LanesWork, Modes, Droppers, Wires, Work, Points and Records, see `models.catenary.step.array_book`.
+        Of Lanes, LanesWork, Modes, Droppers, Wires, Surfaces, Work, Points and Records, see
+        `models.catenary.step.array_book`.
     moving : (attached, table, pull)
         attached : ndarray, shape (2, n_attached)
         table, pull
@@ -79,7 +82,8 @@ def step(book, moving, state, strips, given, out):
         modes_of(book, 17),
         droppers_of(book, 25),
     )
-    wires, work, points, records = wires_of(book, 33), work_of(book, 38), points_of(book, 50), records_of(book, 68)
+    wires, surfaces, work = wires_of(book, 33), surfaces_of(book, 38), work_of(book, 43)
+    points, records = points_of(book, 55), records_of(book, 73)
     (attached, table, pull), report, a1 = moving, work.report, work.numbers[0]
     motion = a1, table, work.change, attached
     if report[STAGE] < _BEGUN:
@@ -94,7 +98,7 @@ def step(book, moving, state, strips, given, out):
             _bend_at(records, record, points, 0, force, work.change)
         _put_free(droppers, motion, work.free)
         report[STAGE] = _BEGUN
-    report[LACKS], count = _meet(wires, records, state, strips[0], motion, points, work)
+    report[LACKS], count = _meet(wires, surfaces, records, state, strips[0], motion, points, work)
     if report[LACKS] >= 0:
         return INTERVAL_LACKS
     n = 0
@@ -180,7 +184,7 @@ def _put_free(droppers, motion, free):
 
 
 @part
-def _meet(wires, records, state, strips, motion, points, work):
+def _meet(wires, surfaces, records, state, strips, motion, points, work):
     """Find all strips that cross a wire at the end of the step, forces found inside it left out.
 
     Returns
@@ -217,6 +221,11 @@ def _meet(wires, records, state, strips, motion, points, work):
             a, b = strips[p, 0, :, 2], strips[p, 1, :, 2]
             points.penetration[count] = a[0] + place[1] * (b[0] - a[0]) - (height - work.numbers[4])
             points.velocity[count] = a[1] + place[1] * (b[1] - a[1]) - rate
+            if surfaces.first[s] < surfaces.first[s + 1]:
+                a, b = strips[p, 0, :, 0], strips[p, 1, :, 0]
+                r, slope = surface_at(surfaces, wires, s, a[0] + place[1] * (b[0] - a[0]))
+                points.penetration[count] -= r
+                points.velocity[count] -= (a[1] + place[1] * (b[1] - a[1])) * slope
             ahead = _next(wires, s, number)
             if records.intervals[ahead] < 0:
                 work.report[AHEAD] = ahead

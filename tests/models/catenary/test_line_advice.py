@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from models.catenary.definition.line_definition import Contact, Rayleigh
+from models.catenary.definition.surface_definition import RunningSurface
 from models.catenary.line_advice import (
     longest_step,
     slack_law_warning,
     slack_warning,
     speed_warning,
     step_warning,
+    surface_warning,
     tangent_stiffness,
 )
 from models.catenary.line_part import CatenaryPart
@@ -119,3 +121,27 @@ def test_droppers_that_pull_before_they_are_taut_are_told_with_figure_and_cure(l
 def test_statics_warns_of_the_speed(speed, expected, capsys):
     assert main(["statics", "EN50318_2018_AC_simple", "--speed", speed]) == 0
     assert ("warning: the train's 350 km/h" in capsys.readouterr().err) == expected
+
+
+def test_waves_that_steps_pass_over_are_warned_of(ln2):
+    """8 steps of 1 ms at 300 km/h are 0.67 m."""
+    generated = RunningSurface(sigma=1e-4, exponent=2.0, from_=0.1, to=2.0, seed=0)
+    line = dataclasses.replace(ln2, running_surface=generated)
+    said = surface_warning(line, -300.0 / 3.6, 1e-3)
+    assert said == (
+        "the running surface has waves down to 0.5 m, and steps of 1 ms at 300 km/h follow none below 0.67 m: take a "
+        "smaller time_step"
+    )
+    assert surface_warning(line, 300.0 / 3.6, 5e-4) == ""
+    assert surface_warning(line.with_values({"running_surface.to": 1.4}), 300.0 / 3.6, 1e-3) == ""
+    assert surface_warning(line.with_values({"running_surface.sigma": 0.0}), 300.0 / 3.6, 1e-3) == ""
+    assert surface_warning(ln2, 300.0 / 3.6, 1e-3) == ""
+
+
+@pytest.mark.parametrize(("length", "is_short"), [(0.4, True), (1.0, False)])
+def test_of_a_measured_surface_the_waves_count_not_the_points(ln2, length, is_short):
+    x = np.arange(300.0, 340.0, 0.05)
+    points = np.stack([x, 1e-4 * np.cos(2.0 * np.pi * x / length) + 1e-5 * (x - 300.0)], axis=1)
+    surface = RunningSurface(profile="wear.csv", points=tuple(map(tuple, points.tolist())))
+    said = surface_warning(dataclasses.replace(ln2, running_surface=surface), 300.0 / 3.6, 1e-3)
+    assert said.startswith("the running surface of wear.csv has waves, and steps of 1 ms") is is_short

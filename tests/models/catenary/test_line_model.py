@@ -39,6 +39,7 @@ def _single_wire(length, elements):
         is_hanger=np.zeros(0, dtype=bool),
         beside_stitch=np.zeros(elements, dtype=bool),
         tension_factor=np.ones(elements),
+        area_factor=np.ones(elements),
         target=np.zeros(0),
         given_length=np.zeros(0),
         broken=np.zeros(0, dtype=bool),

@@ -1,24 +1,16 @@
 """What ``statics`` writes: tables and figures of a line in a curve."""
 
 import csv
-from pathlib import Path
 
 import pytest
 
 from models.commands.physics_main import main
-
-ROUTE = Path(__file__).parents[3] / "docs" / "build_site" / "probes" / "line_route.toml"
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    out = tmp_path_factory.mktemp("statics") / "out"
-    assert main(["statics", str(ROUTE), "--out", str(out), "--speed", "120"]) == 0
-    return out
+from models.commands.physics_options import shown_progress
+from tests.models.commands.conftest import ROUTE
 
 
-def test_supports_with_their_loads(folder):
-    with (folder / "supports.csv").open() as file:
+def test_supports_with_their_loads(statics_folder):
+    with (statics_folder / "supports.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [float(row["x [m]"]) for row in rows] == [50.0, 100.0, 150.0]
     assert [float(row["side of the arm [1: left]"]) for row in rows] == [-1.0] * 3
@@ -26,14 +18,71 @@ def test_supports_with_their_loads(folder):
     assert all(float(row["lift [N]"]) > 0.0 for row in rows)
 
 
-def test_the_strip_chart_is_there_as_both_kinds_of_file(folder):
-    assert (folder / "profile.png").read_bytes().startswith(b"\x89PNG")
-    text = (folder / "profile.svg").read_text()
+def test_the_strip_chart_is_there_as_both_kinds_of_file(statics_folder):
+    assert (statics_folder / "profile.png").read_bytes().startswith(b"\x89PNG")
+    text = (statics_folder / "profile.svg").read_text()
     assert "<svg" in text
-    assert {p.name for p in folder.glob("*.png")} == {"profile.png", "span.png", "elasticity.png", "droppers.png"}
+    drawn = {"profile", "span", "elasticity", "droppers", "tension", "sag", "wind"}
+    assert {p.stem for p in statics_folder.glob("*.png")} == drawn
 
 
-def test_verdicts_are_in_the_summary(folder):
-    text = (folder / "summary.csv").read_text()
+def test_verdicts_are_in_the_summary(statics_folder):
+    text = (statics_folder / "summary.csv").read_text()
     assert "keeps 0.25 at least (ADIF)" in text
     assert '"steepest gradient [permil], IFE 6.3","1.00 at 50 m: keeps 4 at 120 km/h"' in text
+
+
+def test_room_under_the_bridge_at_rest_lifted_and_over_temperature(statics_folder):
+    with (statics_folder / "overbridges.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    found = {name: float(value) for name, value in row.items()}
+    assert found["clearance at rest [m]"] == pytest.approx(7.1 - found["highest wire [m]"])
+    assert found["clearance lifted [m]"] == pytest.approx(found["clearance at rest [m]"] - 0.05)
+    with (statics_folder / "temperature.csv").open() as file:
+        cold, warm = csv.DictReader(file)
+    left = "clearance under bridge 1 [m]"
+    assert float(cold[left]) < float(warm[left])  # a messenger wire between springs is tighter in the cold
+    assert float(cold["wave speed [km/h]"]) == pytest.approx(429.5, abs=0.1)
+
+
+def test_the_summary_can_be_read_whatever_a_bridge_is_called(statics_folder):
+    with (statics_folder / "summary.csv").open() as file:
+        names = [row["quantity"] for row in csv.DictReader(file)]
+    assert "clearance under <b>A-4</b> & 'x' $a_b$, at rest [m]" in names
+
+
+def test_progress_is_for_terminals(capsys):
+    with shown_progress([1.0, 2.0], "temperatures", is_quiet=False) as one_by_one:
+        assert [*one_by_one] == [1.0, 2.0]
+    assert capsys.readouterr() == ("", "")
+
+
+def test_the_bar_is_gone_before_an_error_is_told(capsys, monkeypatch):
+    """At a terminal it is wiped away, and with it the line above, if that came first."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+
+    def interrupted():
+        with shown_progress([1.0], "temperatures", is_quiet=False) as one_by_one:
+            for _ in one_by_one:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as kept:
+        interrupted()
+    drawn = capsys.readouterr().err
+    assert "temperatures" in drawn
+    del kept
+    assert capsys.readouterr().err == ""
+
+
+def test_an_interrupted_list_of_temperatures_leaves_no_half_results(capsys, monkeypatch, tmp_path):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("models.catenary.statics.temperature_table._at", interrupted)
+    line = tmp_path / "probe.toml"
+    line.write_text(ROUTE.read_text(encoding="utf-8"))
+    assert main(["statics", str(line), "--temperature", "5", "10", "--out", str(tmp_path / "out")]) == 1
+    said = capsys.readouterr()
+    assert said.err.endswith("error: interrupted\n")
+    assert said.out == ""
+    assert not (tmp_path / "out").exists()

@@ -10,6 +10,7 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.commands.physics_main import main
 from models.coupled.lanes import Lane, LanePlan, run_lanes, run_singly
+from models.definition_files.parameter import ParameterError
 from models.library.catalogue import load_lumped
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
 
@@ -90,6 +91,29 @@ def test_a_train_passes_from_one_wire_to_the_next(overlap, cx):
 def test_trains_go_round_a_line_that_closes_on_itself(ring_maker, cx):
     (found,) = compared(ring_maker(), [lane((cx, {"speed": 80.0, "start_position": 470.0}), steps=600)])
     assert found.contact[-1, 0, 1] > 505.0
+
+
+SURFACE = {
+    "sigma": [0.1, "mm", "test"], "exponent": [2, "1", "test"], "from": [0.1, "1/m", "test"], "to": [1, "1/m", "test"],
+}  # fmt: skip
+
+
+def test_trains_run_on_a_surface_that_is_not_smooth(line_maker, cx):
+    lanes = [
+        lane((cx, {"speed": v, "start_position": 75.0, "reference_height": 5.034}), steps=110) for v in (60.0, 80.0)
+    ]
+    wavy = line_maker(running_surface=SURFACE).with_values({"contact.restitution": 0.99})
+    found = compared(wavy, lanes)
+    smooth = compared(replace(wavy, running_surface=None), lanes)
+    assert all(np.abs(a.contact - b.contact)[60:, 0, 0].max() > 1.0 for a, b in zip(found, smooth, strict=True))
+
+
+def test_wires_with_surfaces_of_their_own_are_refused(section_maker, sections_maker, cx):
+    pytest.importorskip("numba")
+    sections = [section_maker(x, 4, [0.2, -0.2, 0.2]) for x in (0.0, 100.0)]
+    model = CatenaryModel(sections_maker(*sections, running_surface=SURFACE))
+    with pytest.raises(ParameterError, match="several contact wires with running surfaces"):
+        next(run_lanes(model, [lane((cx, {}))], PLAN))
 
 
 def test_inner_steps_and_coarser_orders_are_those_of_the_parts(short_line, cx):

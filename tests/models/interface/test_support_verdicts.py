@@ -23,7 +23,8 @@ def said(model, speed=100.0, shortest=None, **changes):
     hung = droppers(model)
     if shortest is not None:
         hung = dataclasses.replace(hung, length=np.full_like(hung.length, shortest))
-    return dict(support_verdicts(supports, hung, support_limits(), gradient_limits(), speed / 3.6))
+    found = support_verdicts(supports, hung, support_limits(), gradient_limits(), speed / 3.6)
+    return {judged.what: judged.text for judged in found}
 
 
 def test_loads_of_arms(model):

@@ -286,6 +286,15 @@ def test_a_folder_of_something_else_is_left_alone(swept, tmp_path):
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["thesis.txt"]
 
 
+def test_a_sweep_of_another_scenario_is_left_alone(swept, toy_system, tmp_path):
+    swept(**STIFFNESSES)
+    before = (tmp_path / "out" / "sweep.csv").read_bytes()
+    other = PreparedSweep.of(replace(toy_system, name="other"), SweepRequest(**STIFFNESSES))
+    with pytest.raises(MasterError, match=f"holds a sweep of the scenario '{toy_system.name}', this one is of 'other'"):
+        sweep(other, tmp_path / "out")
+    assert (tmp_path / "out" / "sweep.csv").read_bytes() == before
+
+
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_a_command_that_is_ended_goes_on_where_it_was(command, tmp_path, number, whole_table):
     process = command(*GRID)

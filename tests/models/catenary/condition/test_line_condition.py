@@ -10,7 +10,6 @@ from scipy.sparse.linalg import spsolve
 from models.catenary.condition import line_condition
 from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.definition.condition_definition import Fault
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, find_form, find_rest, weight
@@ -18,7 +17,7 @@ from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import line_names, load_line
 from tests.effort import count, some
 from tests.models.catenary.shape.test_nonlinear_truss import limp
-from tests.models.conftest import make_line
+from tests.models.conftest import make_fault, make_line
 from tests.models.nonlinear_truss import Truss
 
 #: Span of LN2 with 49.5 m and seven droppers, 4.5 m from the supports and 6.75 m apart.
@@ -30,7 +29,7 @@ def design_of(line):
 
 
 def with_faults(line, *faults):
-    return dataclasses.replace(line, fault=tuple(Fault(**fault) for fault in faults))
+    return dataclasses.replace(line, fault=tuple(make_fault(**fault) for fault in faults))
 
 
 def broken(dropper, span=SPAN, **more):

@@ -32,7 +32,7 @@ def test_a_radius_is_a_curvature():
         ({"positions": of("m", 0), "radius": of("m", -5)}, "track.radius: -5 m: no track is as tight"),
         ({"positions": of("m", 9, 9), "cant": of("mm", 0, 100)}, "track.cant: jumps from 0 to 100 mm at 9 m"),
         ({"positions": of("m", 0), "cant": of("mm", 450)}, "track.cant: 0.45 m is outside"),
-        ({"positions": of("m", 0), "cant": of("m", 0.29), "base": [0.4, "km", "x"]}, "track.base: unknown unit"),
+        ({"positions": of("m", 0), "cant": of("m", 0.29), "base": [0.4, "mi", "x"]}, "track.base: unknown unit"),
         ({"positions": of("m", 0), "curvature": of("1/m", float("nan"))}, "track.curvature: "),
         ({"positions": of("m", 0), "bank": of("mm", 0)}, "track.bank: unknown key"),
         ({"positions": of("m", 0, 0.01), "cant": of("mm", 0, 100)}, "track.cant: goes from 0 to 100 mm within 0.01 m"),
@@ -67,12 +67,34 @@ def test_all_mistakes_are_said_at_once(line_maker):
         ({"arm_side": "left"}, "supports.arm_side: 'left' is none of auto"),
         ({"arm_length": [1.2, "m"]}, "supports.arm_length: "),
         ({"heights": of("m", 5.3)}, "supports.heights: unknown key"),
+        ({"structure": ["1", 2]}, "supports.structure: ['1', 2] is not a list of texts"),
+        ({"structure": ["1", "2"]}, "gives 2 names for 5 supports, or 7 with the anchors"),
+        ({"structure": ["1", "", "", "2", "1"]}, "supports.structure: '1' is the name of two supports"),
     ],
 )
 def test_mistakes_of_supports(line_maker, table, said):
     with pytest.raises(DefinitionError) as caught:
         line_maker(supports=table)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("names", [["1", "2", "", "4", "5"], ["A", "1", "2", "", "4", "5", "B"]])
+def test_supports_have_the_names_of_their_structures(line_maker, names):
+    supports = line_maker(supports={"structure": names}).sections[0].supports
+    assert [s.structure for s in supports] == (names if len(names) == 7 else ["", *names, ""])
+
+
+def test_anchors_have_a_place_in_plan_each_or_one_for_both(line_maker):
+    plain, each = line_maker(stagger={"amplitude": [0.2, "m", "x"]}), []
+    for anchor in ([0.1, "m", "x"], of("m", -0.3, 0.1), of("m", 1, 2, 3)):
+        stagger = {"amplitude": [0.2, "m", "x"], "anchor": anchor}
+        if len(each) == 2:
+            with pytest.raises(DefinitionError, match=r"stagger\.anchor: gives 3 values: give one for both"):
+                line_maker(stagger=stagger)
+            return
+        each.append([s.stagger for s in line_maker(stagger=stagger).sections[0].supports])
+    assert each[0] == [0.1, *(s.stagger for s in plain.sections[0].inner_supports), 0.1]
+    assert each[1] == [-0.3, *each[0][1:-1], 0.1]
 
 
 def test_values_of_arms_need_arms(line_maker):

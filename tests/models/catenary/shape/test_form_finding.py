@@ -20,7 +20,7 @@ from models.library.catalogue import line_names, load_line
 from tests.effort import some
 
 
-@pytest.fixture(scope="module", params=some(line_names(), "LN2", "LN2_overlap", "LN2_ring", "Re330", "Shinkansen"))
+@pytest.fixture(scope="module", params=some(line_names(), "AC_mixed", "LN2", "LN2_ring", "Re330", "Shinkansen"))
 def found(request):
     line = load_line(request.param)
     mesh = build_mesh(line)
@@ -59,6 +59,8 @@ def test_the_line_stands_still_on_droppers_of_the_lengths_found(found):
 
 def test_supports_carry_the_weight(found):
     line, mesh, state = found
+    if line.track is not None:
+        pytest.skip("in curves they carry what tension gives besides: test_curved_line.py")
     matrices = state.shape.matrices
     internal = matrices.K @ state.displacement + state.shape.droppers.rows.T @ state.dropper_force
     reactions = (internal - matrices.load).reshape(-1, NODE_DOFS)
@@ -94,11 +96,22 @@ def test_every_dropper_is_in_tension(found):
     assert stiffness * (state.droppers.length - state.unstrained_length) == pytest.approx(state.dropper_force, rel=1e-6)
 
 
+def slid(line, state):
+    """Return by how much weight along their slope stretches wires whose supports are not equally high, at most."""
+    supports = [s for section in line.sections for s in section.inner_supports]
+    heights = [s.contact_wire_height + s.encumbrance for s in supports if s.contact_wire_height and s.encumbrance]
+    length = sum(np.ptp([s.x for s in section.supports]) for section in line.sections)
+    per_length = weight(state.shape.matrices) / length
+    wire = line.messenger_wire
+    longest = max(np.ptp([s.x for s in section.supports]) for section in line.sections)
+    return per_length * np.ptp(heights or [0.0]) * 0.5 * longest / (wire.youngs_modulus * wire.area)
+
+
 def test_wires_keep_the_tension_that_they_are_strung_with(found):
     """Not so, were the tension of the messenger wire the same on both sides of a stitch wire's clamp."""
     line, mesh, state = found
     stretch = np.abs(state.displacement.reshape(-1, NODE_DOFS)[:, 0]).max()
-    assert stretch < 1e-4
+    assert stretch < 1e-4 + slid(line, state)
     for chain in mesh.chains:
         wire = getattr(line, chain.component)
         points, move = state.shape.points[chain.nodes], state.displacement.reshape(-1, NODE_DOFS)[chain.nodes, :3]

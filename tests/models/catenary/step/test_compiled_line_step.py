@@ -1,6 +1,7 @@
 """The compiled step against the plain one: the same figures to rounding, whatever touches, hangs slack or closes."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,20 @@ def test_a_law_that_is_not_linear(both, short_line):
     law = {"contact.exponent": 1.5, "contact.stiffness": 2e5, "contact.restitution": 0.9}
     forces, _ = run(both, short_line.with_values(law), (70.0,), lift=0.01)
     assert forces.max() > 50.0
+
+
+@pytest.mark.parametrize("kind", ["ends", "ring"])
+def test_running_surfaces_of_several_pieces(both, line_maker, ring_maker, kind):
+    """The law takes energy, so that the surface's slope counts too; in a ring the second strip crosses the seam."""
+    waves = {"sigma": [0.1, "mm", "test"], "exponent": [2, "1", "test"], "from": [0.1, "1/m", "test"]}
+    waves |= {"to": [1, "1/m", "test"], "seed": 2}
+    make, places = (line_maker, (70.0, 95.0)) if kind == "ends" else (ring_maker, (70.0, 498.0))
+    line = make(running_surface=waves).with_values({"contact.restitution": 0.7})
+    kink = replace(line.running_surface, points=((70.5, 0.0), (71.0, 1e-3), (71.5, 0.0)))
+    line, closed = replace(line, running_surface=kink), [lambda _, state: state.impact_velocity.fill(0.5)]
+    forces, _ = run(both, line, places, before=closed, lift=0.01)
+    smooth, _ = run(both, replace(line, running_surface=None), places, before=closed, lift=0.01)
+    assert (np.abs(forces - smooth)[10:].max(axis=0) > 0.3).all()
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.01])

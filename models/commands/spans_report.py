@@ -1,0 +1,57 @@
+"""Spans and radii in the wind: the rows of the tables of ``spans``, and its figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.interface.line_spans import SpanTable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Radii that stand at the figure's axis, as far as it reaches [m].
+_TICKS: Final = (100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 7000, 10000, 20000, 50000)
+
+
+def figure(found: SpanTable) -> Figure:
+    """Smallest radius over the length of the span, a line for each pair of staggers."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
+
+    drawn = Figure(figsize=(8.0, 4.5), layout="constrained")
+    axes = drawn.subplots()
+    for values, name in zip(found.smallest_radius, found.names, strict=True):
+        axes.plot(found.lengths, values, "o-", markersize=3, label=f"stagger {name}")
+    axes.set_yscale("log")
+    known = found.smallest_radius[np.isfinite(found.smallest_radius)]
+    if known.size:
+        low, high = axes.get_ylim()
+        shown = [tick for tick in _TICKS if low <= tick <= high]
+        axes.set_yticks(shown, [f"{tick}" for tick in shown])
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.grid(visible=True, which="major", linewidth=0.3)
+    axes.set_xlabel("length of the span [m]")
+    axes.set_ylabel("smallest radius [m]")
+    axes.set_title(heading(found), loc="left", fontsize=9)
+    axes.legend(fontsize=8, frameon=False)
+    return drawn
+
+
+def heading(found: SpanTable) -> str:
+    """Return for what the tables hold."""
+    return f"{found.pressure:.2f} Pa, {found.force:.3f} N/m on {found.tension:g} N, limit {found.limit:g} m"
+
+
+def rows(first: Sequence[float], columns: FloatArray, digits: int) -> list[Sequence[str]]:
+    """Return the rows of a table whose columns belong to pairs of staggers, shape (n_staggers, n)."""
+
+    def cell(value: float) -> str:
+        return "none" if math.isnan(value) else "any" if math.isinf(value) else f"{value:.{digits}f}"
+
+    heads = ["straight" if math.isinf(value) else f"{value:g}" for value in first]
+    return [(head, *map(cell, row)) for head, row in zip(heads, columns.T.tolist(), strict=True)]

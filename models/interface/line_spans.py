@@ -1,0 +1,203 @@
+"""How long spans may be, and how tight curves, in the wind: tables for a contact wire as a string."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.shape.line_mesh import contact_wire_height
+from models.catenary.shape.support_places import SupportPlaces
+from models.catenary.statics.span_table import LENGTHS, String, radii
+from models.definition_files.given_value import quantity
+from models.definition_files.parameter import ParameterError
+from models.interface.column_frames import column_frame
+from models.interface.line_and_pantograph import Line, open_line
+from models.interface.line_in_wind import asked_limit, asked_wind
+from models.interface.line_statics import Table, given
+from models.library.norm_tables import lateral_norm
+
+if TYPE_CHECKING:
+    import pandas
+
+#: Radii for which the largest span is given unless others are asked for; infinite: straight track [m].
+RADII: Final = (200.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1000.0, 1500.0, 2000.0, 3000.0, 5000.0, math.inf)
+#: Staggers at both ends of a span, positive to the outside of the curve [m].
+Staggers = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SpanTable:
+    """Smallest radius for a span and largest span for a radius, for pairs of staggers; SI.
+
+    Attributes
+    ----------
+    pressure, force, tension, limit : float
+        Of the wind [Pa], its force on the contact wire [N/m], the wire's tension [N], the permissible offset [m].
+    staggers : tuple of (float, float)
+        At both ends of a span, positive to the outside of the curve [m].
+    lengths : tuple of float
+        Of spans [m].
+    smallest_radius : ndarray, shape (n_staggers, n_lengths)
+        [m]; NaN where no curve keeps within the limit.
+    radii : tuple of float
+        [m]; infinite for straight track.
+    largest_span : ndarray, shape (n_staggers, n_radii)
+        [m]; NaN where the staggers alone are beyond the limit, infinite where no wind moves the wire.
+    """
+
+    pressure: float
+    force: float
+    tension: float
+    limit: float
+    staggers: tuple[Staggers, ...]
+    lengths: tuple[float, ...]
+    smallest_radius: FloatArray
+    radii: tuple[float, ...]
+    largest_span: FloatArray
+
+    def __repr__(self) -> str:
+        return f"<SpanTable at {self.pressure:.0f} Pa, limit {self.limit:g} m>"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the pairs of staggers as text."""
+        return tuple(" / ".join(f"{100.0 * b:+g} cm" for b in pair) for pair in self.staggers)
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """Columns by name: ``radii`` (smallest radius by span) and ``spans`` (largest span by radius)."""
+        return {
+            "radii": (("span [m]", *self.names), (np.array(self.lengths), *self.smallest_radius)),
+            "spans": (("radius [m]", *self.names), (np.array(self.radii), *self.largest_span)),
+        }
+
+    def frame(self, name: str = "radii") -> pandas.DataFrame:
+        """Return one of the `tables` as a data frame with the first column as index (needs pandas).
+
+        Raises
+        ------
+        ParameterError
+            If there is no such table.
+        """
+        if name not in self.tables:
+            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
+        return column_frame(*self.tables[name], is_indexed=True)
+
+
+def span_table(
+    line: Line | str | Path,
+    *,
+    speed: float | str | None = None,
+    pressure: float | str | None = None,
+    limit: float | str | None = None,
+    head: int | str | None = None,
+    radii: Sequence[float | str] = (),
+    staggers: Sequence[tuple[float | str, float | str]] = (),
+) -> SpanTable:
+    """Find the smallest radius for every span, and the largest span for every radius, in a steady wind.
+
+    Parameters
+    ----------
+    line : Line, str or Path
+        From `open_line`, or what it takes.
+    speed, pressure : float or str, optional
+        Of the wind, in m/s or Pa, or with a unit; by default the speed of the line's file.
+    limit : float or str, optional
+        How far the wire may be from the middle of the track, in m or with a unit; it or a head is needed.
+    head : {1600, 1950}, optional
+        In place of the limit: the permissible deviation on straight track for a pantograph head of so many mm.
+    radii : sequence of float or str, optional
+        For the largest span, in m or with a unit.
+    staggers : sequence of pairs, optional
+        At both ends of a span, positive to the outside of the curve, in m or with a unit; by default the line's
+        largest, alternating and not.
+
+    Raises
+    ------
+    ParameterError
+        If wind or limit cannot be meant, or neither limit nor head is given.
+
+    Examples
+    --------
+    >>> table = span_table("CA160", pressure=961.04, limit=0.55, radii=[800], staggers=[(0.2, 0.2)])
+    >>> round(float(table.largest_span[0, 0]), 2)
+    53.88
+    """
+    definition = (line if isinstance(line, Line) else open_line(line)).definition
+    own, chosen = asked_limit(limit, head)
+    if own is None and chosen is None:
+        raise ParameterError("how far may the wire be blown? give limit, in m, or head, 1600 or 1950")
+    return tabulated(
+        definition,
+        None if speed is None else given("speed", speed, "m/s", fastest=math.inf),
+        None if pressure is None else given("pressure", pressure, "Pa"),
+        own if own is not None else straight_limit(definition, str(chosen)),
+        [given("radius", R, "m") for R in radii],
+        [(_stagger(a), _stagger(b)) for a, b in staggers],
+        ("speed", "pressure"),
+    )
+
+
+def tabulated(
+    definition: CatenaryDefinition,
+    speed: float | None,
+    pressure: float | None,
+    limit: float,
+    wanted: Sequence[float],
+    staggers: Sequence[Staggers],
+    names: tuple[str, str],
+) -> SpanTable:
+    """Return the tables of a line, all in SI; `names` are what speed and pressure are called."""
+    wind, found = asked_wind(definition, speed, pressure, names)
+    string = String(definition.contact_wire.tension, wind.force(definition.contact_wire.width, found))
+    pairs, asked = tuple(staggers or _own_staggers(definition)), tuple(wanted or RADII)
+    return SpanTable(
+        pressure=found,
+        force=string.wind,
+        tension=string.tension,
+        limit=limit,
+        staggers=pairs,
+        lengths=LENGTHS,
+        smallest_radius=np.array([radii(string, limit, *pair) for pair in pairs]),
+        radii=asked,
+        largest_span=np.array([[string.largest_span(limit, 1.0 / R, *pair) for R in asked] for pair in pairs]),
+    )
+
+
+def straight_limit(definition: CatenaryDefinition, head: str) -> float:
+    """Return the permissible offset of a head on straight track at the line's largest height [m].
+
+    Raises
+    ------
+    ParameterError
+        If the height is outside the range of the permissible deviations.
+    """
+    return lateral_norm().permissible(head, max(_heights(definition)), 0.0, 0.0).permissible
+
+
+def _heights(definition: CatenaryDefinition) -> Iterator[float]:
+    """Yield the heights of the contact wire at the supports where it is at its working height [m]."""
+    for section in definition.sections:
+        places = SupportPlaces(definition, section)
+        first, last = (-math.inf, math.inf) if section.periodic else section.ends.working
+        yield from (contact_wire_height(places, s.x) for s in section.inner_supports if first <= s.x <= last)
+
+
+def _own_staggers(definition: CatenaryDefinition) -> list[Staggers]:
+    """Return the line's largest stagger, alternating and not [m]."""
+    largest = max(abs(s.stagger) for section in definition.sections for s in section.inner_supports)
+    return [(largest, -largest), (largest, largest)]
+
+
+def _stagger(value: float | str) -> float:
+    try:
+        return quantity("stagger", value, "m")
+    except (TypeError, ValueError) as error:
+        raise ParameterError(str(error)) from error

@@ -19,9 +19,9 @@ from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.shape.track import track_at
 from models.catenary.statics.blow_off import BlowOff, blow_off
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.line_statics import LineStatics, Table, given
+from models.interface.line_statics import LineStatics, given
 from models.interface.norm_judgement import Judgement, kept
 from models.library.norm_tables import lateral_norm
 
@@ -116,9 +116,7 @@ class LineInWind:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name])
+        return table_frame(self.tables, name)
 
 
 def in_wind(

@@ -119,7 +119,7 @@ class SteadyArm:
     youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e9, maximum=1e12)
     length: float = quantity("m", "length", positive=True, minimum=0.1, maximum=10.0)
     angle: float = quantity(
-        "rad", "angle to the horizontal, from the registration end; negative: falls towards the wire",
+        "rad", "angle to the rail plane, from the registration end; negative: falls towards the wire",
         minimum=-1.2, maximum=1.2,
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ import os
 import platform
 import sys
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Final
@@ -58,6 +58,10 @@ def kept_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
 
 def _state(definition: CatenaryDefinition, mesh: CatenaryMesh, kept: Mapping[str, FloatArray]) -> StaticState:
     points = kept["points"]
+    # Arms that pushed stand on the other side since.
+    ends = mesh.points.copy()
+    ends[mesh.arms[:, 0], 1] = points[mesh.arms[:, 0], 1]
+    mesh = replace(mesh, points=ends)
     positions = points + kept["displacement"].reshape(-1, NODE_DOFS)[:, :3]
     return StaticState(
         shape=line_shape(definition, mesh, points),

@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS, bar_geometric_stiffness
-from models.catenary.shape.form_finding import EquilibriumError, find_form
+from models.catenary.shape.form_finding import find_form
 from models.catenary.shape.line_matrices import pendulum_stiffness
 from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics import elasticity
@@ -166,15 +166,6 @@ def test_the_switch_is_a_number_that_an_FMU_offers(ln2):
     assert names["dynamics.geometric_stiffness"].is_integer
     with pytest.raises(ParameterError, match=r"dynamics\.geometric_stiffness"):
         ln2.with_values({"dynamics.geometric_stiffness": 2})
-
-
-def test_an_arm_that_pushes_is_refused(line_maker):
-    """Its wire is pulled away from its side: by the listed stagger of its neighbours."""
-    stagger = {"listed": [[0.2, -0.2, -0.1, -0.2, 0.2], "m", "test"], "anchor": [0.0, "m", "test"]}
-    with pytest.raises(EquilibriumError) as raised:
-        CatenaryModel(line_maker(spans=6, stagger=stagger))
-    assert "the arm at 150.00 m pushes with" in str(raised.value)
-    assert "an arm must pull; change its side (arm_side in [supports]) or the stagger" in str(raised.value)
 
 
 def test_arms_of_a_straight_wire_neither_pull_nor_push(line_maker):

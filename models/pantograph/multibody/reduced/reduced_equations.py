@@ -186,6 +186,35 @@ def joint_forces(slides: Any, turns: Any, y: Any, n: Any, forces: Any) -> Any:
     return on_roll
 
 
+def is_free(y: Any, model: Any, lowest: Any, highest: Any) -> Any:
+    """Return whether no stop is reached, and the lifting element is between two places."""
+    table, single, _, lines, _, turns, arm, _, _ = model
+    t = look_up(table, y[0])
+    if not lowest <= t[PLACE] <= highest:
+        return False
+    for row in arm:
+        if row[6] == 0.0 and not row[2] <= t[int(row[0])] <= row[3]:
+            return False
+    roll = y[1] if single[1] == 0.0 else 0.0
+    sine, cosine = sin(roll), cos(roll)
+    for row in turns:
+        if not row[2] <= row[0] + row[1] * roll <= row[3]:
+            return False
+    for row in lines:
+        if row[14] == 0.0:  # no stop
+            continue
+        a, b = int(row[0]), int(row[1])
+        gap = y[2 + b] if b >= 0 else 0.0
+        gap -= y[2 + a] if a >= 0 else 0.0
+        value = row[3] + sine * row[4] + cosine * row[5]
+        value += gap * (row[6] + sine * row[7] + cosine * row[8] + gap * row[9])
+        if row[2] == 0.0:
+            value = sqrt(abs(value))
+        if not row[16] <= value <= row[17]:
+            return False
+    return True
+
+
 def strip_on_body(strip: Any, sin_p: Any, cos_p: Any) -> Any:
     """Return the strip's direction across, and where its middle is from its body's centre, in axes of the carrier."""
     if strip[21] == 0.0:

@@ -17,7 +17,9 @@ _LEAST_TRAVEL = 1e-9
 
 #: What is called from Python, and what by other kernels alone: nothing is made for Python then, which takes long.
 _compiled = njit(cache=True, error_model="numpy")
-_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+_part = njit(  # type: ignore[call-overload]
+    error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
 
 
 @_compiled

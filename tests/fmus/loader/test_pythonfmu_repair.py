@@ -21,6 +21,7 @@ import sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
 from tests.fmus.support import Instance
+from tests.effort import rest
 kept = [Instance(Path(sys.argv[1]), f"part{i}") for i in range(4)]
 for instance in kept:
     instance.initialise(force=1.0)
@@ -54,7 +55,7 @@ def test_an_fmu_carries_the_repaired_library(toy_fmu):
 
 
 @linux
-@pytest.mark.parametrize("ending", ["free", "keep"])
+@pytest.mark.parametrize("ending", ["keep", *rest("free")])
 def test_a_process_ends_cleanly_with_instances_freed_or_kept(toy_fmu, tmp_path, ending):
     environment = {**os.environ, "PYTHONMALLOC": "malloc", "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", _END, str(toy_fmu), str(REPOSITORY), ending]

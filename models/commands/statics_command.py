@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from models.catenary.statics import rest_profile
+from models.catenary.statics.temperature_table import check_tensioned
 from models.commands import route_plots, statics_plots, temperature_report, wind_report
 from models.commands.desk import statics_page
 from models.commands.desk.statics_page import Found
@@ -65,11 +66,13 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     Raises
     ------
     ParameterError
-        If the line has no such section or span.
+        If the line has no such section or span, or none of the tensioning that temperatures ask for.
     """
     definition = load_line(arguments.line)
     warn(doubts("lines", arguments.line))
     definition = definition.with_values(settings(arguments.set, "line", definition))
+    if arguments.temperature:
+        check_tensioned(definition)
     found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
     warn(found.warnings)
     return found

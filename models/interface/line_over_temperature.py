@@ -18,9 +18,9 @@ from models.catenary.statics.wire_waves import OPERATION_LIMIT
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.definition_files.si_units import OFFSETS
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.line_statics import LineStatics, Table, given
+from models.interface.line_statics import LineStatics, given
 from models.interface.norm_judgement import Judgement
 from models.interface.support_verdicts import clearance_at_temperatures
 from models.library.norm_tables import norm_sources, support_limits
@@ -95,9 +95,7 @@ class LineOverTemperature:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name])
+        return table_frame(self.tables, name)
 
 
 def over_temperature(

@@ -17,10 +17,10 @@ from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.statics.span_table import LENGTHS, String, radii
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_in_wind import asked_limit, asked_wind
-from models.interface.line_statics import Table, given
+from models.interface.line_statics import given
 from models.library.norm_tables import lateral_norm
 
 if TYPE_CHECKING:
@@ -86,9 +86,7 @@ class SpanTable:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name], is_indexed=True)
+        return table_frame(self.tables, name, is_indexed=True)
 
 
 def span_table(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.arrays import BoolArray, FloatArray
+from models.arrays import FloatArray
 from models.catenary import line_advice
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.overbridge_definition import Overbridge
@@ -23,7 +23,7 @@ from models.catenary.statics.overbridge_room import OverbridgeRoom, overbridge_r
 from models.catenary.statics.support_loads import SupportLoads, support_loads
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.norm_judgement import Judgement
 from models.interface.support_verdicts import overbridge_verdicts, support_verdicts
@@ -31,9 +31,6 @@ from models.library.norm_tables import gradient_limits, support_limits
 
 if TYPE_CHECKING:
     import pandas
-
-#: A table: titles with units, and columns.
-Table = tuple[tuple[str, ...], tuple[FloatArray | BoolArray, ...]]
 
 
 @dataclass(frozen=True)
@@ -132,9 +129,7 @@ class LineStatics:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name])
+        return table_frame(self.tables, name)
 
 
 def statics(

@@ -78,7 +78,7 @@ def area_left(definition: CatenaryDefinition, mesh: CatenaryMesh) -> FloatArray:
     result = np.ones(len(mesh.beams))
     middle = mesh.points[mesh.beams, 0].mean(axis=1)
     for fault in active_of(definition, Wear):
-        inside = (middle > fault.start) & (middle < fault.end)
+        inside = (middle > fault.from_) & (middle < fault.to)
         result[_of_wire(mesh, "contact_wire", fault.section) & inside] *= 1.0 - fault.amount
     return result
 
@@ -95,7 +95,7 @@ def hard_point_mass(definition: CatenaryDefinition, mesh: CatenaryMesh) -> Float
 
 def marked_places(definition: CatenaryDefinition, section: int) -> list[float]:
     """Return where faults need a node of the contact wire of a section, which counts from 0 [m]."""
-    worn = (x for f in active_of(definition, Wear) if f.section - 1 == section for x in (f.start, f.end))
+    worn = (x for f in active_of(definition, Wear) if f.section - 1 == section for x in (f.from_, f.to))
     return [*worn, *(f.position for f in active_of(definition, HardPoint) if f.section - 1 == section)]
 
 

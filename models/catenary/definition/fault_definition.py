@@ -180,51 +180,64 @@ class TensionLoss(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class Wear(Fault):
-    """A length of contact wire that is worn, of the share ``value`` of its cross-section.
-
-    Attributes
-    ----------
-    start, end : float
-        Keys `from` and `to` [m].
-    """
+    """A length of contact wire that is worn, of the share ``value`` of its cross-section."""
 
     asks = "which share of the cross-section is worn away?"
-    start: float
-    end: float
+    from_: float = quantity("m", "where the contact wire begins to be worn, along the track", tunable=False)
+    to: float = quantity("m", "where it ends to be worn, along the track", tunable=False)
     value: float | None = quantity(
         "1", "share of the contact wire's cross-section that is worn away", default=None, minimum=0.0, maximum=0.5
     )
+    lost_thickness: float | None = quantity(
+        "m", "what is worn away of the contact wire's underside, on which strips run higher by it", default=None,
+        minimum=0.0, maximum=0.02, tunable=False,
+    )  # fmt: skip
 
     def problems(self) -> Iterator[tuple[str, str]]:
         """Yield a problem if it does not go from somewhere to a place beyond."""
         yield from super().problems()
-        if self.end - self.start < SHORTEST_WEAR:
-            yield "to", f"{self.end:g} m: must be {SHORTEST_WEAR:g} m or more beyond 'from', {self.start:g} m"
+        if self.to - self.from_ < SHORTEST_WEAR:
+            yield "to", f"{self.to:g} m: must be {SHORTEST_WEAR:g} m or more beyond 'from', {self.from_:g} m"
 
     def missing_part(self, section: Section) -> tuple[str, str] | None:
         """Return the key and the text if the section does not reach so far."""
         first, last = section.spans[0].start, section.spans[-1].end
-        for key, x in (("from", self.start), ("to", self.end)):
+        for key, x in (("from", self.from_), ("to", self.to)):
             if not (first <= x <= last or math.isnan(x)):
                 return key, f"{x:g} m lies outside the section, {first:g} ... {last:g} m"
         return None
 
     def of(self) -> tuple[str, str]:
         """Return the key and the name of the piece of wire."""
-        return "from", f"contact wire from {self.start:g} m"
+        return "from", f"contact wire from {self.from_:g} m"
 
     def place(self, section: Section) -> str:
         """Return where it ends."""
-        return f"to {self.end:g} m"
+        return f"to {self.to:g} m"
 
 
 @dataclass(frozen=True, kw_only=True)
 class HardPoint(Fault):
-    """A mass on the contact wire: a section insulator, a splice, ice."""
+    """A mass on the contact wire, on whose underside it may stand out: a section insulator, a splice, ice."""
 
     asks = "how heavy is it?"
     position: float = quantity("m", "where along the track it is", tunable=False)
     value: float | None = quantity("kg", "mass on the contact wire", default=None, minimum=0.0, maximum=200.0)
+    height: float | None = quantity(
+        "m", "height of a bump of the wire's underside, less than 0 where something stands out downwards", default=None,
+        minimum=-0.05, maximum=0.05, tunable=False,
+    )  # fmt: skip
+    length: float | None = quantity(
+        "m", "length of the bump along the track", default=None, minimum=0.01, maximum=20.0, tunable=False
+    )
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Yield a problem if a bump has a height and no length, or the other way round."""
+        yield from super().problems()
+        if self.height is not None and self.length is None:
+            yield "length", "is missing: how long is the bump whose height is given?"
+        if self.length is not None and self.height is None:
+            yield "height", "is missing: how high is the bump whose length is given?"
 
     def missing_part(self, section: Section) -> tuple[str, str] | None:
         """Return the key and the text if the section does not reach so far."""

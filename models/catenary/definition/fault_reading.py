@@ -18,7 +18,10 @@ _OWN_KEYS: Final[dict[str, tuple[str, ...]]] = {
     "wire": ("tension_loss",),
     "from": ("wear",),
     "to": ("wear",),
+    "lost_thickness": ("wear",),
     "position": ("hard_point",),
+    "height": ("hard_point",),
+    "length": ("hard_point",),
     "value": tuple(kind for kind, cls in FAULT_KINDS.items() if cls.asks),
 }
 
@@ -51,11 +54,7 @@ def _read(table: Table) -> Fault | None:
         if kind not in _OWN_KEYS.get(key, (kind,)):
             table.offers(key)
             table.problem(key, f"means nothing for kind '{kind}', of {' and '.join(_OWN_KEYS[key])}: remove it")
-    cls = FAULT_KINDS[kind]
-    if cls is Wear:
-        ends = {"start": table.quantity("from", "m"), "end": table.quantity("to", "m")}
-        return field_schema.read(Wear, table, kind=kind, **ends)
-    return field_schema.read(cls, table, kind=kind)
+    return field_schema.read(FAULT_KINDS[kind], table, kind=kind)
 
 
 def _missing(definition: CatenaryDefinition, fault: Fault) -> tuple[str, str] | None:
@@ -72,6 +71,6 @@ def _check_wear(tables: Sequence[Table], numbers: Sequence[int], definition: Cat
     worn = [(f, t, n) for f, t, n in zip(definition.fault, tables, numbers, strict=True) if isinstance(f, Wear)]
     for i, (fault, table, _) in enumerate(worn):
         for other, _, number in worn[:i]:
-            same = fault.section == other.section and fault.start != other.start
-            if same and fault.start < other.end and other.start < fault.end:
-                table.problem("from", f"{fault.start:g} m: what is worn there is that of fault[{number}] already")
+            same = fault.section == other.section and fault.from_ != other.from_
+            if same and fault.from_ < other.to and other.from_ < fault.to:
+                table.problem("from", f"{fault.from_:g} m: what is worn there is that of fault[{number}] already")

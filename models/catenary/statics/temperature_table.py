@@ -84,13 +84,23 @@ def temperature_table(
     EquilibriumError
         If the line has no equilibrium at one of them.
     """
+    check_tensioned(definition)
+    design = kept_form(definition, build_mesh(definition))
+    return tuple(_at(design, temperature, section, speed) for temperature in temperatures)
+
+
+def check_tensioned(definition: CatenaryDefinition) -> None:
+    """Refuse a line that says nothing of its tensioning.
+
+    Raises
+    ------
+    ParameterError
+    """
     if definition.tensioning is None:
         raise ParameterError(
             f"line '{definition.name}' has no table [tensioning]: what it does over temperature is not known; give at "
             "least temperature and reference_temperature there"
         )
-    design = kept_form(definition, build_mesh(definition))
-    return tuple(_at(design, temperature, section, speed) for temperature in temperatures)
 
 
 def ruling(section: Section) -> tuple[float, Span]:

@@ -136,7 +136,7 @@ def test_a_wire_that_has_lost_tension_hangs_as_a_truss_does(weighted, name):
 def test_a_worn_wire_hangs_as_a_truss_of_lighter_bars(weighted):
     """Worn from one node to another, neither of which is a support or a dropper."""
     ends = [float(weighted.mesh.points[weighted.node("contact_wire", x), 0]) for x in (X - 31.2, X + 33.3)]
-    condition = condition_of(weighted.design, with_fault(weighted.line, "wear", start=ends[0], end=ends[1], value=0.2))
+    condition = condition_of(weighted.design, with_fault(weighted.line, "wear", from_=ends[0], to=ends[1], value=0.2))
     truss, points = weighted.anew()
     middle = weighted.mesh.points[truss.wires, 0].mean(axis=1)
     worn = np.isin(truss.wires[:, 0], weighted.wire("contact_wire")) & (middle > ends[0]) & (middle < ends[1])
@@ -208,7 +208,7 @@ def test_registration_ends_are_aside_by_their_errors(short):
 def test_a_worn_wire_bends_as_the_square_of_its_cross_section(short):
     """As does its stiffness in torsion; a fifth less area, mass and axial stiffness."""
     line, design = short
-    worn = condition_of(design, with_fault(line, "wear", start=103.3, end=197.7, value=0.2)).shape
+    worn = condition_of(design, with_fault(line, "wear", from_=103.3, to=197.7, value=0.2)).shape
     mesh = worn.mesh
     middle = mesh.points[mesh.beams, 0].mean(axis=1)
     inside = (mesh.component == 0) & (middle > 103.3) & (middle < 197.7)
@@ -224,8 +224,8 @@ FAULTS = {
     "arm": {"kind": "arm_loose", "support": SUPPORT},
     "sunk": {"kind": "support_sunk", "support": SUPPORT, "value": 0.02},
     "tension": {"kind": "tension_loss", "wire": "messenger_wire", "value": 0.05},
-    "wear": {"kind": "wear", "start": 131.3, "end": 180.1, "value": 0.15},
-    "hard point": {"kind": "hard_point", "position": 127.77, "value": 4.0},
+    "wear": {"kind": "wear", "from_": 131.3, "to": 180.1, "value": 0.15, "lost_thickness": 1e-3},
+    "hard point": {"kind": "hard_point", "position": 127.77, "value": 4.0, "height": -5e-4, "length": 2.0},
 }
 ERRORS = {"irregularity.dropper_position_sigma": 0.05, "irregularity.stagger_sigma": 0.01, "irregularity.seed": 3}
 
@@ -235,7 +235,7 @@ def test_every_error_and_fault_at_once_leaves_a_line_in_equilibrium(name):
     """Vertical equilibrium of all that is not held, to 1e-6 of the line's weight; on rings, stitches, hangers."""
     line = load_line(name).with_values(ERRORS | {"irregularity.dropper_length_sigma": 0.005})
     start = line.sections[0].inner_supports[SUPPORT - 1].x - X
-    moved = {"position": FAULTS["hard point"]["position"] + start, "start": 131.3 + start, "end": 180.1 + start}
+    moved = {"position": FAULTS["hard point"]["position"] + start, "from_": 131.3 + start, "to": 180.1 + start}
     faults = [f | {k: v for k, v in moved.items() if k in f} for f in FAULTS.values()]
     line = dataclasses.replace(line, fault=tuple(make_fault(**f) for f in faults))
     design = find_form(line, build_mesh(line))

@@ -353,6 +353,10 @@ def test_faults_of_arms_supports_wires_are_read_with_their_parameters():
             "-5 m lies outside the section, -3.1 ... 1136.9 m",
         ),
         (other("hard_point", value=[300, "kg", SOURCE]), "value", "outside 0 ... 200 kg"),
+        (other("wear", lost_thickness=[30, "mm", SOURCE]), "lost_thickness", "outside 0 ... 0.02 m"),
+        (other("wear", height=[1, "mm", SOURCE]), "height", "means nothing for kind 'wear', of hard_point: remove it"),
+        (other("hard_point", height=[-1, "mm", SOURCE]), "length", "is missing: how long is the bump"),
+        (other("hard_point", length=[1, "m", SOURCE]), "height", "is missing: how high is the bump"),
         (other("hard_point", section=2), "section", "there is no section 2: the line has 1"),
     ],
 )

@@ -11,6 +11,7 @@ import pytest
 
 from fmus.builder.recipe import PYTHONFMU, REPOSITORY
 from fmus.loader.pythonfmu_repair import repaired
+from tests.effort import rest
 
 LIBRARY = PYTHONFMU / "resources" / "binaries" / "linux64" / "libpythonfmu-export.so"
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the repair is one of the Linux library")
@@ -21,7 +22,6 @@ import sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
 from tests.fmus.support import Instance
-from tests.effort import rest
 kept = [Instance(Path(sys.argv[1]), f"part{i}") for i in range(4)]
 for instance in kept:
     instance.initialise(force=1.0)

@@ -120,7 +120,7 @@ def test_a_mistake_is_one_sentence_that_says_what_to_do(call, tmp_path, line, sa
 
 @pytest.mark.slow
 def test_an_edit_of_the_line_changes_the_figures_with_nothing_else_done_by_hand(call, tmp_path):
-    assert call("new demo --line LN2 --pantograph DSA380 --speed 250 --interval 250 320")[0] == 0
+    assert call("new demo --line LN2 --pantograph DSA380 --speed 250 --interval 150 200")[0] == 0
     code, out, err = call("run demo --out before --no-report")
     assert code == 0, err
     assert "building Catenary_demo_LN2.fmu\n" in err
@@ -128,7 +128,7 @@ def test_an_edit_of_the_line_changes_the_figures_with_nothing_else_done_by_hand(
     line = tmp_path / "demo" / "lines" / "demo_LN2.toml"
     text = line.read_text()
     assert "45.3, 45.5, 45.0, 45.0, 45.0" in text
-    line.write_text(text.replace("45.3, 45.5, 45.0, 45.0, 45.0", "45.3, 45.5, 45.0, 47.0, 43.0"))  # within the interval
+    line.write_text(text.replace("45.3, 45.5, 45.0, 45.0, 45.0", "45.3, 47.5, 43.0, 45.0, 45.0"))  # within the interval
     code, out, err = call("run demo --out after --no-report")
     assert code == 0, err
     assert "building Catenary_demo_LN2.fmu again: what it is made of has changed" in err

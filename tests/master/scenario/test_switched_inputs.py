@@ -53,7 +53,8 @@ def test_nothing_is_said_where_both_fit(connected, values):
         (
             ("train.x", "train.vx"),
             {"use_train": "1", "speed": "40"},
-            "train.speed is set, but does nothing while use_train is 1: the inputs train.x and train.vx say where it is",
+            "train.speed is set, but does nothing while use_train is 1: "
+            "the inputs train.x and train.vx say where it is",
         ),
         ((), {"lift_input": "1"}, "train.lift_input = 1, but nothing is connected to lift.value: nothing lifts it"),
     ],

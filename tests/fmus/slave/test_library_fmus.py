@@ -26,7 +26,6 @@ STARTED = (
     "Catenary_AC_curve",
     "Catenary_AC_mixed",
     "Catenary_LN2",
-    "Catenary_LN2_overlap",
     "Catenary_LN2_ring",
     "Catenary_Re330",
     "Catenary_Shinkansen",

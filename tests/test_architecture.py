@@ -55,6 +55,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"mechanism_assembly", "mechanism_energy"},
         {"analysis", "mechanism_integrator"},
         {"mechanism_advice", "step_memory", "range_watch", "reduced"},
+        {"compiled"},
         {"multibody_part"},
     ],
     "fmus": [{"slave", "loader"}, {"builder"}, {"__main__"}],

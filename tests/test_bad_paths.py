@@ -78,6 +78,9 @@ COMMANDS: Final = (
     "signal s.csv --standalone --runtime {in:d}",
     "spans {in:toml} --wind 29 --limit 0.5",
     "spans EN50318_2002 --wind 29 --limit 0.5 --out {dir}",
+    "asbuilt {in:toml} m.csv --out built",
+    "asbuilt EN50318_2002 {in:csv} --out built",
+    "asbuilt EN50318_2002 m.csv --out {dir}",
     "import {in:xlsx} --out mine.toml",
     "import lay --design EN50318_2002 --out {file:toml}",
     "export EN50318_2002 --out {dir}",
@@ -116,6 +119,7 @@ def workplace(tmp_path, monkeypatch, request):
     request.getfixturevalue("measured_run")
     (tmp_path / "afile").write_text("a file\n")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "m.csv").write_text("position,height\n" + "".join(f"{x},5.08\n" for x in range(9)))
     (tmp_path / "r.csv").write_text("".join(f"{f / 2},{100 - f},{3 * f}\n" for f in range(1, 41)))
     (tmp_path / "s.csv").write_text("time [s],base.z [m]\n0,0\n1,0.01\n")
     (tmp_path / "lay").mkdir()

@@ -156,14 +156,15 @@ def in_wind(
     >>> round(blown.pressure, 1), blown.judgements[0].word
     (250.0, 'keeps')
     """
-    model, index = _section(line, section)
+    definition, index = _section(line, section)
+    own, chosen = asked_limit(limit, head)
     _, force = asked_wind(
-        model.definition,
+        definition,
         None if speed is None else given("speed", speed, "m/s", fastest=math.inf),
         None if pressure is None else given("pressure", pressure, "Pa"),
         ("speed", "pressure"),
     )
-    own, chosen = asked_limit(limit, head)
+    model = line.model if isinstance(line, LineStatics) else CatenaryModel(definition)
     return in_the_wind(model, index, force, own, chosen)
 
 
@@ -229,13 +230,14 @@ def in_the_wind(model: CatenaryModel, index: int, pressure: float, limit: float 
     return LineInWind(pressure, blow_off(model, pressure, index), start, end, limits, works, source)
 
 
-def _section(line: LineStatics | Line | str | Path, number: int) -> tuple[CatenaryModel, int]:
+def _section(line: LineStatics | Line | str | Path, number: int) -> tuple[CatenaryDefinition, int]:
+    """Return the definition of a line and the index of a section of it, from 0."""
     if isinstance(line, LineStatics):
-        return line.model, line.section
+        return line.model.definition, line.section
     definition = (line if isinstance(line, Line) else open_line(line)).definition
     if not 1 <= number <= len(definition.sections):
         raise ParameterError(f"section {number}: the line has sections 1 to {len(definition.sections)}")
-    return CatenaryModel(definition), number - 1
+    return definition, number - 1
 
 
 def _limit(

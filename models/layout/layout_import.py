@@ -42,6 +42,12 @@ _UNITS: Final = {
 }  # fmt: skip
 #: Without which there is no line.
 _NEEDED: Final = ("contact_wire", "messenger_wire", "dropper")
+#: Tables of a definition, of which a key names a value, and those that have tables in them.
+_TABLES: Final = (
+    "profile", "clamps", "damping", "contact", "mesh", "messenger_support", "dynamics", "track", "tensioning", "wind",
+    "irregularity", "fault", *WIRE_COLUMNS,
+)  # fmt: skip
+_NESTED: Final = ("damping", "tensioning", "wind")
 _TRACK: Final = {"curvature": "1/m", "radius": "m", "cant": "m", "vertical_curvature": "1/m"}
 #: Tables of a definition in which something lacks where a sheet is wrong.
 _CONSEQUENT: Final = (*SECTION_TABLES, "section", "profile", "track", *WIRE_COLUMNS)
@@ -152,10 +158,14 @@ class _Maker:
             return
         place = self.draft.place(problem.key)
         if place is not None and place.sheet:
-            self.problems.add(place, problem.text)
-        elif re.sub(r"^section\[\d+\]\.", "", problem.key).partition(".")[0] not in consequent:
-            where = f" (from {self.design.path})" if self.design is not None else ""
-            self.problems.add(Place(f"key {problem.key}{where}"), problem.text)
+            is_its_own = problem.key in self.draft.places
+            self.problems.add(place, problem.text if is_its_own else f"'{problem.key}' {problem.text}")
+            return
+        first = re.sub(r"^section\[\d+\]\.", "", problem.key).partition(".")[0].partition("[")[0]
+        if first not in consequent:
+            where = "" if self.design is None else f" (it may be of {self.design.path})"
+            sheet = "wires" if first in WIRE_COLUMNS else "line"
+            self.problems.add(Place(sheet), f"'{problem.key}' {problem.text}{where}")
 
     def _type(self) -> str:
         """Return the type of the line by its wires, or the design's."""
@@ -179,6 +189,12 @@ class _Maker:
                 self.problems.add(place, f"'{key}' cannot stand here: {what}")
             elif (first := seen.setdefault(key, k)) != k:
                 self.problems.add(place, f"'{key}' stands in row {sheet.rows[first]} already")
+            elif key in _TABLES:
+                self.problems.add(place, f"'{key}' is a table: name a key in it, as damping.alpha is in damping")
+            elif key.count(".") > 1 and key.partition(".")[0] not in _NESTED:
+                self.problems.add(
+                    place, f"there is no key '{key}': a table in a table is in {', '.join(_NESTED)} alone"
+                )
             else:
                 self._put_key(sheet, k, key, value)
 
@@ -235,7 +251,8 @@ class _Maker:
                 self.problems.add(Place("wires"), text)
             return
         for component in _NEEDED:
-            if component not in self.draft.data and component not in self.draft.places:
+            given = self.draft.data.get(component, {})
+            if not given.keys() & set(_UNITS) and component not in self.draft.places:
                 text = f"there is no row '{component}': add it, or name a line that has one with --design"
                 self.problems.add(Place("wires"), text)
 

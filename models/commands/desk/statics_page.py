@@ -263,6 +263,14 @@ def _wind(wind: LineInWind | None) -> Iterator[str]:
         "Offset: largest distance of the contact wire from the middle of the track, wind from either side, found with "
         "the mesh; beside it that of the contact wire as a string between its supports."
     )
+    f = wind.found
+    if f.lift.size:
+        rows = [
+            (f"{x:.2f}", _cell(1e3 * left, 1), _cell(1e3 * right, 1))
+            for x, (left, right) in zip(f.arm_x.tolist(), f.lift.tolist(), strict=True)
+        ]
+        yield "<h3>How far the contact wire rises at the arms</h3>"
+        yield markup.table(("x [m]", "wind to the left [mm]", "wind to the right [mm]"), rows, leading=0)
 
 
 def _droppers(result: LineStatics) -> Iterator[str]:

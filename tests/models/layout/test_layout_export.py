@@ -151,6 +151,19 @@ def test_a_workbook_is_the_same_layout(tmp_path):
     assert book.text.replace("layout.xlsx", "layout") == tables.text
 
 
+@pytest.mark.parametrize("as_workbook", [False, True])
+def test_text_that_looks_like_a_formula_stays_text(tmp_path, as_workbook):
+    if as_workbook:
+        pytest.importorskip("openpyxl")
+    names = ["'=1+1", "-12"]
+    data = short("EN50318_2002", 3, title="=SUM(A1)", supports={"structure": ["a", *names[:2], "b"]})
+    exported = export_line(written(tmp_path, data))
+    assert as_workbook or not [line for line in csv_text(exported.sheets["line"]).splitlines() if ",=" in line]
+    line = returned(tmp_path, exported, as_workbook=as_workbook)
+    assert [s.structure for s in line.definition.sections[0].supports] == ["a", *names[:2], "b"]
+    assert line.definition.title == "=SUM(A1)"
+
+
 def test_values_name_file_sheet_and_row_as_their_source(tmp_path):
     line = returned(tmp_path, export_line(written(tmp_path, route())))
     found = line.definition.provenance

@@ -46,6 +46,7 @@ def test_errors_of_a_definition_are_slips_of_its_droppers(design):
     slipped = find_condition(dataclasses.replace(design, shape=dataclasses.replace(design.shape, definition=line)))
     found = with_table(design, errors)
     assert np.abs(found.positions - slipped.positions).max() < 1e-12
+    assert found.is_slack.sum() == 0
     assert np.array_equal(found.unstrained_length, with_errors(design, errors).unstrained_length)
 
 

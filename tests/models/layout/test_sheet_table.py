@@ -260,6 +260,13 @@ def test_without_openpyxl_a_sentence_says_what_to_do(tmp_path, monkeypatch):
         workbook_bytes({})
 
 
+def test_a_workbook_that_is_too_large(openpyxl, tmp_path, monkeypatch):
+    monkeypatch.setattr("models.layout.xlsx_sheets._LARGEST", 3000)
+    _, problems = book(openpyxl, tmp_path, [["position", "height"], [1, 5]])
+    assert len(problems) == 1
+    assert "MB are read at most: split it" in problems[0]
+
+
 def test_a_written_workbook_is_read_back(openpyxl, tmp_path):
     path = tmp_path / "written.xlsx"
     path.write_bytes(workbook_bytes({"table": [["position [km]", "height", "kind"], [0.1, 5.25, "support"]]}))

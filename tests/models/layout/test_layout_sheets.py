@@ -79,7 +79,7 @@ def test_files_are_found_whatever_their_letters_case(tmp_path):
 def test_a_folder_with_a_workbook_in_it_is_told_to_name_that(tmp_path):
     (tmp_path / "survey.xlsx").write_bytes(b"")
     (tmp_path / "poles.csv").write_text("a")
-    with pytest.raises(LayoutError, match="is no layout: .*; it has 'poles'; if survey.xlsx is one, name that file"):
+    with pytest.raises(LayoutError, match=r"is no layout: .*; it has 'poles'; if survey\.xlsx is one, name that file"):
         read_layout(tmp_path, SheetProblems("here"))
 
 

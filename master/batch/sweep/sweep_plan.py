@@ -15,14 +15,15 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
 from master.batch.sweep.sensitivity import LEAST_BLOCKS, SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
-from master.errors import MasterError, RequestError, said
+from master.errors import MasterError, RequestError, hint, said
+from master.scenario.overrides import FaultsOf
 from master.system.components import System
 from master.system.pantograph_motion import STATIC_FORCE
 
@@ -81,6 +82,8 @@ class SweepRequest(PlainRequest):
     faults : tuple of int
         Spans whose droppers break one after the other; the first run has none broken. The scenario must have been
         opened with them.
+    faults_of : str
+        ``each-dropper``, or ``each-arm``: the steady arms at the ends of these spans come off instead.
     stop : float, optional
         Stop time of all runs [s]; it follows the speed if not given.
     static_force, mean_force : str, optional
@@ -105,6 +108,7 @@ class SweepRequest(PlainRequest):
     sensitivity: SensitivityMethod | None = None
     table: Path | None = None
     faults: tuple[int, ...] = ()
+    faults_of: FaultsOf = "each-dropper"
     stop: float | None = None
     static_force: str | None = None
     mean_force: str | None = None
@@ -112,6 +116,27 @@ class SweepRequest(PlainRequest):
     keep: Keep = "figures"
     engine: Engine = "fmu"
     check: int = Field(1, ge=0)
+
+
+def listed_faults(faults: str | int | Sequence[int], span: int | Sequence[int]) -> dict[str, Any]:
+    """Return what a request says of faults: ``each-dropper`` or ``each-arm`` with spans, or spans alone.
+
+    Raises
+    ------
+    RequestError
+        If spans are missing, or given twice.
+    """
+    spans = (span,) if isinstance(span, int) else tuple(span)
+    if not isinstance(faults, str):
+        if spans:
+            raise RequestError("--span is of --faults each-dropper and --faults each-arm: give one of them too")
+        return {"faults": (faults,) if isinstance(faults, int) else tuple(faults)}
+    if faults not in get_args(FaultsOf):
+        known = get_args(FaultsOf)
+        raise RequestError(f"--faults: '{faults}' is none of {', '.join(known)}{hint(faults, known)}")
+    if not spans:
+        raise RequestError(f"--faults {faults} needs --span K: of which span of the line?")
+    return {"faults": spans, "faults_of": faults}
 
 
 def stored_request(folder: Path) -> dict[str, Any]:

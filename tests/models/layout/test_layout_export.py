@@ -16,6 +16,7 @@ from models.definition_files.toml_reader import Table
 from models.layout.definition_draft import toml_text
 from models.layout.layout_export import csv_text, export_line
 from models.layout.layout_import import import_layout
+from models.layout.sheet_problems import LayoutError
 from models.layout.xlsx_sheets import workbook_bytes
 from models.library.catalogue import line_names, line_path
 
@@ -193,6 +194,19 @@ def test_what_a_layout_cannot_say_is_told(tmp_path):
     exported = export_line(written(tmp_path, data))
     assert [note.split(": ")[1] for note in exported.notes] == ["[measured] is not in the layout"]
     assert difference(exported, returned(tmp_path, exported)) < 1e-6
+
+
+def test_a_surface_lies_beside_the_definition(tmp_path):
+    (tmp_path / "wear.csv").write_text("position [m],height [mm]\n0,0\n90,-0.1\n180,0\n")
+    exported = export_line(written(tmp_path, short("EN50318_2002", 3, running_surface={"profile": "wear.csv"})))
+    assert [note.split(": ")[1] for note in exported.notes] == ["wear.csv is named in the layout and no part of it"]
+    folder = tmp_path / "layout"
+    folder.mkdir()
+    for name, rows in exported.sheets.items():
+        (folder / f"{name}.csv").write_text(csv_text(rows))
+    assert import_layout(folder, "back", out=tmp_path / "back.toml").definition.running_surface.profile == "wear.csv"
+    with pytest.raises(LayoutError, match=r"line, row \d+, column B \(value\): wear.csv"):
+        import_layout(folder, "back", out=folder / "back.toml")
 
 
 def test_a_design_gives_what_the_layout_does_not(tmp_path):

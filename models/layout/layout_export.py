@@ -86,6 +86,8 @@ def _shown(cell: str | float) -> str:
 
 def _notes(path: Path, data: Mapping[str, Any]) -> Iterator[str]:
     """Yield what of a line its layout does not say."""
+    if (surface := data.get("running_surface", {}).get("profile")) is not None:
+        yield f"{path}: {surface} is named in the layout and no part of it: copy it to where the definition will lie"
     for table in data.get("section", [data]):
         if "measured" in table:
             yield f"{path}: [measured] is not in the layout: the droppers have the lengths that its heights give"

@@ -8,12 +8,12 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_type_hints
 
 import numpy as np
 
 from models.catenary.definition import line_reading
-from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_definition import CatenaryDefinition, LineType
 from models.catenary.definition.section_reading import SECTION_TABLES
 from models.definition_files.given_value import WITH_UNIT
 from models.definition_files.toml_reader import DefinitionError, Problem, Table
@@ -43,10 +43,9 @@ _UNITS: Final = {
 #: Without which there is no line.
 _NEEDED: Final = ("contact_wire", "messenger_wire", "dropper")
 #: Tables of a definition, of which a key names a value, and those that have tables in them.
-_TABLES: Final = (
-    "profile", "clamps", "damping", "contact", "mesh", "messenger_support", "dynamics", "track", "tensioning", "wind",
-    "irregularity", "fault", *WIRE_COLUMNS,
-)  # fmt: skip
+_TABLES: Final = {
+    k for k, hint in get_type_hints(CatenaryDefinition).items() if hint not in (str, int, float, LineType)
+}
 _NESTED: Final = ("damping", "tensioning", "wind")
 _TRACK: Final = {"curvature": "1/m", "radius": "m", "cant": "m", "vertical_curvature": "1/m"}
 #: Tables of a definition in which something lacks where a sheet is wrong.
@@ -65,7 +64,7 @@ class ImportedLine:
     notes: tuple[str, ...]
 
 
-def import_layout(path: Path, name: str, design: Path | None = None) -> ImportedLine:
+def import_layout(path: Path, name: str, design: Path | None = None, out: Path | None = None) -> ImportedLine:
     """Return the line that a layout describes.
 
     Parameters
@@ -76,6 +75,8 @@ def import_layout(path: Path, name: str, design: Path | None = None) -> Imported
         Of the line.
     design : Path, optional
         Definition file of the line that gives what the layout does not.
+    out : Path, optional
+        Where the definition will lie; files that it names lie beside it.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def import_layout(path: Path, name: str, design: Path | None = None) -> Imported
     maker = _Maker(layout, behind, problems)
     maker.fill(name)
     text = toml_text(maker.draft.data, f"Imported from {layout.name} by openpanto import.")
-    definition = maker.read(text)
+    definition = maker.read(text, out or Path(name))
     problems.finish()
     assert definition is not None
     return ImportedLine(definition, text, (*layout.notes, *maker.notes))
@@ -140,10 +141,10 @@ class _Maker:
             what = "alpha 1e-4 s and beta 0.0125 1/s, as the reference lines of EN 50318, were written as a choice"
             self.notes.append(f"{self.layout.name} says nothing of damping: {what}")
 
-    def read(self, text: str) -> CatenaryDefinition | None:
+    def read(self, text: str, out: Path) -> CatenaryDefinition | None:
         """Return the definition as its file will be read, or tell what is wrong, with the places in the sheets."""
         try:
-            return line_reading.read(Table.from_dict(tomllib.loads(text), "definition"))
+            return line_reading.read(Table.from_dict(tomllib.loads(text), str(out)))
         except DefinitionError as error:
             consequent = _CONSEQUENT if self.problems.found else ()
             for problem in error.problems:

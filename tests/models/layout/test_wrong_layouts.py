@@ -303,6 +303,11 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
          ("wires, row 2, column C (mass)", "is missing"),
          ("wires, row 3, column C (mass)", "0 kg/m must be greater than 0")],
     ),
+    "a column of wires that lacks": (
+        change("wires", "mass;", "#mass;"),
+        [(f"wires, row {r}, column A (component)", f"'{name}.mass' is missing")
+         for r, name in enumerate(("contact_wire", "messenger_wire", "dropper", "steady_arm"), 2)],
+    ),
     "wires of another unit": (
         change("wires", "[mm2]", "[m2]"),
         [(f"wires, row {r}, column B (area)", "m2 is outside 1e-0") for r in (2, 3, 4, 5)],
@@ -310,7 +315,14 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
     "keys that are none": (
         change("line", "damping.alpha", "damping.alfa", "clamps.dropper_lower", "clamps"),
         [("line, row 2, column B (value)", "unknown key (known here: alpha, auxiliary_wire"),
-         ("line, row 4, column B (value)", "must be a table [clamps]")],
+         ("line, row 4, column A (key)", "'clamps' is a table: name a key in it, as damping.alpha is in damping")],
+    ),
+    "keys that lack": (
+        every(instead("line", "key;value;unit\ndamping.alpha;0;s\ndropper.slack_law;tension;\nmesh.a.b;1;1\n"),
+              change("wires", "dropper;12;0.11;84.7;\n", "")),
+        [("line, row 4, column A (key)", "there is no key 'mesh.a.b': a table in a table is in damping"),
+         ("line", "'damping.beta' is missing"),
+         ("wires", "there is no row 'dropper': add it, or name a line")],
     ),
     "keys that other sheets give": (
         lambda s: s.update(line=s["line"] + "profile.encumbrance;1.4;m;\nspans.start;0;m;\nwires;x;;\n"

@@ -95,17 +95,18 @@ def test_a_wrong_stagger_of_supports_is_one_mistake(line_maker):
     assert "gives 2 values for 5 supports" in str(caught.value)
 
 
+def places_with(line_maker, anchor):
+    """Return the places of the contact wire in plan, the anchors' and the others."""
+    supports = line_maker(stagger={"amplitude": [0.2, "m", "x"], "anchor": anchor}).sections[0].supports
+    return supports[0].stagger, supports[-1].stagger, [s.stagger for s in supports[1:-1]]
+
+
 def test_anchors_have_a_place_in_plan_each_or_one_for_both(line_maker):
-    plain, each = line_maker(stagger={"amplitude": [0.2, "m", "x"]}), []
-    for anchor in ([0.1, "m", "x"], of("m", -0.3, 0.1), of("m", 1, 2, 3)):
-        stagger = {"amplitude": [0.2, "m", "x"], "anchor": anchor}
-        if len(each) == 2:
-            with pytest.raises(DefinitionError, match=r"stagger\.anchor: gives 3 values: give one for both"):
-                line_maker(stagger=stagger)
-            return
-        each.append([s.stagger for s in line_maker(stagger=stagger).sections[0].supports])
-    assert each[0] == [0.1, *(s.stagger for s in plain.sections[0].inner_supports), 0.1]
-    assert each[1] == [-0.3, *each[0][1:-1], 0.1]
+    inner = [0.2, -0.2, 0.2, -0.2, 0.2]
+    assert places_with(line_maker, [0.1, "m", "x"]) == (0.1, 0.1, inner)
+    assert places_with(line_maker, of("m", -0.3, 0.1)) == (-0.3, 0.1, inner)
+    with pytest.raises(DefinitionError, match=r"stagger\.anchor: gives 3 values: give one for both"):
+        places_with(line_maker, of("m", 1, 2, 3))
 
 
 def test_values_of_arms_need_arms(line_maker):

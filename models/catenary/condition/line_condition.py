@@ -22,8 +22,7 @@ from models.catenary.condition.fitted_lengths import checked_lengths, fitted_err
 from models.catenary.condition.irregularities import dropper_length_errors, stagger_errors, support_height_errors
 from models.catenary.condition.tensioning import WireTension, mast_sides, swing, tension_factors, wire_tensions
 from models.catenary.definition.line_definition import CatenaryDefinition
-from models.catenary.shape.form_finding import EquilibriumError, StaticState, find_rest
-from models.catenary.shape.line_matrices import beam_properties
+from models.catenary.shape.form_finding import StaticState, find_rest
 from models.catenary.shape.line_mesh import CatenaryMesh
 
 
@@ -51,7 +50,6 @@ def find_condition(design: StaticState) -> StaticState:
         broken=broken_droppers(definition, designed),
         seat=mesh.seat + raised,
     )
-    _check_relieved(definition, changed)
     aside = stagger_errors(definition.irregularity, designed)
     return find_rest(found, changed, _held(found, raised, aside, wires))
 
@@ -75,16 +73,6 @@ def _lengths(design: StaticState) -> FloatArray:
     definition, mesh = design.shape.definition, design.shape.mesh
     lengths = design.unstrained_length + dropper_length_errors(definition.irregularity, mesh) + slips(definition, mesh)
     return checked_lengths(design, lengths + fitted_errors(definition, mesh))
-
-
-def _check_relieved(definition: CatenaryDefinition, mesh: CatenaryMesh) -> None:
-    """Refuse a messenger wire that would push where a stitch wire takes over what is left of its tension."""
-    tension = beam_properties(definition, mesh).tension
-    if (tension[mesh.beside_stitch] <= 0.0).any():
-        raise EquilibriumError(
-            f"line '{definition.name}': beside a stitch wire the messenger wire has no tension left: less of it may "
-            "be lost (fault of kind 'tension_loss'), or the stitch wire needs less"
-        )
 
 
 def _held(design: StaticState, raised: FloatArray, aside: FloatArray, wires: Sequence[WireTension]) -> FloatArray:

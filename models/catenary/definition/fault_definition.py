@@ -87,8 +87,9 @@ class DropperFault(Fault):
         return "dropper", f"dropper {self.dropper} of span {self.span}"
 
     def place(self, section: Section) -> str:
-        """Return where it hangs."""
-        return f"at {section.spans[self.span - 1].droppers[self.dropper - 1]:.2f} m"
+        """Return where it hangs, and between which supports."""
+        span = section.spans[self.span - 1]
+        return f"at {span.droppers[self.dropper - 1]:.2f} m, supports at {span.start:.2f} and {span.end:.2f} m"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,7 +33,7 @@ def read_faults(tables: Sequence[Table]) -> tuple[Fault, ...]:
 
 def check_faults(tables: Sequence[Table], definition: CatenaryDefinition) -> None:
     """Check that the line has what every fault is of, and no two are of the same."""
-    known = [table for table in tables if table.data.get("kind") in FAULT_KINDS]
+    known = [table for table in tables if table.data.get("kind") in tuple(FAULT_KINDS)]  # it may be anything
     numbers = [number for number, table in enumerate(tables, 1) if table in known]
     seen: dict[tuple[int, str], int] = {}
     for number, table, fault in zip(numbers, known, definition.fault, strict=True):

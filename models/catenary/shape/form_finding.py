@@ -343,7 +343,11 @@ def _check_wires(definition: CatenaryDefinition, mesh: CatenaryMesh) -> None:
     raise EquilibriumError(
         f"line '{definition.name}': at {mesh.points[mesh.beams[worst, 0], 0]:.2f} m the {name} {why} has a tension of "
         f"{tension[worst]:.0f} N: a wire must pull; "
-        + ("give the stitch wire less (stitch_wire.tension)" if stitched else "see tensioning")
+        + (
+            "give the stitch wire less (stitch_wire.tension), or let the messenger wire lose less"
+            if stitched
+            else "let it lose less"
+        )
     )
 
 

@@ -221,6 +221,13 @@ def table(**changes):
     return Table.from_dict(data | changes)
 
 
+def test_a_speed_beside_inputs_in_its_place_is_refused():
+    given = table(speed=[40.0, "m/s", "t"], use_train=[1, "1", "t"])
+    del given.data["speed_profile"]
+    with pytest.raises(DefinitionError, match=r"speed: does nothing with use_train = 1: .*; leave out one of the two"):
+        read_lumped(given)
+
+
 def test_a_profile_is_read_in_its_units_and_takes_the_place_of_the_speed():
     found = read_lumped(table())
     assert found.speed_profile == SpeedProfile(time=(0.0, 8.0), speed=(20.0, 30.0))

@@ -286,6 +286,7 @@ def evaluate(y: Any, given: Any, model: Any, respond: Any) -> Any:
         Coordinates, then their rates.
     given : (force, lateral, base acceleration, lift, uplift)
     respond : bool
+        Here never a constant: numba would compile the function for each of the two.
 
     Returns
     -------
@@ -468,7 +469,7 @@ def begin(memory: Any, given: Any, model: Any, settings: Any) -> None:
     """Begin at the coordinates and rates in a memory: fill the rest of it."""
     state, rates, kept, _, _, single = memory
     inputs = inputs_at(given, 0.0)
-    acceleration, response = evaluate(list(state), inputs, model, True)
+    acceleration, response = evaluate(list(state), inputs, model, len(rates) > 0)
     put(rates, acceleration)
     put(kept, response)
     keep_inputs(single, inputs)
@@ -509,7 +510,7 @@ def step(memory: Any, given: Any, duration: Any, model: Any, settings: Any) -> A
             middle[n + i] += change
             begun[n + i] += change
     else:
-        acceleration, _ = evaluate(y, acting, model, False)
+        acceleration, _ = evaluate(y, acting, model, n < 0)
         first, before = first + acceleration, 0.0
     response = first[:0]
     rise = given[19] - (given[0] - given[1])
@@ -568,14 +569,14 @@ def continued(
         speed = u + a * (23.0 * dq - 16.0 * dr + 5.0 * ds)
         speeds.append(speed)
         places.append(x + b * (s - 5.0 * r + 19.0 * q + 9.0 * speed))
-    acceleration, _ = evaluate(places + speeds, inputs_at(given, now + 0.5 * h), model, False)
+    acceleration, _ = evaluate(places + speeds, inputs_at(given, now + 0.5 * h), model, n < 0)
     guess, places = [], []
     for x, u, q, dq, dr, r, dm in zip(y, v, first, f, m, speeds, acceleration):  # noqa: B905
         speed = u + c * (dr - 2.0 * dq + 7.0 * dm)
         guess.append(speed)
         places.append(x + c * (q + 4.0 * r + speed))
     acting = inputs_at(given, now + h)
-    latest, response = evaluate(places + guess, acting, model, True)
+    latest, response = evaluate(places + guess, acting, model, n > 0)
     places, ends, largest = [], [], 0.0
     terms = zip(y, v, first, f, acceleration, latest, guess, settings[2][n:])  # noqa: B905
     for x, u, q, dq, dm, de, guessed, weight in terms:
@@ -595,16 +596,16 @@ def started(y: Any, first: Any, given: Any, now: Any, h: Any, model: Any, settin
     at_middle, at_end = inputs_at(given, now + 0.5 * h), inputs_at(given, now + h)
     a, c = 0.5 * h, h / 6.0
     second = [y[i] + a * first[i] for i in range(2 * n)]
-    acceleration, _ = evaluate(second, at_middle, model, False)
+    acceleration, _ = evaluate(second, at_middle, model, n < 0)
     k2 = second[n:] + acceleration
     third = [y[i] + a * k2[i] for i in range(2 * n)]
-    acceleration, _ = evaluate(third, at_middle, model, False)
+    acceleration, _ = evaluate(third, at_middle, model, n < 0)
     k3 = third[n:] + acceleration
     fourth = [y[i] + h * k3[i] for i in range(2 * n)]
-    acceleration, _ = evaluate(fourth, at_end, model, False)
+    acceleration, _ = evaluate(fourth, at_end, model, n < 0)
     k4 = fourth[n:] + acceleration
     new = [y[i] + c * (first[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) for i in range(2 * n)]
-    acceleration, response = evaluate(new, at_end, model, True)
+    acceleration, response = evaluate(new, at_end, model, n > 0)
     last = new[n:] + acceleration
     error = error_of([c * k for k in k4], [c * k for k in last], settings[2], settings[0])
     return new, last, response, k3, at_end, error

@@ -242,8 +242,9 @@ def test_faults_are_read_with_their_parameters():
     ]
     described = {p.name: p.description for p in line.parameters()}
     for number, f in enumerate(line.fault, 1):
-        x = line.sections[0].spans[f.span - 1].droppers[f.dropper - 1]
-        assert described[f"fault[{number}].active"].endswith(f"; dropper {f.dropper} of span {f.span} at {x:.2f} m")
+        span = line.sections[0].spans[f.span - 1]
+        place = f"at {span.droppers[f.dropper - 1]:.2f} m, supports at {span.start:.2f} and {span.end:.2f} m"
+        assert described[f"fault[{number}].active"].endswith(f"; dropper {f.dropper} of span {f.span} {place}")
     (value,) = (p for p in line.parameters() if p.name == "fault[2].value")
     assert (value.value, value.unit, value.source) == (0.02, "m", SOURCE)
     changed = line.with_values({"fault[2].active": 1, "fault[2].value": 0.03, "irregularity.seed": 2**31 - 1})

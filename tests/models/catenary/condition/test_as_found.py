@@ -14,7 +14,8 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import StripMotion
 from models.catenary.shape import form_finding
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.form_finding import EquilibriumError, find_form, weight
+from models.catenary.shape.form_finding import EquilibriumError, weight
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_matrices import beam_properties
 from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics.elasticity import elasticity
@@ -39,7 +40,7 @@ def with_fault(line, kind, **values):
 @pytest.fixture(scope="module")
 def short():
     line = make_line()
-    return line, find_form(line, build_mesh(line))
+    return line, kept_form(line, build_mesh(line))
 
 
 class Weighted:
@@ -50,7 +51,7 @@ class Weighted:
         wires = ("contact_wire", "messenger_wire")
         limp = {w: dataclasses.replace(getattr(line, w), bending_stiffness=0.0) for w in wires}
         self.line = dataclasses.replace(line, **limp)
-        self.design = find_form(self.line, build_mesh(self.line))
+        self.design = kept_form(self.line, build_mesh(self.line))
         self.mesh, self.truss = self.design.shape.mesh, Truss(self.line)
         self.count = len(self.truss.wires)
         self.kept = {n: getattr(self.truss, n).copy() for n in ("unstrained", "stiffness", "weight", "bars")}
@@ -238,7 +239,7 @@ def test_every_error_and_fault_at_once_leaves_a_line_in_equilibrium(name):
     moved = {"position": FAULTS["hard point"]["position"] + start, "from_": 131.3 + start, "to": 180.1 + start}
     faults = [f | {k: v for k, v in moved.items() if k in f} for f in FAULTS.values()]
     line = dataclasses.replace(line, fault=tuple(make_fault(**f) for f in faults))
-    design = find_form(line, build_mesh(line))
+    design = kept_form(line, build_mesh(line))
     condition = find_condition(design)
     shape = condition.shape
     force = shape.matrices.K @ condition.displacement + shape.droppers.rows.T @ condition.dropper_force

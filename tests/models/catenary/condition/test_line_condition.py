@@ -12,10 +12,11 @@ from models.catenary.condition.irregularities import dropper_length_errors, supp
 from models.catenary.condition.line_condition import find_condition
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.form_finding import EquilibriumError, find_form, find_rest, weight
+from models.catenary.shape.form_finding import EquilibriumError, find_rest, weight
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import line_names, load_line
-from tests.effort import count, some
+from tests.effort import count, rest, some
 from tests.models.catenary.shape.test_nonlinear_truss import limp
 from tests.models.conftest import make_fault, make_line
 from tests.models.nonlinear_truss import Truss
@@ -25,7 +26,7 @@ SPAN = 12
 
 
 def design_of(line):
-    return find_form(line, build_mesh(line))
+    return kept_form(line, build_mesh(line))
 
 
 def with_faults(line, *faults):
@@ -70,7 +71,7 @@ def short():
     return line, design_of(line)
 
 
-@pytest.mark.parametrize("name", some(line_names(), "LN2", "LN2_ring", "Re330", "Shinkansen"))
+@pytest.mark.parametrize("name", some(line_names(), "LN2_ring", "Re330", "Shinkansen"))
 def test_the_lengths_of_the_design_give_the_design(name):
     design = design_of(load_line(name))
     mesh = dataclasses.replace(design.shape.mesh, given_length=design.unstrained_length)
@@ -101,8 +102,8 @@ def test_errors_and_faults_of_size_zero_leave_the_design(short):
 
 @pytest.mark.parametrize(
     "errors",
-    [{"dropper_length_sigma": 0.01}, {"support_height_sigma": 0.01}],
-    ids=["dropper lengths", "support heights"],
+    [{"support_height_sigma": 0.01}, *rest({"dropper_length_sigma": 0.01})],
+    ids=["support heights", "dropper lengths"],
 )
 def test_a_line_with_errors_hangs_as_a_nonlinear_truss_does(errors):
     """Every error 10 mm at one sigma; the truss has its bars cut, and its supports raised, by the same."""
@@ -253,7 +254,7 @@ def test_a_broken_dropper_has_no_damper_and_no_pendulum(short):
     assert condition.shape.matrices.M.sum() == pytest.approx(design.shape.matrices.M.sum(), rel=1e-5)
 
 
-@pytest.mark.parametrize("name", ["LN2", "Re330", "LN2_ring", "EN50318_2018_AC_simple"])
+@pytest.mark.parametrize("name", ["LN2_ring", *rest("LN2", "Re330", "EN50318_2018_AC_simple")])
 def test_supports_and_anchors_carry_the_weight(name):
     """Vertical equilibrium of the whole line: what is held, or sprung, takes its weight and nothing else."""
     values = {f"irregularity.{kind}_sigma": 0.01 for kind in ("dropper_length", "support_height")}
@@ -287,7 +288,7 @@ def sum_of_reactions(condition):
 
 def test_supports_that_are_all_too_high_lift_the_line_as_it_is(monkeypatch):
     """10 mm at every support and arm: far from the anchors, which stay, the line is the same 10 mm higher."""
-    for line in (make_line(16), dataclasses.replace(load_line("EN50318_2018_AC_simple"))):
+    for line in (make_line(16), load_line("EN50318_2018_AC_simple"))[: count(1, 2)]:
         design = design_of(line)
         monkeypatch.setattr(line_condition, "support_height_errors", lambda _, mesh: np.full(len(mesh.sprung), 0.01))
         condition = changed(design, line.with_values({"irregularity.support_height_sigma": 0.01}))
@@ -355,7 +356,7 @@ def test_a_dropper_without_length_is_refused(short):
         changed(design, with_faults(line, slipped(4, -1.2, span=3)))
 
 
-@pytest.mark.parametrize("name", ["LN2", "Re330"])
+@pytest.mark.parametrize("name", ["LN2", *rest("Re330")])
 def test_large_errors_settle_with_many_droppers_slack(name):
     line = load_line(name)
     design = design_of(line)

@@ -106,9 +106,15 @@ def conditions(definition: CatenaryDefinition, section: int) -> Iterator[tuple[s
     if definition.track is not None:
         yield "track", _track(definition, section)
     e = definition.irregularity
-    if e.dropper_length_sigma or e.support_height_sigma:
-        sigma = f"{1e3 * e.dropper_length_sigma:g} mm in droppers, {1e3 * e.support_height_sigma:g} mm in supports"
-        yield "errors of assembly", f"sigma {sigma}, seed {e.seed}"
+    sigmas = {
+        "dropper lengths": e.dropper_length_sigma,
+        "dropper places": e.dropper_position_sigma,
+        "support heights": e.support_height_sigma,
+        "stagger": e.stagger_sigma,
+    }
+    if any(sigmas.values()):
+        sigma = ", ".join(f"{name} {1e3 * value:g} mm" for name, value in sigmas.items() if value)
+        yield "errors of assembly, sigma", f"{sigma}; seed {e.seed}"
     if count := sum(fault.active for fault in definition.fault):
         yield "faults that act", str(count)
 

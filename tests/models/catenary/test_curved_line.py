@@ -13,6 +13,7 @@ from models.catenary.line_state import StripMotion
 from models.catenary.step.compiled_line_step import CompiledLineStep
 from models.catenary.step.plain_step import PlainStep
 from models.library.catalogue import load_line
+from tests.effort import rest
 
 STEP = 1e-3
 TRANSITION = Track(positions=(40.0, 110.0, 180.0, 260.0), curvature=(0.0, 1e-3, 1e-3, 0.0), cant=(0.0, 0.08, 0.08, 0.0))
@@ -110,7 +111,7 @@ def test_two_strips_in_an_overlap_in_a_curve_at_another_temperature(overlap, mon
         np.testing.assert_allclose(met[:, 1], np.interp(met[:, 0], x, y), atol=0.01)
 
 
-@pytest.mark.parametrize("name", ["Re330", "Shinkansen"])
+@pytest.mark.parametrize("name", ["Re330", *rest("Shinkansen")])
 def test_lines_of_every_kind_lie_in_curves(name):
     """Lateral loads of all their wires are those of the supports: sum T kappa over the whole line."""
     line = load_line(name)

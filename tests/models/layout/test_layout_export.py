@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.catenary.definition.line_reading import read
-from models.catenary.shape.form_finding import find_form
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.commands.physics_main import main
 from models.definition_files.toml_reader import Table
@@ -112,7 +112,7 @@ def returned(folder, exported, *, as_workbook=False):
 
 def difference(exported, line) -> float:
     """Return by how much two lines at rest differ in shape [m]."""
-    state = find_form(line.definition, build_mesh(line.definition))
+    state = kept_form(line.definition, build_mesh(line.definition))
     return float(np.abs(state.positions - exported.state.positions).max())
 
 
@@ -183,7 +183,7 @@ def test_lengths_are_those_of_form_finding_in_mm(tmp_path):
     with (tmp_path / "out" / "droppers.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     line = read(Table.load(path))
-    state = find_form(line, build_mesh(line))
+    state = kept_form(line, build_mesh(line))
     assert [float(row["length [mm]"]) for row in rows] == pytest.approx(1e3 * state.unstrained_length, abs=1e-4)
     assert [(row["span"], row["dropper"]) for row in rows][6:8] == [("1", "7"), ("2", "1")]
 

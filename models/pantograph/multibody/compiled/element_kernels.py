@@ -10,19 +10,20 @@ from math import atan2, cos, sin, sqrt, tanh
 import numpy as np
 from numba import njit
 
-_compiled = njit(cache=True, error_model="numpy")
-#: For what kernels call: their machine code holds it, so that it need not be kept besides.
-_inside = njit(error_model="numpy")
+#: For what other kernels alone call: nothing is made for Python then, nor kept besides.
+_inside = njit(  # type: ignore[call-overload]
+    error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
 
 
-@_compiled
+@_inside
 def turn(frame, x, y, z, out):
     """Write the product of the first three rows of a frame and a body-fixed vector."""
     for i in range(3):
         out[i] = frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z
 
 
-@_compiled
+@_inside
 def rotation(p, A):
     """Write the rotation matrix of Euler parameters; see `rotations.rotation_matrices`."""
     a, x, y, z = p[0], p[1], p[2], p[3]
@@ -34,7 +35,7 @@ def rotation(p, A):
     A[2, 0], A[0, 2] = 2.0 * (z * x - a * y), 2.0 * (z * x + a * y)
 
 
-@_compiled
+@_inside
 def spun(frame, w, out):
     """Write the product of a matrix and w~; w are three numbers."""
     for i in range(3):
@@ -44,7 +45,7 @@ def spun(frame, w, out):
         out[i, 2] = x * w[1] - y * w[0]
 
 
-@_compiled
+@_inside
 def crossed(a, b, out):
     """Write a x b."""
     x = a[1] * b[2] - a[2] * b[1]
@@ -156,7 +157,7 @@ def vectors_of(vectors, gaps, levers, frames, origins):
     return values
 
 
-@_compiled
+@_inside
 def dot(values, a, b):
     """Return the product of two vectors that begin at places in a flat array."""
     return values[a] * values[b] + values[a + 1] * values[b + 1] + values[a + 2] * values[b + 2]
@@ -181,7 +182,7 @@ def add_lines(lines, values, crosses, lift, loads):
         pull(row, tension / divisor, values, crosses, loads)
 
 
-@_compiled
+@_inside
 def pull(row, tension, values, crosses, loads):
     """Add a tension per length of x along a line; see `force_elements._Lines.spread`."""
     x, start, to, at_start, at_to = int(row[0]), int(row[2]), int(row[3]), int(row[4]), int(row[5])
@@ -213,7 +214,7 @@ def add_moments(moments, values, lift, loads):
             loads[i, 3 + c] -= value * values[axis, c]
 
 
-@_compiled
+@_inside
 def angle_of(row, frames):
     """Return the angle of body j about an axis of body i; see `angle_elements.BodyAngle`."""
     i, j = frames[int(row[0])], frames[int(row[1])]
@@ -226,7 +227,7 @@ def angle_of(row, frames):
     return atan2(aside, along)
 
 
-@_compiled
+@_inside
 def relative_spin(i, j, frames, w, out):
     """Write the angular velocity of body j less that of body i."""
     other = np.empty(3)
@@ -352,7 +353,7 @@ def add_air(air, frames, against, loads):
             loads[k, 3 + c] += side[c]
 
 
-@_compiled
+@_inside
 def curve_at(curve, x):
     """Return the value of a cubic curve, its end values held outside; see `cubic_curve.CubicCurve`."""
     last = len(curve) - 1
@@ -407,7 +408,7 @@ def lift_of(lifting, own, per_lift, per_force, u, frames, origins):
     return value + uplift * curve_at(per_force, place) if len(per_force) > 0 else value
 
 
-@_compiled
+@_inside
 def touch(strip, y, n, frame, force, lateral, out):
     """Write the contact's force along z and moments about x and y on the strip's body; see `Mechanism.contact_load`."""
     k = int(strip[0])

@@ -30,8 +30,11 @@ from models.pantograph.multibody.compiled.element_kernels import (
     vectors_of,
 )
 
+#: For what is called from Python, and for what other kernels alone call.
 _compiled = njit(cache=True, error_model="numpy")
-_inside = njit(error_model="numpy")
+_inside = njit(  # type: ignore[call-overload]
+    error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
 #: Tables, in the order of `mechanism_tables.TABLES`.
 (
     _BODIES, _BASE, _VECTORS, _GAPS, _LEVERS, _CROSSES, _ROWS, _LINES, _SLIDES, _MOMENTS, _STOPS, _FRICTIONS, _BUSHINGS,
@@ -41,7 +44,7 @@ _inside = njit(error_model="numpy")
 _BAUMGARTE = 50.0
 
 
-@_compiled
+@_inside
 def table(numbers, place):
     """Return a table, shape (elements, numbers of each)."""
     begin, rows, columns = place
@@ -79,7 +82,7 @@ def loads_of(numbers, layout, y, u, frames, origins, values, crosses):
     return loads
 
 
-@_compiled
+@_inside
 def scale(bodies, frames, k, values, out):
     """Write six global components of a body's load, or of its columns in Phi_q, in scaled body coordinates."""
     A = frames[k]
@@ -158,7 +161,7 @@ def solve(L, right):
             right[r, c] = total * L[r, r]
 
 
-@_compiled
+@_inside
 def place_rates(y, n, out):
     """Write the time derivatives of positions and Euler parameters, the first 7 n; see `rotations.euler_rates`."""
     for i in range(3 * n):
@@ -173,7 +176,7 @@ def place_rates(y, n, out):
         out[q + 3] = 0.5 * (a * z + e0 * s - e1 * x)
 
 
-@_compiled
+@_inside
 def rates_of(y, acceleration, out):
     """Write the time derivative of a state."""
     n = len(acceleration)

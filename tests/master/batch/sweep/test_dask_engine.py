@@ -116,7 +116,7 @@ def test_the_same_bits_here_with_processes_and_through_a_scheduler(swept, tmp_pa
 
 
 def test_a_run_whose_worker_always_dies_is_a_row_and_the_others_go_on(exiting_toy, command, tmp_path):
-    process = command("--over", "catenary.fail_at=0.2,9,10", "--jobs", "2", quiet=False)
+    process = command("--over", "catenary.fail_at=0.2,9,10", "--jobs", "1", quiet=False)
     code, error = ended(process)
     assert code == 1
     assert re.search(r"worker 127\S+ died in run 1; the run is made once more", error)

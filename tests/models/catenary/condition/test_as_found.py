@@ -14,9 +14,11 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import StripMotion
 from models.catenary.shape import form_finding
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.form_finding import EquilibriumError, find_form, weight
+from models.catenary.shape.form_finding import EquilibriumError, weight
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_matrices import beam_properties
 from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.shape.wire_intervals import attachments
 from models.catenary.statics.elasticity import elasticity
 from models.library.catalogue import load_line
 from tests.effort import some
@@ -39,7 +41,7 @@ def with_fault(line, kind, **values):
 @pytest.fixture(scope="module")
 def short():
     line = make_line()
-    return line, find_form(line, build_mesh(line))
+    return line, kept_form(line, build_mesh(line))
 
 
 class Weighted:
@@ -50,7 +52,7 @@ class Weighted:
         wires = ("contact_wire", "messenger_wire")
         limp = {w: dataclasses.replace(getattr(line, w), bending_stiffness=0.0) for w in wires}
         self.line = dataclasses.replace(line, **limp)
-        self.design = find_form(self.line, build_mesh(self.line))
+        self.design = kept_form(self.line, build_mesh(self.line))
         self.mesh, self.truss = self.design.shape.mesh, Truss(self.line)
         self.count = len(self.truss.wires)
         self.kept = {n: getattr(self.truss, n).copy() for n in ("unstrained", "stiffness", "weight", "bars")}
@@ -238,7 +240,7 @@ def test_every_error_and_fault_at_once_leaves_a_line_in_equilibrium(name):
     moved = {"position": FAULTS["hard point"]["position"] + start, "from_": 131.3 + start, "to": 180.1 + start}
     faults = [f | {k: v for k, v in moved.items() if k in f} for f in FAULTS.values()]
     line = dataclasses.replace(line, fault=tuple(make_fault(**f) for f in faults))
-    design = find_form(line, build_mesh(line))
+    design = kept_form(line, build_mesh(line))
     condition = find_condition(design)
     shape = condition.shape
     force = shape.matrices.K @ condition.displacement + shape.droppers.rows.T @ condition.dropper_force
@@ -360,3 +362,17 @@ def test_places_are_drawn_from_a_stream_of_their_own(short):
     lower = condition.shape.mesh.droppers[:, 0], design.shape.mesh.droppers[:, 0]
     found = condition.shape.mesh.points[lower[0], 0] - design.shape.mesh.points[lower[1], 0]
     assert found == pytest.approx(errors, abs=1e-9)
+    held = attachments(condition.shape.mesh)
+    (wire,) = condition.shape.mesh.contact_chains()
+    x, y = condition.shape.points[wire.nodes, :2].T
+    at = held[wire.nodes]
+    assert np.abs(y - np.interp(x, x[at], y[at])).max() < 1e-12, "straight in plan between its clamps"
+
+
+def test_a_hard_point_has_a_node_of_its_own_or_that_of_a_clamp_beside_it(short):
+    line, design = short
+    clamp = float(line.sections[0].spans[2].droppers[2])
+    for place, expected in ((127.77, 127.77), (clamp + 0.009, clamp)):
+        found = condition_of(design, with_fault(line, "hard_point", position=place, value=40.0)).shape.mesh
+        (heaviest,) = np.flatnonzero(found.clamp_mass > 30.0)
+        assert found.points[heaviest, 0] == pytest.approx(expected, abs=1e-9)

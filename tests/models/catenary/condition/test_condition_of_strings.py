@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.shape.form_finding import find_form
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import load_line
 from tests.models.conftest import make_fault
@@ -99,8 +99,8 @@ def line():
 
 def condition(line, fault):
     """Return what a fault of a dropper of LN2's fourteenth span does: rise of droppers and of the support before it."""
-    design = find_form(line, build_mesh(line))
-    found = find_condition(find_form(faulty := replace(line, fault=(fault,)), build_mesh(faulty)))
+    design = kept_form(line, build_mesh(line))
+    found = find_condition(kept_form(faulty := replace(line, fault=(fault,)), build_mesh(faulty)))
     lower, supports = design.shape.mesh.droppers[:, 0], design.shape.mesh.support_nodes
     rise = (found.positions - design.positions)[:, 2]
     x = design.positions[:, 0]
@@ -111,7 +111,7 @@ def condition(line, fault):
 
 
 def test_the_design_of_strings_is_that_of_the_line(strings, line):
-    design = find_form(line, build_mesh(line))
+    design = kept_form(line, build_mesh(line))
     (*_, first) = condition(line, make_fault(kind="dropper_slipped", span=14, dropper=1, value=0.0))
     assert strings.length[14:21] == pytest.approx(
         design.droppers.length[first : first + 7], abs=0.005

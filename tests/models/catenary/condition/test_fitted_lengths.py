@@ -7,7 +7,8 @@ import pytest
 
 from models.catenary.condition.fitted_lengths import droppers_along, find_fitted_lengths, with_errors
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.shape.form_finding import EquilibriumError, find_form
+from models.catenary.shape.form_finding import EquilibriumError
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import load_line
 from tests.models.conftest import make_fault, make_line
@@ -16,7 +17,7 @@ from tests.models.conftest import make_fault, make_line
 @pytest.fixture(scope="module")
 def design():
     line = make_line(4)
-    return find_form(line, build_mesh(line))
+    return kept_form(line, build_mesh(line))
 
 
 def heights(state):

@@ -15,7 +15,7 @@ from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics import elasticity
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import line_names, load_line
-from tests.effort import some
+from tests.effort import rest, some
 from tests.models import nodal_line
 
 GRAVITY = 9.81
@@ -122,7 +122,8 @@ def test_a_bar_on_two_droppers_swings_as_a_pendulum():
 
 
 @pytest.mark.parametrize(
-    ("name", "low", "high"), [("LN2", 262.0, 270.0), ("EN50318_2018_AC_simple", 263.0, 270.0), ("Re330", 788.0, 788.0)]
+    ("name", "low", "high"),
+    [("LN2", 262.0, 270.0), *rest(("EN50318_2018_AC_simple", 263.0, 270.0), ("Re330", 788.0, 788.0))],
 )
 def test_arms_have_the_stiffness_of_the_specification(name, low, high):
     """N/l in the spans of which a line has most, those beside an anchor left out, within 2 %."""
@@ -150,6 +151,7 @@ def without_bending(line, elements):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_support_of_LN2_gives_way_as_a_nonlinear_truss_does(ln2):
     """100 N lift it by 22.63 mm in a truss without bending, 16 elements between droppers; 23.9 mm without N/L."""
     at = np.array([600.7])

@@ -7,7 +7,7 @@ import pytest
 
 from models.catenary.condition.fitted_lengths import with_errors
 from models.catenary.definition.condition_definition import Irregularity
-from models.catenary.shape.form_finding import find_form
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.layout.as_built.as_built_line import find_as_built
 from models.layout.as_built.as_built_outcome import AGREEMENT, judge_as_built
@@ -28,7 +28,7 @@ def line():
 
 @pytest.fixture(scope="module")
 def design(line):
-    return find_form(line, build_mesh(line))
+    return kept_form(line, build_mesh(line))
 
 
 @pytest.fixture(scope="module")

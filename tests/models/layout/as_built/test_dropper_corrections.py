@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from models.catenary.condition.fitted_lengths import FittedLengths, with_errors
-from models.catenary.shape.form_finding import find_form
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics.dropper_influence import dropper_influence
 from models.layout.as_built.dropper_corrections import Allowed, correct, most_useful
@@ -49,7 +49,7 @@ def test_the_first_is_the_best_of_all_and_seven_of_seven_leave_nothing():
 @pytest.fixture(scope="module")
 def design():
     line = make_line(4)
-    return find_form(line, build_mesh(line))
+    return kept_form(line, build_mesh(line))
 
 
 def heights(state):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from models.library.catalogue import load_pantograph
 from models.numerics.cubic_curve import CubicCurve
 from models.numerics.kernel_cache import SWITCH, KernelError
 from models.pantograph.multibody.base_motion import Sway
+from models.pantograph.multibody.compiled import compiled_equations as compiled_equations_module
 from models.pantograph.multibody.compiled import mechanism_tables
 from models.pantograph.multibody.compiled.compiled_equations import compiled_equations
 from models.pantograph.multibody.elements.angle_elements import Cam
@@ -154,6 +157,17 @@ def test_kernels_see_what_has_strayed(both):
 def test_every_kind_of_force_is_compared():
     seen = {type(f) for made, _, _ in CASES.values() for f in made().forces}
     assert seen == set(KNOWN) == set(mechanism_tables.COMPILED)
+
+
+def test_what_python_calls_is_made_for_python():
+    """A kernel that is compiled for other kernels alone ends the process if Python calls it."""
+    multibody = Path(compiled_equations_module.__file__).parents[1]
+    called = set(re.findall(r"kernels\.(\w+)\(", (multibody / "compiled" / "compiled_equations.py").read_text()))
+    kernels = (multibody / "compiled" / "mechanism_kernels.py").read_text()
+    assert called == set(re.findall(r"@_compiled\ndef (\w+)\(", kernels))
+    called = set(re.findall(r"self\._equations\.(\w+)\(", (multibody / "reduced" / "reduced_motion.py").read_text()))
+    (listed,) = re.findall(r"_FOR_PYTHON = \((.+)\)", (multibody / "reduced" / "reduced_kernels.py").read_text())
+    assert called == set(re.findall(r"\w+", listed))
 
 
 def test_a_kind_that_no_kernel_knows_stays_plain(both, monkeypatch):

@@ -8,6 +8,8 @@ import pytest
 from models import in_wind, over_temperature, span_table, statics
 from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.tensioning_definition import Tensioning, TensioningDevice
+from models.catenary.shape.form_finding import EquilibriumError
+from models.catenary.statics import temperature_table
 from models.definition_files.parameter import ParameterError
 from models.interface.line_and_pantograph import Line
 
@@ -74,6 +76,15 @@ def test_a_verdict_in_the_wind_counts_the_spans_beyond(rest):
     assert "4 of 4 spans beyond" in beyond.figure
     assert in_wind(rest, pressure=300.0).judgements == ()
     assert np.isnan(in_wind(rest, pressure=300.0).limit).all()
+
+
+def test_what_a_line_does_not_stand_is_told_with_its_temperature(line, monkeypatch):
+    def refuse(design):
+        raise EquilibriumError("line 'short': the arm at 50.00 m pushes")
+
+    monkeypatch.setattr(temperature_table, "find_condition", refuse)
+    with pytest.raises(EquilibriumError, match=r"^at -20 degC: line 'short': the arm at 50\.00 m pushes$"):
+        over_temperature(line, ["-20 degC", "40 degC"])
 
 
 def test_spans_have_the_tension_that_the_devices_leave(line):

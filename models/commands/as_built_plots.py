@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from models.arrays import FloatArray
+from models.arrays import BoolArray, FloatArray
 from models.layout.as_built.as_built_outcome import AsBuiltOutcome
 
 if TYPE_CHECKING:
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 #: What a row of a figure shows of the line [m], and most of its rows.
 _ROW: Final = 700.0
 _MOST_ROWS: Final = 24
+_BESIDE: Final = 20.0
+#: Heights that are drawn one by one; more of them are a picture.
+_MANY: Final = 4000
 _WITHIN, _LONG, _SHORT, _GREY = "#5b8f6b", "#b3261e", "#1f5fa8", "#9aa0a6"
 
 
@@ -31,9 +34,11 @@ def errors(found: AsBuiltOutcome) -> Figure:
     width = 0.7 * float(np.median(np.diff(np.unique(b.x)))) if len(b.x) > 1 else 3.0
     figure, panels = _rows(b.x)
     for axes in panels:
+        here = _shown(axes, b.x)
         for label, colour, chosen in kinds:
-            axes.bar(b.x[chosen], mm * b.error[chosen], width=width, color=colour, label=label)
-        slack, missing = b.is_slack & b.is_measured, ~b.is_measured
+            bars = here & chosen
+            axes.bar(b.x[bars], mm * b.error[bars], width=width, color=colour, label=label)
+        slack, missing = here & b.is_slack & b.is_measured, here & ~b.is_measured
         axes.plot(b.x[slack], mm * b.error[slack], "v", color="black", markersize=4, label="slack: at least")
         axes.plot(b.x[missing], np.zeros(missing.sum()), "x", color=_GREY, markersize=4, label="not measured")
         for limit in (-found.tolerance, found.tolerance):
@@ -48,28 +53,36 @@ def heights(found: AsBuiltOutcome) -> Figure:
     """Heights over those of the design: measured, as built and expected, with the droppers that change."""
     b, mm = found.built, 1e3
     figure, panels = _rows(b.x)
-    change = found.change
-    limits = _limits(mm * found.before, mm * found.after, [mm * d.value[d.is_measured] for d in b.deviations if d])
+    before, after, change = mm * found.before, mm * found.after, found.change
+    limits = _limits(before, after, [mm * d.value[d.is_measured] for d in b.deviations if d])
+    bottom = limits[0] + 0.04 * (limits[1] - limits[0])
+    of = b.design.shape.mesh.section[b.design.shape.mesh.droppers[b.droppers, 0]]
+    x, measured = (np.concatenate([getattr(d, name) for d in b.deviations if d]) for name in ("x", "deviation"))
     for axes in panels:
-        for d in b.deviations:
-            if d is not None:
-                axes.plot(d.x, mm * d.deviation, ".", color=_GREY, markersize=1.5, zorder=0, rasterized=len(d.x) > 5000)
-        axes.plot([], [], ".", color=_GREY, label="measured")
-        of = b.design.shape.mesh.section[b.design.shape.mesh.droppers[b.droppers, 0]]
+        dots, here = _shown(axes, x), _shown(axes, b.x)
+        axes.plot(
+            x[dots], mm * measured[dots], ".", color=_GREY, markersize=1.5, zorder=0, label="measured",
+            rasterized=len(x) > _MANY,
+        )  # fmt: skip
         for section in np.unique(of):
-            own = of == section
-            axes.plot(b.x[own], mm * found.before[own], color=_LONG, linewidth=1.0, label="" if section else "as built")
+            own = here & (of == section)
+            axes.plot(b.x[own], before[own], color=_LONG, linewidth=1.0, label="" if section else "as built")
             text = "" if section else "expected after changes"
-            axes.plot(b.x[own], mm * found.after[own], color=_WITHIN, linewidth=1.4, label=text)
-        bottom = np.full(len(b.x), limits[0] + 0.04 * (limits[1] - limits[0]))
+            axes.plot(b.x[own], after[own], color=_WITHIN, linewidth=1.4, label=text)
         for sign, marker, label in ((1.0, "v", "dropper to lengthen"), (-1.0, "^", "to shorten")):
-            chosen = sign * change > 0.0
-            axes.plot(b.x[chosen], bottom[chosen], marker, color="black", markersize=3.5, label=label)
+            chosen = here & (sign * change > 0.0)
+            axes.plot(b.x[chosen], np.full(chosen.sum(), bottom), marker, color="black", markersize=3.5, label=label)
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_ylim(*limits)
         axes.set_ylabel("height over\nthe design [mm]")
     _legend(panels[0])
     return figure
+
+
+def _shown(axes: Axes, x: FloatArray) -> BoolArray:
+    """Return which places a row of a figure shows, and a little beyond, so that lines reach its edges."""
+    low, high = axes.get_xlim()
+    return np.asarray((x > low - _BESIDE) & (x < high + _BESIDE))
 
 
 def _limits(before: FloatArray, after: FloatArray, measured: Sequence[FloatArray]) -> tuple[float, float]:

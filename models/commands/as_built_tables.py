@@ -103,9 +103,11 @@ def droppers_csv(found: AsBuiltOutcome) -> str:
     return text.getvalue()
 
 
-def worst_rows(found: AsBuiltOutcome) -> list[tuple[str, ...]]:
-    """Return the rows of droppers beyond the tolerance."""
-    return [row for row, beyond in zip(dropper_rows(found), found.is_beyond, strict=True) if beyond]
+def worst_rows(found: AsBuiltOutcome, most: int) -> list[tuple[str, ...]]:
+    """Return the rows of droppers beyond the tolerance along the track, of the worst so many if there are more."""
+    size = np.where(found.is_beyond, np.abs(found.built.error), 0.0)
+    least = np.sort(size)[-most] if len(size) > most else 0.0
+    return [row for row, error in zip(dropper_rows(found), size, strict=True) if error > 0.0 and error >= least]
 
 
 def _number(value: float, digits: int) -> str:

@@ -29,6 +29,8 @@ BUILT, CORRECTED, SURFACE, DROPPERS = "asbuilt.toml", "corrected.toml", "running
 FIGURES: Final = ("errors.png", "heights.png")
 #: What a tolerance or a step may be [mm]; less was written in metres.
 MILLIMETRES: Final = (0.1, 500.0)
+#: Droppers that are printed at most.
+_PRINTED: Final = 40
 PAGE: Final = "asbuilt.html"
 
 
@@ -47,15 +49,21 @@ def run(arguments: argparse.Namespace) -> int:
         found = judge_as_built(definition, measured, 1e-3 * arguments.tolerance, allowed, tell)
     doubtful = tuple(_doubts(found))
     warn(doubtful)
-    print_table(f"{arguments.line} as built", ("quantity", "value"), as_built_tables.summary(found))
-    if rows := as_built_tables.worst_rows(found):
-        columns, *lines = ([row[k] for k in as_built_tables.PRINTED] for row in (as_built_tables.COLUMNS, *rows))
-        print_table("Droppers beyond the tolerance", columns, lines)
     folder = new_folder(arguments.out)
     write(folder, found, design_path, measured.source)
     write_text(folder / PAGE, page(found, str(design_path), doubtful))
+    _print(arguments.line, found)
     print(f"page: {folder / PAGE}, with definitions, tables and figures beside it")
     return 0
+
+
+def _print(line: str, found: AsBuiltOutcome) -> None:
+    print_table(f"{line} as built", ("quantity", "value"), as_built_tables.summary(found))
+    if rows := as_built_tables.worst_rows(found, _PRINTED):
+        columns, *lines = ([row[k] for k in as_built_tables.PRINTED] for row in (as_built_tables.COLUMNS, *rows))
+        count = int(found.is_beyond.sum())
+        which = f", the worst {len(rows)} of {count} ({DROPPERS} has all)" if len(rows) < count else ""
+        print_table(f"Droppers beyond the tolerance{which}", columns, lines)
 
 
 def write(folder: Path, found: AsBuiltOutcome, design_path: Path, source: str) -> None:

@@ -15,7 +15,7 @@ from models.arrays import FloatArray
 from models.commands.cam_curves import write_cam
 from models.commands.force_over_speed import SPEEDS, print_over_speed, tabulated, write_over_speed
 from models.commands.physics_files import set_heading, show_no_noise, write_csv, write_figure
-from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
+from models.commands.physics_options import check_folder, new_folder, own_settings, print_table, warn
 from models.definition_files.parameter import ParameterError
 from models.library.catalogue import doubts, load_pantograph, pantograph_path
 from models.pantograph.lumped import lumped_rig as lumped
@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.out)
     definition = load_pantograph(arguments.pantograph)
     warn(doubts("pantographs", arguments.pantograph))
-    definition = definition.with_values(settings(arguments.set, "pantograph", definition))
+    definition = definition.with_values(own_settings(arguments.set, "pantograph", definition))
     try:
         result = (
             _multibody(definition, arguments)

@@ -17,8 +17,8 @@ from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import (
     check_folder,
     new_folder,
+    own_settings,
     print_table,
-    settings,
     shown_progress,
     warn,
 )
@@ -70,7 +70,7 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     """
     definition = load_line(arguments.line)
     warn(doubts("lines", arguments.line))
-    definition = definition.with_values(settings(arguments.set, "line", definition))
+    definition = definition.with_values(own_settings(arguments.set, "line", definition))
     if arguments.temperature:
         check_tensioned(definition)
     found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
@@ -179,6 +179,8 @@ def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
     z = contact.z[rest_profile.within(contact, result.span)]
     rows = [("contact wire, highest and lowest [m]", f"{z.max():.4f}, {z.min():.4f}")]
     d = result.span_droppers
+    if not len(d.length):
+        return rows
     rows.append(("dropper lengths, longest and shortest [m]", f"{d.length.max():.4f}, {d.length.min():.4f}"))
     rows.append(("dropper tensions, largest and smallest [N]", f"{d.force.max():.1f}, {d.force.min():.1f}"))
     return rows

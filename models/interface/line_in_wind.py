@@ -21,7 +21,7 @@ from models.catenary.statics.blow_off import BlowOff, blow_off
 from models.definition_files.parameter import ParameterError
 from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.line_statics import LineStatics, given
+from models.interface.line_statics import LineStatics, given, whole
 from models.interface.norm_judgement import Judgement, kept
 from models.library.norm_tables import lateral_norm
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 #: Strongest wind that is meant [m/s], [Pa].
 _FASTEST: Final = 100.0
 _HIGHEST: Final = 50e3
+#: Farthest from the middle of the track that a wire can be meant to be [m].
+_FARTHEST: Final = 2.0
 
 
 @dataclass(frozen=True)
@@ -210,14 +212,30 @@ def asked_limit(limit: float | str | None, head: int | str | None) -> tuple[floa
     return None if limit is None else given("limit", limit, "m"), None if head is None else str(head)
 
 
+def check_limit(limit: float) -> None:
+    """Refuse a permissible offset that is none [m].
+
+    Raises
+    ------
+    ParameterError
+    """
+    if limit > _FARTHEST:
+        raise ParameterError(
+            f"limit {limit:g} m: no wire may be as far from the middle of the track, {_FARTHEST:g} m at most; check "
+            "the unit"
+        )
+
+
 def in_the_wind(model: CatenaryModel, index: int, pressure: float, limit: float | None, head: str | None) -> LineInWind:
     """Return a section, counted from 0, of a line at rest in a wind of some pressure [Pa].
 
     Raises
     ------
     ParameterError
-        If a height is outside the range of the permissible deviations.
+        If the limit is none, or a height is outside the range of the permissible deviations.
     """
+    if limit is not None:
+        check_limit(limit)
     definition = model.definition
     section = definition.sections[index]
     start, end = np.array([s.start for s in section.spans]), np.array([s.end for s in section.spans])
@@ -235,6 +253,7 @@ def _section(line: LineStatics | Line | str | Path, number: int) -> tuple[Catena
     if isinstance(line, LineStatics):
         return line.model.definition, line.section
     definition = (line if isinstance(line, Line) else open_line(line)).definition
+    whole("section", number)
     if not 1 <= number <= len(definition.sections):
         raise ParameterError(f"section {number}: the line has sections 1 to {len(definition.sections)}")
     return definition, number - 1

@@ -20,7 +20,7 @@ from models.definition_files.parameter import ParameterError
 from models.definition_files.si_units import OFFSETS
 from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.line_statics import LineStatics, given
+from models.interface.line_statics import LineStatics, given, listed, whole
 from models.interface.norm_judgement import Judgement
 from models.interface.support_verdicts import clearance_at_temperatures
 from models.library.norm_tables import norm_sources, support_limits
@@ -136,10 +136,11 @@ def over_temperature(
         definition, index, fast = line.model.definition, line.section, line.waves.train_speed
     else:
         definition = (line if isinstance(line, Line) else open_line(line)).definition
+        whole("section", section)
         index, fast = section - 1, given("speed", speed, "m/s")
     if not 0 <= index < len(definition.sections):
         raise ParameterError(f"section {index + 1}: the line has sections 1 to {len(definition.sections)}")
-    asked = [_kelvin(value) for value in temperatures]
+    asked = [_kelvin(value) for value in listed("temperatures", temperatures, "['-20 degC', '15 degC']")]
     if not asked:
         raise ParameterError("temperatures: give at least one, '15 degC' say")
     return at_temperatures(definition, asked, index, fast)

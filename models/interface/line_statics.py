@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -31,6 +31,8 @@ from models.library.norm_tables import gradient_limits, support_limits
 
 if TYPE_CHECKING:
     import pandas
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -167,12 +169,17 @@ def statics(
     (0.43, 441)
     """
     found = line if isinstance(line, Line) else open_line(line)
+    whole("section", section)
+    if span is not None:
+        whole("span", span)
     values = {"speed": given("speed", speed, "m/s"), "force": given("force", force, "N")}
     return at_rest(found.definition, span, section, **values)
 
 
 #: Highest speed of a train that is meant in m/s: above it km/h were [m/s].
 FASTEST = 200.0
+#: Greatest force of an elasticity that is meant [N].
+_STRONGEST = 10e3
 
 
 def given(name: str, value: float | str, unit: str, fastest: float = FASTEST) -> float:
@@ -194,14 +201,42 @@ def given(name: str, value: float | str, unit: str, fastest: float = FASTEST) ->
     return found
 
 
+def whole(name: str, value: object) -> None:
+    """Refuse what is not a whole number where one was to be given from Python.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ParameterError(f"{name}: {value!r} is not a whole number")
+
+
+def listed(name: str, values: Iterable[_T], example: str) -> list[_T]:
+    """Return what was to be given as a list from Python.
+
+    Raises
+    ------
+    ParameterError
+        If it is a single value; `example` shows a list.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise ParameterError(f"{name}: {values!r} is not a list; write {example}")
+    return list(values)
+
+
 def at_rest(definition: CatenaryDefinition, span: int | None, section: int, speed: float, force: float) -> LineStatics:
     """Return the statics of a section and a span, both counted from 1, at a speed [m/s] and under a force [N].
 
     Raises
     ------
     ParameterError
-        If the line has no such section or span.
+        If the line has no such section or span, or speed or force are none of a train.
     """
+    if speed > FASTEST:
+        raise ParameterError(f"speed {3.6 * speed:g} km/h is faster than any train; check the unit")
+    if force > _STRONGEST:
+        raise ParameterError(f"force {force:g} N is more than any pantograph pushes with; check the unit")
     if not 1 <= section <= len(definition.sections):
         raise ParameterError(f"section {section}: the line has sections 1 to {len(definition.sections)}")
     index = section - 1

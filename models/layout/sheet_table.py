@@ -237,7 +237,12 @@ def _name_and_unit(cell: Cell) -> tuple[str, str]:
     match = _HEADING.fullmatch(cell) if isinstance(cell, str) else None
     if match is None:
         return (cell.casefold() if isinstance(cell, str) else ""), ""
-    return re.sub(r"[\s_-]+", "_", match[1].casefold()), (match[2] or "").translate(_SIGNS)
+    return _plain_name(match[1]), (match[2] or "").translate(_SIGNS)
+
+
+def _plain_name(text: str) -> str:
+    """Return a name in lower case, its words joined as declared ones are."""
+    return re.sub(r"[\s_-]+", "_", text.casefold())
 
 
 def _tell_nameless(
@@ -328,9 +333,10 @@ class _ColumnReader:
         choices = self.column.choices
         if not choices:
             return text
-        if text.casefold() not in choices:
+        name = _plain_name(text)
+        if name not in choices:
             raise ValueError(f"{shown_value(text)} is none of {', '.join(choices)}{hint(text, choices)}")
-        return text.casefold()
+        return name
 
     def _number(self, cell: Cell) -> float:
         """Return the number of a cell in SI, raise ``ValueError`` saying what is wrong with it."""

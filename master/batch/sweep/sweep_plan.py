@@ -20,6 +20,7 @@ from typing import Any, Final, Literal, Self, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
+from master.batch.sweep.seed_samples import seed_samples
 from master.batch.sweep.sensitivity import LEAST_BLOCKS, SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
 from master.errors import MasterError, RequestError, hint, said
@@ -205,9 +206,8 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     RequestError
         If something is asked for that there is not, or the parts do not go together.
     """
-    if bool(request.vary) != (request.samples is not None):
-        missing = "--samples N: how many" if request.vary else "--vary NAME=DISTRIBUTION: of what"
-        raise RequestError(f"samples need {missing}")
+    if request.vary and request.samples is None:
+        raise RequestError("samples need --samples N: how many")
     _check_sensitivity(request)
     table, names = (None, ()) if request.table is None else _read_table(system, request.table)
     if request.faults:
@@ -216,9 +216,11 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
         table, names = broken_in_turn(system)
     grid = [_listed(system, name, text) for name, text in request.over.items()]
     distributions = tuple(read_distribution(ParameterReader(system, n), text) for n, text in request.vary.items())
+    if request.samples is not None and not distributions:
+        grid.append(_Part(*seed_samples(system, request.samples, request.seed, {*request.over, *_names(table)})))
     sizes = [len(part.rows) for part in (table, *grid) if part is not None]
     each_sample = block_size(request.sensitivity, len(distributions)) if request.sensitivity else 1
-    if (count := math.prod(sizes) * (request.samples or 1) * each_sample) > MOST_RUNS:
+    if (count := math.prod(sizes) * (request.samples or 1 if distributions else 1) * each_sample) > MOST_RUNS:
         raise RequestError(f"that makes {count} runs, more than {MOST_RUNS}")
     parts = [part for part in (table, *grid) if part is not None]
     parts += [_sample(distributions, request)] if distributions else []
@@ -235,7 +237,8 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
 def _check_used(request: SweepRequest, parameters: Sequence[SweptParameter]) -> None:
     """Refuse what the runs would not heed, and values that they would not have."""
     given = request.model_fields_set
-    if not request.vary and ("method" in given or request.seed != SweepRequest.model_fields["seed"].default):
+    is_seeded = request.seed != SweepRequest.model_fields["seed"].default
+    if (not request.vary and "method" in given) or (request.samples is None and is_seeded):
         raise RequestError("--seed and --method are of samples: give --vary with --samples, or leave them out")
     if "tolerance" in given and request.mean_force is None:
         raise RequestError("--mean-tolerance is of --mean-force: give that too, or leave it out")
@@ -342,6 +345,10 @@ def broken_in_turn(system: System) -> tuple[_Part, tuple[str, ...]]:
     read = [_column(system, name, column) for (name, _), column in zip(found, cells, strict=True)]
     values = list(zip(*(column for _, column in read), strict=True))
     return _Part(tuple(p for p, _ in read), values), ("healthy", *(name for name, _ in found))
+
+
+def _names(part: _Part | None) -> list[str]:
+    return [] if part is None else [name for p in part.parameters for name in (p.targets or (p.name,))]
 
 
 def _read_lines(path: Path) -> list[tuple[int, list[str]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -23,10 +24,10 @@ AUTO: Final = "auto"
 
 
 def listed_stagger(own: Table | None, count: int) -> tuple[float, ...]:
-    """Return the stagger of all supports between the anchors, if the table [supports] gives it [m]."""
+    """Return the stagger of all supports between the anchors, if the table [supports] gives it [m]; NaN if wrongly."""
     if own is None or not own.has("stagger"):
         return ()
-    return _each(own, "stagger", count, "m", -1.0, 1.0)
+    return _each(own, "stagger", count, "m", -1.0, 1.0) or (math.nan,) * count
 
 
 def with_own_values(own: Table, supports: Sequence[Support], *, periodic: bool, has_arms: bool) -> tuple[Support, ...]:
@@ -105,8 +106,9 @@ def _is_empty_list(entry: Any) -> bool:
 def _sides(own: Table, count: int) -> tuple[float, ...]:
     if not own.has("arm_side"):
         return ()
-    if isinstance(own.data["arm_side"], str):
-        own.text("arm_side", choices=(AUTO,))
+    if isinstance(side := own.data["arm_side"], str):
+        if own.text("arm_side") != AUTO:
+            own.problem("arm_side", f"'{side}': a side is 1, to the left of the wire, or -1, or all of them 'auto'")
         return ()
     sides = _each(own, "arm_side", count, "1", -1.0, 1.0)
     if wrong := [side for side in sides if abs(side) != 1.0]:

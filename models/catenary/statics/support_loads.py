@@ -71,6 +71,8 @@ def support_loads(model: CatenaryModel, section: int = 0) -> SupportLoads:
 
 def _gradients(x: FloatArray, height: FloatArray, section: Section) -> FloatArray:
     """Return the gradient from every support to the next one; NaN where the wires rise to their anchors."""
+    if not len(x):
+        return x.copy()
     if section.periodic:
         return (np.roll(height, -1) - height) / np.diff(np.append(x, x[0] + section.period))
     first, last = section.ends.working

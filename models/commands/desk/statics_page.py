@@ -106,9 +106,15 @@ def conditions(definition: CatenaryDefinition, section: int) -> Iterator[tuple[s
     if definition.track is not None:
         yield "track", _track(definition, section)
     e = definition.irregularity
-    if e.dropper_length_sigma or e.support_height_sigma:
-        sigma = f"{1e3 * e.dropper_length_sigma:g} mm in droppers, {1e3 * e.support_height_sigma:g} mm in supports"
-        yield "errors of assembly", f"sigma {sigma}, seed {e.seed}"
+    sigmas = {
+        "dropper lengths": e.dropper_length_sigma,
+        "dropper places": e.dropper_position_sigma,
+        "support heights": e.support_height_sigma,
+        "stagger": e.stagger_sigma,
+    }
+    if any(sigmas.values()):
+        sigma = ", ".join(f"{name} {1e3 * value:g} mm" for name, value in sigmas.items() if value)
+        yield "errors of assembly, sigma", f"{sigma}; seed {e.seed}"
     if count := sum(fault.active for fault in definition.fault):
         yield "faults that act", str(count)
 
@@ -119,9 +125,8 @@ def _track(definition: CatenaryDefinition, section: int) -> str:
     along = track_at(track, np.linspace(spans[0].start, spans[-1].end, 2001))
     tightest = float(np.abs(along.curvature).max())
     cant = float(np.abs(np.sin(along.cant)).max() * track.base)
-    return f"smallest radius {1.0 / tightest:.0f} m, largest cant {1e3 * cant:.0f} mm" if tightest else (
-        f"straight, largest cant {1e3 * cant:.0f} mm"
-    )  # fmt: skip
+    course = f"smallest radius {1.0 / tightest:.0f} m" if tightest else "straight"
+    return f"{course}, largest cant {1e3 * cant:.0f} mm" if cant else f"{course}, without cant"
 
 
 def _figures(result: LineStatics) -> Part:

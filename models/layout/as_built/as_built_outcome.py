@@ -76,7 +76,9 @@ class AsBuiltOutcome:
         b = self.built
         for error, measured, slack, beyond in zip(b.error, b.is_measured, b.is_slack, self.is_beyond, strict=True):
             size = ("too long" if error > 0.0 else "too short") if beyond else "within"
-            yield "not measured" if not measured else f"slack, {size} at least" if slack else size
+            if slack:
+                size = "slack, too long" if beyond and error > 0.0 else "slack"
+            yield size if measured else "not measured"
 
 
 def judge_as_built(

@@ -18,7 +18,7 @@ from models.layout.as_built.measured_run import AsBuiltError
 from models.layout.as_built.wire_deviation import WireDeviation
 
 #: Standard errors from which on the course at an arm is more than noise.
-_SURE: Final = 3.0
+_SURE: Final = 4.0
 #: Farther from a measured height than this nothing is known [m].
 _GAP: Final = 5.0
 #: The largest height that a running surface has [m]; beyond it something else has moved.

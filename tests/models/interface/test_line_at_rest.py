@@ -8,6 +8,8 @@ import pytest
 from models import in_wind, over_temperature, span_table, statics
 from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.tensioning_definition import Tensioning, TensioningDevice
+from models.catenary.shape.form_finding import EquilibriumError
+from models.catenary.statics import temperature_table
 from models.definition_files.parameter import ParameterError
 from models.interface.line_and_pantograph import Line
 
@@ -76,6 +78,39 @@ def test_a_verdict_in_the_wind_counts_the_spans_beyond(rest):
     assert np.isnan(in_wind(rest, pressure=300.0).limit).all()
 
 
+def test_what_a_line_does_not_stand_is_told_with_its_temperature(line, monkeypatch):
+    def refuse(design):
+        raise EquilibriumError("line 'short': the arm at 50.00 m pushes")
+
+    monkeypatch.setattr(temperature_table, "find_condition", refuse)
+    with pytest.raises(EquilibriumError, match=r"^at -20 degC: line 'short': the arm at 50\.00 m pushes$"):
+        over_temperature(line, ["-20 degC", "40 degC"])
+
+
+def test_spans_have_the_tension_that_the_devices_leave(line):
+    tensioning = Tensioning(
+        temperature=288.15,
+        reference_temperature=288.15,
+        direction=1,
+        contact_wire=TensioningDevice(efficiency=0.9),
+        messenger_wire=TensioningDevice(kind="fixed"),
+    )
+    rubbed = span_table(Line(dataclasses.replace(line.definition, tensioning=tensioning)), limit=0.4)
+    assert span_table(line, limit=0.4).tension == line.definition.contact_wire.tension
+    assert rubbed.tension == pytest.approx(0.9 * line.definition.contact_wire.tension)
+
+
+@pytest.fixture(scope="module")
+def only_span(line_maker):
+    return Line(line_maker(spans=1, ends={"spans": 0, "rise": [0.1, "m", "test"]}))
+
+
+def test_a_line_of_one_span_has_no_supports_between_its_anchors(only_span):
+    titles, columns = statics(only_span).tables["supports"]
+    assert [len(column) for column in columns] == [0] * len(titles)
+    assert span_table(only_span, head=1600).staggers == ((0.0, 0.0),)
+
+
 @pytest.mark.parametrize(
     ("ask", "answer"),
     [
@@ -96,6 +131,18 @@ def test_a_verdict_in_the_wind_counts_the_spans_beyond(rest):
         (lambda line: span_table(line, speed=29.0), "how far may the wire be blown? give limit, in m, or head"),
         (lambda line: span_table(line, limit=0.4, radii=[0.0]), "radius: 0.0 must be greater than 0 m"),
         (lambda line: span_table(line, limit=0.4, staggers=[(0.2, "x")]), "stagger: 'x' is not a number"),
+        (lambda line: in_wind(line, limit=400), "limit 400 m: no wire may be as far from the middle of the track"),
+        (lambda line: in_wind(line, section="1"), "section: '1' is not a whole number"),
+        (lambda line: statics(line, span=1.5), "span: 1.5 is not a whole number"),
+        (lambda line: statics(line, force="20 kN"), "force 20000 N is more than any pantograph pushes with"),
+        (lambda line: over_temperature(line, ["15 degC"], section=1.5), "section: 1.5 is not a whole number"),
+        (lambda line: over_temperature(line, "15 degC"), "temperatures: '15 degC' is not a list"),
+        (lambda line: over_temperature(line, [None]), "temperature: None is neither a number nor a text"),
+        (lambda line: span_table(line, limit=400), "limit 400 m: no wire may be as far from the middle of the track"),
+        (lambda line: span_table(line, limit=0.4, radii=800), "radii: 800 is not a list; write [800, 1200]"),
+        (lambda line: span_table(line, limit=0.4, radii=[3]), "radius 3 m: no track is as tight; 15 m or more"),
+        (lambda line: span_table(line, limit=0.4, staggers=(0.2, 0.1)), "staggers: 0.2 is not a pair"),
+        (lambda line: span_table(line, limit=0.4, staggers=[(20, 20)]), "stagger 20 m is outside -1 ... 1 m"),
         (lambda line: in_wind(line).frame("winds"), "there is no table 'winds'; there are wind, plan, arms"),
     ],
 )

@@ -18,6 +18,7 @@ from models.catenary.shape.form_finding import EquilibriumError, weight
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_matrices import beam_properties
 from models.catenary.shape.line_mesh import build_mesh
+from models.catenary.shape.wire_intervals import attachments
 from models.catenary.statics.elasticity import elasticity
 from models.library.catalogue import load_line
 from tests.effort import some
@@ -361,3 +362,17 @@ def test_places_are_drawn_from_a_stream_of_their_own(short):
     lower = condition.shape.mesh.droppers[:, 0], design.shape.mesh.droppers[:, 0]
     found = condition.shape.mesh.points[lower[0], 0] - design.shape.mesh.points[lower[1], 0]
     assert found == pytest.approx(errors, abs=1e-9)
+    held = attachments(condition.shape.mesh)
+    (wire,) = condition.shape.mesh.contact_chains()
+    x, y = condition.shape.points[wire.nodes, :2].T
+    at = held[wire.nodes]
+    assert np.abs(y - np.interp(x, x[at], y[at])).max() < 1e-12, "straight in plan between its clamps"
+
+
+def test_a_hard_point_has_a_node_of_its_own_or_that_of_a_clamp_beside_it(short):
+    line, design = short
+    clamp = float(line.sections[0].spans[2].droppers[2])
+    for place, expected in ((127.77, 127.77), (clamp + 0.009, clamp)):
+        found = condition_of(design, with_fault(line, "hard_point", position=place, value=40.0)).shape.mesh
+        (heaviest,) = np.flatnonzero(found.clamp_mass > 30.0)
+        assert found.points[heaviest, 0] == pytest.approx(expected, abs=1e-9)

@@ -33,6 +33,10 @@ def test_a_radius_is_a_curvature():
         ({"positions": of("m", 9, 9), "cant": of("mm", 0, 100)}, "track.cant: jumps from 0 to 100 mm at 9 m"),
         ({"positions": of("m", 0), "cant": of("mm", 450)}, "track.cant: 0.45 m is outside"),
         ({"positions": of("m", 0), "cant": of("m", 0.29), "base": [0.4, "mi", "x"]}, "track.base: unknown unit"),
+        (
+            {"positions": of("m", 0), "radius": of("m", 600), "base": [1.0, "m", "x"]},
+            "track.base: 1 m says nothing where no cant is measured over it",
+        ),
         ({"positions": of("m", 0), "curvature": of("1/m", float("nan"))}, "track.curvature: "),
         ({"positions": of("m", 0), "bank": of("mm", 0)}, "track.bank: unknown key"),
         ({"positions": of("m", 0, 0.01), "cant": of("mm", 0, 100)}, "track.cant: goes from 0 to 100 mm within 0.01 m"),
@@ -64,7 +68,7 @@ def test_all_mistakes_are_said_at_once(line_maker):
         ({"encumbrance": of("m", 0.01)}, "supports.encumbrance: 0.01 m is outside"),
         ({"contact_wire_height": of("cm", 53)}, "supports.contact_wire_height: 0.53 m is outside"),
         ({"arm_side": of("1", 1, 1, 0.5, 1, 1)}, "supports.arm_side: 0.5: a side is 1"),
-        ({"arm_side": "left"}, "supports.arm_side: 'left' is none of auto"),
+        ({"arm_side": "left"}, "supports.arm_side: 'left': a side is 1, to the left"),
         ({"arm_length": [1.2, "m"]}, "supports.arm_length: "),
         ({"heights": of("m", 5.3)}, "supports.heights: unknown key"),
         ({"structure": ["1", 2]}, "supports.structure: ['1', 2] is not a list of texts"),
@@ -82,6 +86,13 @@ def test_mistakes_of_supports(line_maker, table, said):
 def test_supports_have_the_names_of_their_structures(line_maker, names):
     supports = line_maker(supports={"structure": names}).sections[0].supports
     assert [s.structure for s in supports] == (names if len(names) == 7 else ["", *names, ""])
+
+
+def test_a_wrong_stagger_of_supports_is_one_mistake(line_maker):
+    with pytest.raises(DefinitionError) as caught:
+        line_maker(stagger=None, supports={"stagger": of("m", 0.1, 0.2)})
+    assert str(caught.value).count("\n") == 0
+    assert "gives 2 values for 5 supports" in str(caught.value)
 
 
 def places_with(line_maker, anchor):

@@ -1,6 +1,7 @@
 """The page of ``statics``: whole, sealed, with all that was asked for, and nothing taken for markup that is not."""
 
 import csv
+import dataclasses
 import html
 import re
 import xml.etree.ElementTree as ET
@@ -8,6 +9,8 @@ from html.parser import HTMLParser
 
 import pytest
 
+from models.catenary.definition.condition_definition import Irregularity
+from models.commands.desk.statics_page import conditions
 from tests.models.commands.conftest import NASTY
 
 VOID = {"meta", "link", "br"}
@@ -98,3 +101,9 @@ def test_the_dropper_sheet_has_every_dropper_in_millimetres(page, statics_folder
     x, length, tension, _ = listed[7]
     assert cells == ["2", "3", f"{x:.2f}", f"{x - 50.0:.2f}", f"{1e3 * length:.0f}", f"{tension:.1f}"]
     assert "<thead>" in sheet
+
+
+def test_every_kind_of_error_of_assembly_is_a_condition(line_maker):
+    errors = Irregularity(seed=3, dropper_position_sigma=0.05, stagger_sigma=0.01)
+    found = dict(conditions(dataclasses.replace(line_maker(), irregularity=errors), 0))
+    assert found["errors of assembly, sigma"] == "dropper places 50 mm, stagger 10 mm; seed 3"

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from models.coupled.monolithic import CoupledModel
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError, Table
 from models.library.catalogue import load_pantograph
@@ -229,10 +228,3 @@ def test_it_is_raised_from_where_it_starts_and_rests_there_before(follow):
 def test_heights_that_do_not_fit_are_refused(values, told):
     with pytest.raises((DefinitionError, ParameterError), match=told):
         made(**values)
-
-
-def test_one_system_refuses_what_it_does_not_have(short_line):
-    from models.catenary.line_model import CatenaryModel
-
-    with pytest.raises(ParameterError, match="no stops and no friction"):
-        CoupledModel(CatenaryModel(short_line), [made(highest_height=5.3)])

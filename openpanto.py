@@ -161,6 +161,15 @@ VERBS: Final[Mapping[str, Verb]] = {
         _MODELS,
         ("spans LN2 --wind 29 --limit 0.4", "spans CA160 --pressure 961 --head 1950 --stagger 0.2 0.2 --out spans"),
     ),
+    "asbuilt": Verb(
+        "a line as it hangs, from a measuring run, and which droppers to correct",
+        "models.commands.physics_verbs:add_asbuilt",
+        _MODELS,
+        (
+            "asbuilt LN2 run.csv --out asbuilt",
+            "asbuilt demo/lines/demo_LN2.toml run.xlsx --out asbuilt --tolerance 8 --step 2 --only 20",
+        ),
+    ),
     "import": Verb(
         "make the definition of a line from its layout, tables as CSV or XLSX",
         "models.commands.physics_verbs:add_import",

@@ -64,6 +64,7 @@ def main() -> None:
     for name in (n for n in pantograph_names() if "multibody" in n):
         jobs[f"{name}, plain"] = steps(name, kernel="numpy")
         jobs[f"{name}, general form"] = steps(name, "general")
+        jobs[f"{name}, general form, plain"] = steps(name, "general", "numpy")
     jobs |= {f"{name} as FMU": fmu_steps(name) for name in pantograph_names() if name.endswith("multibody")}
     best = by_turns(jobs, rounds=5)
     rows = [

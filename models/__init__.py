@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from models.definition_files.toml_reader import DefinitionError
     from models.interface.coupled_run import CoupledRun, couple
     from models.interface.line_and_pantograph import Line, Pantograph, open_line, open_pantograph
+    from models.interface.line_as_built import LineAsBuilt, as_built
     from models.interface.line_in_wind import LineInWind, in_wind
     from models.interface.line_over_temperature import LineOverTemperature, over_temperature
     from models.interface.line_spans import SpanTable, span_table
@@ -21,6 +22,7 @@ __all__ = [
     "CoupledRun",
     "DefinitionError",
     "Line",
+    "LineAsBuilt",
     "LineInWind",
     "LineOverTemperature",
     "LineStatics",
@@ -29,6 +31,7 @@ __all__ = [
     "ParameterError",
     "SpanTable",
     "UnknownNameError",
+    "as_built",
     "couple",
     "in_wind",
     "line_names",
@@ -46,6 +49,7 @@ if not TYPE_CHECKING:  # a type checker shall notice a name that is not there
         "definition_files.toml_reader": ("DefinitionError",),
         "interface.coupled_run": ("CoupledRun", "couple"),
         "interface.line_and_pantograph": ("Line", "Pantograph", "open_line", "open_pantograph"),
+        "interface.line_as_built": ("LineAsBuilt", "as_built"),
         "interface.line_in_wind": ("LineInWind", "in_wind"),
         "interface.line_over_temperature": ("LineOverTemperature", "over_temperature"),
         "interface.line_spans": ("SpanTable", "span_table"),

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
+
+import pytest
 
 #: Set by `.ci/long`: tests marked `long` run, and counts are whole.
 IS_LONG: Final = os.environ.get("OPENPANTO_LONG") == "1"
@@ -28,6 +30,16 @@ def some(whole: Sequence[str], *sample: str) -> list[str]:
     """
     assert set(sample) <= set(whole)
     return [name for name in whole if IS_LONG or name in sample or _definition(name) not in ESTABLISHED]
+
+
+def rest(*values: object) -> list[Any]:
+    """Return further values of a parameter, each one or a tuple of several, that are tried in `.ci/long` alone.
+
+    What stands before them is the sample of every run.
+    """
+    return [
+        pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.long) for value in values
+    ]
 
 
 def _definition(name: str) -> str:

@@ -10,6 +10,7 @@ import pytest
 import openpanto
 from models.library.catalogue import line_names
 from models.library.search_path import LIBRARY
+from tests.effort import rest, some
 
 
 @pytest.fixture
@@ -27,13 +28,13 @@ def call(tmp_path, monkeypatch, capsys):
     return called
 
 
-@pytest.mark.parametrize("line", line_names())
+@pytest.mark.parametrize("line", some(line_names(), "EN50318_2002", "LN2_overlap", "LN2_ring", "Shinkansen"))
 def test_every_line_of_the_library_has_room_for_a_train(call, tmp_path, line):
     assert call(f"new demo --line {line} --pantograph CX --speed 200")[0] == 0
     assert (tmp_path / "demo" / "lines" / f"demo_{line}.toml").is_file()
 
 
-@pytest.mark.parametrize("pantograph", ["DSA380", "generic_multibody"])
+@pytest.mark.parametrize("pantograph", ["generic_multibody", *rest("DSA380")])
 def test_a_project_is_valid_as_it_is_written(call, tmp_path, pantograph):
     assert call(f"new demo --line EN50318_2002 --pantograph {pantograph} --speed 250") == (
         0,
@@ -119,7 +120,7 @@ def test_a_mistake_is_one_sentence_that_says_what_to_do(call, tmp_path, line, sa
 
 @pytest.mark.slow
 def test_an_edit_of_the_line_changes_the_figures_with_nothing_else_done_by_hand(call, tmp_path):
-    assert call("new demo --line LN2 --pantograph DSA380 --speed 250 --interval 250 320")[0] == 0
+    assert call("new demo --line LN2 --pantograph DSA380 --speed 250 --interval 150 200")[0] == 0
     code, out, err = call("run demo --out before --no-report")
     assert code == 0, err
     assert "building Catenary_demo_LN2.fmu\n" in err
@@ -127,7 +128,7 @@ def test_an_edit_of_the_line_changes_the_figures_with_nothing_else_done_by_hand(
     line = tmp_path / "demo" / "lines" / "demo_LN2.toml"
     text = line.read_text()
     assert "45.3, 45.5, 45.0, 45.0, 45.0" in text
-    line.write_text(text.replace("45.3, 45.5, 45.0, 45.0, 45.0", "45.3, 45.5, 45.0, 47.0, 43.0"))  # within the interval
+    line.write_text(text.replace("45.3, 45.5, 45.0, 45.0, 45.0", "45.3, 47.5, 43.0, 45.0, 45.0"))  # within the interval
     code, out, err = call("run demo --out after --no-report")
     assert code == 0, err
     assert "building Catenary_demo_LN2.fmu again: what it is made of has changed" in err

@@ -34,6 +34,7 @@ from master.fmu.isolation import isolated_instance
 from master.report import report_files
 from master.report.charts import run_charts
 from master.report.run_inputs import scheme_options
+from master.scenario import overrides
 from master.ssp.run_settings import OPTIONS, SCHEMES, Coupling
 from master.ssp.ssp_units import COMMON
 from models import contact_law
@@ -343,6 +344,7 @@ def test_the_choices_of_the_verbs_are_the_kinds_that_there_are():
     assert typing.get_args(distributions.Method) == verb_options.SAMPLINGS
     assert typing.get_args(sensitivity.SensitivityMethod) == verb_options.SENSITIVITIES
     assert physics_verbs.RESPONSES == identification.RESPONSE_KINDS
+    assert typing.get_args(overrides.FaultsOf) == verb_options.FAULTS_OF
     assert typing.get_args(filters.Kind) == physics_verbs.FILTERS
     assert fmus_main._MAX_PORTS == recipe.MAX_PORTS
 

@@ -57,7 +57,9 @@ class Key:
     given : dict
         What the reader said of it: unit, range, default, choices.
     kinds : set of str
-        Of joints and forces: the kinds that have the key.
+        Of joints, forces and faults: the kinds that have the key.
+    others : list of dict
+        What the reader said of it in tables of other kinds, where that differs.
     read_from : set of str
         The tables, of all files, that it was read from.
     defaults : list
@@ -69,6 +71,7 @@ class Key:
     method: str
     given: dict[str, Any]
     kinds: set[str] = field(default_factory=set)
+    others: list[dict[str, Any]] = field(default_factory=list)
     read_from: set[str] = field(default_factory=set)
     defaults: list[Any] = field(default_factory=list)
 
@@ -182,8 +185,7 @@ def _listening(found: Reference) -> Iterator[None]:
 
 def _note(found: Reference, root: Table, path: str, method: str, given: dict[str, Any]) -> None:
     where, _, name = path.rpartition(".")
-    section, _, element = where.partition(".")
-    kind = str(root.data[section][element].get("kind", "")) if section in ("joint", "force") and element else ""
+    kind = _kind(root, where)
     place = f"{root.file}: {_outside_sections(where)}"
     found.tables.setdefault(generic(where), {})[place] = kind
     table, _, name = generic(path).rpartition(".")
@@ -191,9 +193,19 @@ def _note(found: Reference, root: Table, path: str, method: str, given: dict[str
     if method == "required_table":
         key.method = method
     key.kinds |= {kind} - {""}
+    if where.startswith("fault[") and given not in (key.given, *key.others):
+        key.others.append(given)
     key.read_from.add(place)
     if given.get("default") not in key.defaults:
         key.defaults.append(given.get("default"))
+
+
+def _kind(root: Table, where: str) -> str:
+    """Return the kind of the joint, the force or the fault whose table stands at a path, else nothing."""
+    if match := re.fullmatch(r"fault\[(\d+)\]", where):
+        return str(root.data["fault"][int(match[1]) - 1].get("kind", ""))
+    section, _, element = where.partition(".")
+    return str(root.data[section][element].get("kind", "")) if section in ("joint", "force") and element else ""
 
 
 def _declared(definition: Any) -> Iterator[tuple[str, str]]:
@@ -293,25 +305,31 @@ def _cell(text: str) -> str:
 
 
 def _unit(key: Key) -> str:
-    unit = key.given.get("unit", "")
-    if not unit:
-        return ""
+    units = dict.fromkeys(given.get("unit", "") for given in (key.given, *key.others))
+    return "; ".join(_one_unit(unit) for unit in units if unit)
+
+
+def _one_unit(unit: str) -> str:
     others = [name for name, (si, _) in SI.items() if si == unit and name != unit]
     return f"`{unit}`" + (f" ({', '.join(f'`{o}`' for o in others)})" if others else "")
 
 
 def _range(key: Key) -> str:
-    low, high = key.given.get("minimum", -math.inf), key.given.get("maximum", math.inf)
-    if key.method == "integer" and "minimum" not in key.given:
+    return "; ".join(dict.fromkeys(filter(None, (_one_range(key, given) for given in (key.given, *key.others)))))
+
+
+def _one_range(key: Key, given: dict[str, Any]) -> str:
+    low, high = given.get("minimum", -math.inf), given.get("maximum", math.inf)
+    if key.method == "integer" and "minimum" not in given:
         low = 0
     parts = []
-    if key.given.get("positive") and not low > 0.0:
+    if given.get("positive") and not low > 0.0:
         parts.append("above 0")
     elif math.isfinite(low):
         parts.append(f"from {low:g}")
     if math.isfinite(high):
         parts.append(f"to {high:g}")
-    length = key.given.get("length")
+    length = given.get("length")
     count = f"{length} values" if length == 3 else ""  # of others it is that of another list
     return ", ".join(filter(None, [" ".join(parts), count]))
 

@@ -229,6 +229,8 @@ def _describe(wanted: Recipe, sources: FmuSources, script: str, resources: Mappi
             path.write_bytes(data)
         with _importable(folder, (sources.package, script)):
             slave = _instance(wanted, script, folder)
+            if wanted.is_own and (problem := slave.design_problem()):
+                raise BuildError(f"{wanted.definition}: {problem}")
             return {
                 DESCRIPTION_XML: _description(slave.to_xml()),
                 "documentation/index.html": _page(wanted, sources, slave),

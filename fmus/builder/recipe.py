@@ -143,7 +143,7 @@ def recipe(
     name : str
         ``Catenary_LINE``, ``Catenary_LINE_P2`` for two pantograph ports, ``Pantograph_NAME``, or the path of a
         definition: ``path/to/LINE.toml``. A line's name with ``_F14`` or ``_F14F15`` lists an inactive fault for
-        every dropper of these spans (of the first section, from 1).
+        every dropper of these spans (of the first section, from 1), with ``_A14`` for the arms at both ends of it.
     pantographs : int, optional
         Number of pantograph ports of a line; the name gets the suffix ``_Pn``.
     folders : sequence of Path, optional
@@ -160,14 +160,12 @@ def recipe(
     """
     if name.lower().endswith(".toml"):
         return _own_recipe(Path(name), pantographs or 1)
-    plain, spans = split_faults(name, [*folders, LIBRARY])
+    plain, mark = split_faults(name, [*folders, LIBRARY])
     found = _sound_recipe(plain, pantographs, folders, built_from)
-    if not spans:
+    if not mark:
         return found
     try:
-        return replace(
-            found, name=f"{found.name}_F{'F'.join(map(str, spans))}", added=fault_tables(found.definition, spans)
-        )
+        return replace(found, name=f"{found.name}_{mark}", added=fault_tables(found.definition, mark))
     except ValueError as error:
         raise BuildError(str(error)) from error
 

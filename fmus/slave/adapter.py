@@ -126,6 +126,13 @@ class Adapter(Fmi2Slave, ABC, Generic[DefinitionT, PartT]):  # type: ignore[misc
     def _make_part(self, definition: DefinitionT) -> PartT:
         """Return a part, not built yet."""
 
+    def design_problem(self) -> str:
+        """Return what is wrong with the definition that no reader sees, as far as it is soon found; empty if nothing.
+
+        It is asked for when an FMU is built.
+        """
+        return ""
+
     @abstractmethod
     def _make_ports(self, part: PartT) -> Ports:
         """Name the part's arrays; ``part`` is not built."""

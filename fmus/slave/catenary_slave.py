@@ -54,7 +54,7 @@ class CatenarySlave(Adapter[CatenaryDefinition, CatenaryPart]):
         "The contact is unilateral, without friction along the strip. A running surface is the same over the wire's "
         "width, and what it takes from the train's traction is in no output.",
         "Errors of assembly and faults are there from the start of a run; uplift "
-        "counts from where they have left the line, not from the design.",
+        "counts from where they have left the line, not from the design. No wire breaks.",
         "On a curved or canted track x is the length of the track's axis, y and z lie in the rail plane. Curves act as "
         "loads on the wires at rest: offsets between supports are wrong by about (L/2R)^2/6 of themselves, lengths by "
         "y/R; no crossing of two tracks, no inertia of the curve along the track, radii of 150 m and more.",

@@ -10,6 +10,8 @@ from fmus.slave.adapter import Adapter
 from fmus.slave.lumped_slave import DRIVE_SIGNALS, SWAY_SIGNALS, TRAIN_SIGNALS, pantograph_ports
 from fmus.slave.ports import Ports, Signal
 from models.arrays import FloatArray
+from models.pantograph.multibody.analysis.posture import check_heights
+from models.pantograph.multibody.mechanism import MechanismError
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_reading import load_mechanism
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
@@ -44,6 +46,10 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
     def _make_part(self, definition: MechanismDefinition) -> MultibodyPantographPart:
         return MultibodyPantographPart(definition)
 
+    def design_problem(self) -> str:
+        """Return why it cannot stand where its heights say, empty if it can."""
+        return check_heights(self._definition)
+
     def _make_ports(self, part: MultibodyPantographPart) -> Ports:
         unit = "N.m" if part.definition.lifts_by_moment else "N"
         text = "what the lifting element gives, in place of all else, if lift_input is 1"
@@ -62,7 +68,11 @@ class MultibodyPantographSlave(Adapter[MechanismDefinition, MultibodyPantographP
         return part.told
 
     def _initialise(self, part: MultibodyPantographPart, time: float, inputs: FloatArray) -> None:
-        part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], _drive(inputs))
+        try:
+            part.initialise(time, float(inputs[0]), inputs[1:4], inputs[4:6], _drive(inputs))
+        except MechanismError as error:
+            file = type(self).__name__.removeprefix("Pantograph_")
+            raise MechanismError(f"{error} (see {file}.toml, or the values that were set of its parameters)") from error
 
     def _advance(self, part: MultibodyPantographPart, inputs: FloatArray, step: float) -> None:
         part.step(float(inputs[0]), inputs[1:4], inputs[4:6], step, _drive(inputs))

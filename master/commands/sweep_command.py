@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from master.batch.sweep.engine_selection import engine_of
-from master.batch.sweep.sweep_plan import SweepRequest, check_overridden, stored_request
+from master.batch.sweep.sweep_plan import SweepRequest, check_overridden, listed_faults, stored_request
 from master.batch.sweep.sweep_session import (
     CSV,
     JSON,
@@ -33,7 +33,12 @@ def sweep_verb(options: argparse.Namespace) -> int:
     console = Terminal(stderr=True)
     note: Callable[[str], None] = (lambda _: None) if options.quiet else partial(say, console=console)
     request = _request(options)
-    overrides = replace(overrides_of(options), may_stop_early=options.stop is not None, faults=request.faults)
+    overrides = replace(
+        overrides_of(options),
+        may_stop_early=options.stop is not None,
+        faults=request.faults,
+        faults_of=request.faults_of,
+    )
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedSweep.of(scenario.system, request)
         check_overridden(prepared.outcome.plan, (*overrides.parameters, *(["step"] if overrides.step else [])))
@@ -61,7 +66,7 @@ def _request(options: argparse.Namespace) -> SweepRequest:
         "method": options.method,
         "sensitivity": options.sensitivity,
         "table": options.from_csv,
-        "faults": options.faults,
+        **listed_faults(options.faults, options.span),
         "stop": options.stop,
         "static_force": options.static_force,
         "mean_force": options.mean_force,

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+from master.errors import hint
 from master.ssp.ssp_units import number_advice
 
 #: What can be chosen; tests/test_registries.py.
@@ -23,6 +24,7 @@ KEPT: Final = ("all", "thinned", "figures", "failed")
 ENGINES: Final = ("fmu", "lanes")
 SAMPLINGS: Final = ("lhs", "sobol")
 SENSITIVITIES: Final = ("sobol", "morris")
+FAULTS_OF: Final = ("each-dropper", "each-arm")
 
 
 def add_run(verbs: Any) -> None:
@@ -226,8 +228,9 @@ def _add_values(parser: argparse.ArgumentParser) -> None:
     text = "which parameters matter: blocks of runs for Sobol indices, or Morris' trajectories; --samples says how many"
     parser.add_argument("--sensitivity", choices=SENSITIVITIES, help=text)
     parser.add_argument("--from-csv", type=Path, metavar="FILE", help="a row for each run, a column for each parameter")
-    text = "break each dropper of these spans of the line in turn, e.g. 14 or 14,15; the first run has none broken"
-    parser.add_argument("--faults", type=spans, metavar="SPAN,..", default=(), help=text)
+    text = "each dropper of --span breaks in turn, or each steady arm at its ends comes off; the first run has no fault"
+    parser.add_argument("--faults", type=_faults, metavar="each-dropper|each-arm", default=(), help=text)
+    parser.add_argument("--span", type=spans, metavar="K,..", default=(), help="span of the line from 1, or several")
     parser.add_argument("--static-force", metavar="'F0 N + c v^2'", help="static force over the speed v in km/h")
     parser.add_argument("--mean-force", metavar="'F0 N + c v^2'", help="mean force that the static force is found for")
     parser.add_argument("--mean-tolerance", type=positive_number, metavar="N", help="how near is enough; default 0.2")
@@ -353,6 +356,13 @@ def finite_number(text: str) -> float:
     if not math.isfinite(value) or "_" in text or not text.isascii():
         raise argparse.ArgumentTypeError(f"'{text}' is not a finite number{number_advice(text)}")
     return value
+
+
+def _faults(text: str) -> str | tuple[int, ...]:
+    """Return of what there are faults; a list of spans alone is that of their droppers."""
+    if text in FAULTS_OF or text[:1].isdigit():
+        return text if text in FAULTS_OF else spans(text)
+    raise argparse.ArgumentTypeError(f"'{text}' is none of {', '.join(FAULTS_OF)}{hint(text, FAULTS_OF)}")
 
 
 def spans(text: str) -> tuple[int, ...]:

@@ -98,10 +98,11 @@ class WallClockPacer:
         self._rows: FloatArray = np.full((grid.count - grid.first, 3), np.nan)
         self._count = 0
         self._start = self._began = 0.0
-        self._had_collector = False
+        self._had_collector = self._had_frozen = False
 
     def begin(self, time: float, network: Network) -> None:
         """Set the clock: the first step begins now."""
+        self._had_frozen = gc.get_freeze_count() > 0
         gc.collect()
         gc.freeze()
         self._had_collector = gc.isenabled()
@@ -118,10 +119,11 @@ class WallClockPacer:
         self._wait(deadline)
 
     def finish(self) -> None:
-        """Turn the garbage collector on again."""
+        """Turn the garbage collector on again, for all objects unless the process keeps some from it itself."""
         if self._had_collector:
             gc.enable()
-        gc.unfreeze()
+        if not self._had_frozen:
+            gc.unfreeze()
 
     @property
     def punctuality(self) -> Punctuality | None:

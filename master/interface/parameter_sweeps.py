@@ -11,7 +11,7 @@ from master.batch.sweep.distributions import Method
 from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sensitivity import SensitivityMethod
 from master.batch.sweep.sensitivity_table import sensitivity_heads, sensitivity_rows
-from master.batch.sweep.sweep_plan import Engine, Keep, SweepRequest
+from master.batch.sweep.sweep_plan import Engine, Keep, SweepRequest, listed_faults
 from master.batch.sweep.sweep_session import PAGE, PreparedSweep, SweepOutcome
 from master.batch.sweep.sweep_session import sweep as run_sweep
 from master.batch.sweep.sweep_table import typed_columns
@@ -95,7 +95,8 @@ def sweep(
     method: Method | None = None,
     sensitivity: SensitivityMethod | None = None,
     table: str | Path | None = None,
-    faults: Sequence[int] = (),
+    faults: str | Sequence[int] = (),
+    span: int | Sequence[int] = (),
     static_force: str | None = None,
     mean_force: str | None = None,
     mean_tolerance: float | None = None,
@@ -125,8 +126,11 @@ def sweep(
         ``sobol`` or ``morris``: as many blocks of runs as ``samples`` says, for indices of what matters.
     table : str or Path, optional
         CSV file with a row for each run.
-    faults : sequence of int
-        Spans of the line whose droppers break one after the other; the first run has none broken.
+    faults : str or sequence of int
+        ``each-dropper`` or ``each-arm``: droppers of ``span`` that break one after the other, or arms at its ends that
+        come off; the first run has no fault. Spans alone are those of droppers.
+    span : int or sequence of int
+        Spans of the line, from 1.
     static_force, mean_force : str, optional
         Static force over the speed, ``70 N + 0.00097 v^2`` with v in km/h; or the mean force that it is found for.
     mean_tolerance : float, optional
@@ -157,7 +161,7 @@ def sweep(
     given = {
         "sensitivity": sensitivity,
         "table": table,
-        "faults": (faults,) if isinstance(faults, int) else tuple(faults),
+        **listed_faults(faults, span),
         "static_force": static_force,
         "mean_force": mean_force,
         "keep": keep,
@@ -166,7 +170,7 @@ def sweep(
     }
     request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
     tell = teller(progress)
-    overrides = replace(chosen.overrides, faults=request.faults)
+    overrides = replace(chosen.overrides, faults=request.faults, faults_of=request.faults_of)
     with scenario_files.open_scenario(chosen.path, overrides) as opened:
         folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name
         keep_apart(folder, opened.package)

@@ -22,6 +22,7 @@ from master.report.result_tables import figure_rows
 from master.report.run_inputs import differing_inputs, quality_rows
 from master.report.run_names import short_names
 from master.report.run_page import status_note
+from master.report.run_title import run_title
 from master.results.kept_definitions import differing_definitions
 from master.results.run_difference import setting_notes
 from master.results.run_results import Results
@@ -126,7 +127,7 @@ def comparison_page(runs: Sequence[Results]) -> str:
 
 def _note(name: str, run: Results) -> str:
     """Return what a run is, and a warning if it is not complete."""
-    scenario, title = run.summary.get("scenario", ""), run.summary.get("title", "")
+    scenario, title = run.summary.get("scenario", ""), run_title(run)
     what = f"{name}: {title}, scenario {scenario}" if title else f"{name}: scenario {scenario}"
     return f"<p class='note'>{html_markup.text(what)}</p>{status_note(run.summary)}"
 

@@ -20,6 +20,7 @@ from master.report.moving_picture import Movie, make_movie
 from master.report.result_tables import FILTER_HEADS, calibration_line, figure_rows, filter_rows, uplift_line
 from master.report.run_inputs import Input, inputs_of, provenance_rows, quality_rows
 from master.report.run_names import coupled_models, short_names
+from master.report.run_title import run_title
 from master.results.run_results import Results
 
 _CONTENTS: Final = (
@@ -64,7 +65,7 @@ def page(done: Results, measured: MeasuredComparison | None = None) -> str:
         _computed(summary),
     ]
     contents = "".join(f"<a href='#{k}'>{t}</a>" for k, t in _CONTENTS if any(f"id='{k}'" in part for part in body))
-    title = f"{summary.get('scenario', '')}: {summary.get('title') or _subject(is_coupling)}"
+    title = f"{summary.get('scenario', '')}: {run_title(done) or _subject(is_coupling)}"
     title += "".join(f", {key} = {value}" for key, value in (summary.get("changes") or {}).items())
     return html_markup.document(title, [f"<nav>{contents}</nav>", *body], [*charts, *extra], movie)
 
@@ -82,7 +83,7 @@ def _outputs(done: Results, charts: list[Chart]) -> list[str]:
 def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool = True) -> str:
     summary, limits = done.summary, done.evaluation.limits
     key, names = "verdict" if is_coupling else "run", short_names(summary)
-    parts = [f"<section id='{key}'>{_title(summary, is_coupling)}", status_note(summary)]
+    parts = [f"<section id='{key}'>{_title(done, is_coupling)}", status_note(summary)]
     parts.append(_warnings(summary))
     parts += [html_markup.verdict(a, names[a.contact.pantograph], limits) for a in assessments]
     if reason := summary.get("not_judged", ""):
@@ -92,10 +93,11 @@ def _head(done: Results, assessments: tuple[Assessment, ...], is_coupling: bool 
     return "".join([*parts, "</section>"])
 
 
-def _title(summary: dict[str, Any], is_coupling: bool) -> str:
+def _title(done: Results, is_coupling: bool) -> str:
     """Return what the scenario says that it is, with the names of line and pantographs."""
+    summary = done.summary
     name = str(summary.get("scenario", ""))
-    head = summary.get("title") or f"{name}: {_subject(is_coupling)}"
+    head = run_title(done) or f"{name}: {_subject(is_coupling)}"
     parts = [f"scenario {name}"] if summary.get("title") else []
     parts += [f"{component}: {model}" for component, model in coupled_models(summary)]
     if changes := summary.get("changes"):  # the title is the scenario's, which does not know of them

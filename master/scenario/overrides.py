@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 from master.errors import Problem, RequestError, hint
 from master.scenario.start_values import out_of_range, settable
@@ -15,6 +16,9 @@ from master.ssp.ssp_units import COMMON, conversion, number_advice, split_quanti
 from master.system.components import Component, Fmu, Variable
 from master.system.step_rounding import MEASURED
 from master.system.variable_names import ENERGY_INTERVAL, ENERGY_MONITOR, ENERGY_VARIABLES, matcher
+
+#: Of what a line FMU of ours lists faults.
+FaultsOf = Literal["each-dropper", "each-arm"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ class Overrides:
         Whether the stop time may lie before the end of the interval of interest.
     faults : tuple of int
         Spans for whose droppers a line FMU of ours lists a fault each, none of them active.
+    faults_of : str
+        ``each-dropper``, or ``each-arm``: the steady arms at both ends of these spans instead.
     """
 
     stop: float | None = None
@@ -59,6 +65,7 @@ class Overrides:
     empty: tuple[str, ...] = ()
     may_stop_early: bool = False
     faults: tuple[int, ...] = ()
+    faults_of: FaultsOf = "each-dropper"
 
     def source(self, written: str) -> str:
         """Return the source of a component, which is another for a line FMU of ours that lists faults.
@@ -71,7 +78,8 @@ class Overrides:
         folder, separator, name = written.rpartition("/")
         if not self.faults or not (name.startswith("Catenary_") and name.endswith(".fmu")):
             return written
-        return f"{folder}{separator}{name.removesuffix('.fmu')}_F{'F'.join(map(str, self.faults))}.fmu"
+        letter = {"each-dropper": "F", "each-arm": "A"}[self.faults_of]
+        return f"{folder}{separator}{name.removesuffix('.fmu')}_{''.join(f'{letter}{n}' for n in self.faults)}.fmu"
 
 
 def effective_settings(

@@ -1,4 +1,4 @@
-"""Inputs that a parameter switches on: connected in vain, or switched on with nothing connected.
+"""Inputs that a parameter switches on: connected in vain, with nothing connected, or beside what they replace.
 
 An FMU cannot tell: it does not know what its inputs are connected to.
 """
@@ -20,6 +20,8 @@ class _Switch(NamedTuple):
     without: str
 
 
+#: Parameter in whose place these say how a pantograph moves.
+_SPEED: Final = "speed"
 _SWITCHES: Final = (
     _Switch(USE_TRAIN, "train.x", "it stands still"),
     _Switch(USE_TRAIN, "train.vx", "it has no speed between communication points"),
@@ -42,3 +44,6 @@ def doubts(system: System) -> Iterator[str]:
             elif is_on and switch.without and not is_connected and switch.input not in component.parameters:
                 set_to = f"{component.name}.{switch.parameter} = 1"
                 yield f"{set_to}, but nothing is connected to {switch.input}: {switch.without}"
+        if is_switched_on(component, USE_TRAIN) and _SPEED in component.parameters:
+            instead = "the inputs train.x and train.vx say where it is"
+            yield f"{component.name}.{_SPEED} is set, but does nothing while {USE_TRAIN} is 1: {instead}"

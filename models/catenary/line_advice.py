@@ -12,6 +12,8 @@ from typing import Final, Protocol
 import numpy as np
 
 from models.arrays import BoolArray, FloatArray
+from models.catenary.condition.faults import active_of
+from models.catenary.definition.fault_definition import HardPoint
 from models.catenary.definition.line_definition import CatenaryDefinition, Contact
 from models.catenary.statics.wire_waves import OPERATION_LIMIT, contact_wire_wave_speed
 
@@ -169,9 +171,15 @@ def surface_warning(definition: CatenaryDefinition, speed: float, step: float) -
         Longest step of the line [s].
     """
     surface, shortest = definition.running_surface, _STEPS_PER_WAVE * abs(speed) * step
-    if surface is None or shortest == 0.0:
+    bumps = (p.length for p in active_of(definition, HardPoint) if p.height and p.length)
+    bump = min(bumps, default=math.inf)
+    if shortest == 0.0:
         return ""
-    if surface.sigma and surface.to is not None and surface.to * shortest > 1.0:
+    if bump < shortest:
+        what = f"a hard point has a bump of {bump:.3g} m"
+    elif surface is None:
+        return ""
+    elif surface.sigma and surface.to is not None and surface.to * shortest > 1.0:
         what = f"the running surface has waves down to {1.0 / surface.to:.3g} m"
     elif surface.points and short_waves(np.array(surface.points), shortest) > _SHORT_SHARE:
         what = f"the running surface of {surface.profile} has waves"

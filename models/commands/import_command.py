@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out
     design = None if arguments.design is None else line_path(arguments.design)
     name = _name(out, design)
-    imported = import_layout(arguments.layout, name, design)
+    imported = import_layout(arguments.layout, name, design, out)
     warn([*(doubts("lines", arguments.design) if design is not None else ()), *imported.notes])
     write_text(out, imported.text)
     print(_summary(imported.definition))

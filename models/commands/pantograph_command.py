@@ -15,13 +15,14 @@ from models.arrays import FloatArray
 from models.commands.cam_curves import write_cam
 from models.commands.force_over_speed import SPEEDS, print_over_speed, tabulated, write_over_speed
 from models.commands.physics_files import set_heading, show_no_noise, write_csv, write_figure
-from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
+from models.commands.physics_options import check_folder, new_folder, own_settings, print_table, warn
 from models.definition_files.parameter import ParameterError
-from models.library.catalogue import doubts, load_pantograph
+from models.library.catalogue import doubts, load_pantograph, pantograph_path
 from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_advice import idle_values
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.analysis.mechanism_rig import CamCurves, Dynamics, Rig
+from models.pantograph.multibody.mechanism import MechanismError
 from models.pantograph.multibody.mechanism_advice import inertia_warning
 from models.pantograph.multibody.mechanism_definition import JointFriction, MechanismDefinition
 from models.pantograph.multibody.reduced.reduced_motion import reduced_if_possible
@@ -84,12 +85,16 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.out)
     definition = load_pantograph(arguments.pantograph)
     warn(doubts("pantographs", arguments.pantograph))
-    definition = definition.with_values(settings(arguments.set, "pantograph", definition))
-    result = (
-        _multibody(definition, arguments)
-        if isinstance(definition, MechanismDefinition)
-        else _lumped(definition, arguments)
-    )
+    definition = definition.with_values(own_settings(arguments.set, "pantograph", definition))
+    try:
+        result = (
+            _multibody(definition, arguments)
+            if isinstance(definition, MechanismDefinition)
+            else _lumped(definition, arguments)
+        )
+    except MechanismError as error:
+        text = str(error).removeprefix(f"{definition.name}: ")
+        raise MechanismError(f"{pantograph_path(arguments.pantograph)}: {text}") from error
     print_table(
         f"{arguments.pantograph}: {result.title}",
         result.static_columns,

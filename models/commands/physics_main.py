@@ -10,6 +10,7 @@ from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
 from models.commands.physics_options import show_log
 from models.commands.physics_verbs import (
+    add_asbuilt,
     add_couple,
     add_export,
     add_identify,
@@ -32,6 +33,7 @@ _VERBS = (
     add_spans,
     add_import,
     add_export,
+    add_asbuilt,
     add_pantograph,
     add_identify,
     add_lanes,

@@ -57,6 +57,19 @@ def settings(given: Iterable[Setting], part: str, definition: Definition) -> dic
     return {s.parameter: _value(s, units.get(s.parameter)) for s in own}
 
 
+def own_settings(given: Sequence[Setting], part: str, definition: Definition) -> dict[str, float]:
+    """Return the ``--set`` values of the only part that a verb has [SI].
+
+    Raises
+    ------
+    ParameterError
+        As `settings`, and if a value is of another part.
+    """
+    for other in (s for s in given if s.part != part):
+        raise ParameterError(f"--set {other.part}.{other.parameter}={other.value}: there is no {other.part} here")
+    return settings(given, part, definition)
+
+
 def _value(setting: Setting, wanted: str | None) -> float:
     try:
         return in_si(setting.value, wanted)  # the definition reports an unknown parameter

@@ -62,6 +62,33 @@ def add_spans(verbs: Any) -> None:
     parser.set_defaults(run=_later("spans_command"))
 
 
+def add_asbuilt(verbs: Any) -> None:
+    """Declare ``asbuilt``."""
+    parser = verbs.add_parser("asbuilt", help="a line as it hangs, from a measuring run, and which droppers to correct")
+    parser.add_argument("line", metavar="design", help="the line as designed: name in the library, or definition file")
+    parser.add_argument(
+        "measured", type=Path, help="CSV or XLSX file: position, height, and stagger, thickness, structure if measured"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder for definitions, page, tables and figures")
+    parser.add_argument(
+        "--tolerance", type=positive, default=10.0, metavar="MM", help="of dropper lengths [mm] (default 10)"
+    )
+    parser.add_argument(
+        "--step", type=positive, default=5.0, metavar="MM", help="changes are multiples of it [mm] (default 5)"
+    )
+    text = "change the N most useful droppers alone"
+    parser.add_argument("--only", type=_number_of, default=None, metavar="N", help=text)
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.set_defaults(run=_later("asbuilt_command"))
+
+
+def _number_of(text: str) -> int:
+    """Read a whole number greater than 0 from the command line."""
+    if not (text.isascii() and text.isdigit() and 0 < int(text) <= 10**6):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number, 1 or more")
+    return int(text)
+
+
 def add_wind(parser: argparse.ArgumentParser) -> None:
     """Declare what wind is meant, and how far the wire may be blown by it."""
     strength = parser.add_mutually_exclusive_group()

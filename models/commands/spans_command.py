@@ -9,7 +9,7 @@ from models.catenary.definition.line_definition import CatenaryDefinition
 from models.commands import spans_report
 from models.commands.desk import spans_page
 from models.commands.physics_files import write_csv, write_figure, write_text
-from models.commands.physics_options import check_folder, new_folder, print_table, settings, warn
+from models.commands.physics_options import check_folder, new_folder, own_settings, print_table, warn
 from models.definition_files.parameter import ParameterError
 from models.interface.line_spans import SpanTable, straight_limit, tabulated
 from models.library.catalogue import doubts, line_path, load_line
@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.out)
     definition = load_line(arguments.line)
     warn(doubts("lines", arguments.line))
-    definition = definition.with_values(settings(arguments.set, "line", definition))
+    definition = definition.with_values(own_settings(arguments.set, "line", definition))
     found = tabulated(
         definition,
         arguments.wind,
@@ -30,6 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
         [tuple(pair) for pair in arguments.stagger],
         ("--wind", "--pressure"),
     )
+    warn(spans_report.warnings(definition))
     text = spans_report.heading(found)
     rows = spans_report.rows(found.lengths, found.smallest_radius, 0)
     print_table(f"Smallest radius [m]: {text}", ("span [m]", *found.names), rows)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from models.catenary.statics import rest_profile
+from models.catenary.statics.temperature_table import check_tensioned
 from models.commands import route_plots, statics_plots, temperature_report, wind_report
 from models.commands.desk import statics_page
 from models.commands.desk.statics_page import Found
@@ -16,8 +17,8 @@ from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import (
     check_folder,
     new_folder,
+    own_settings,
     print_table,
-    settings,
     shown_progress,
     warn,
 )
@@ -65,11 +66,13 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     Raises
     ------
     ParameterError
-        If the line has no such section or span.
+        If the line has no such section or span, or none of the tensioning that temperatures ask for.
     """
     definition = load_line(arguments.line)
     warn(doubts("lines", arguments.line))
-    definition = definition.with_values(settings(arguments.set, "line", definition))
+    definition = definition.with_values(own_settings(arguments.set, "line", definition))
+    if arguments.temperature:
+        check_tensioned(definition)
     found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
     warn(found.warnings)
     return found
@@ -176,6 +179,8 @@ def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
     z = contact.z[rest_profile.within(contact, result.span)]
     rows = [("contact wire, highest and lowest [m]", f"{z.max():.4f}, {z.min():.4f}")]
     d = result.span_droppers
+    if not len(d.length):
+        return rows
     rows.append(("dropper lengths, longest and shortest [m]", f"{d.length.max():.4f}, {d.length.min():.4f}"))
     rows.append(("dropper tensions, largest and smallest [N]", f"{d.force.max():.1f}, {d.force.min():.1f}"))
     return rows

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from models.catenary.definition.line_definition import Span
+from models.catenary.definition.section_definition import Span
 from models.catenary.statics.elasticity import Elasticity
 from models.catenary.statics.rest_profile import Droppers, Profile, within
 

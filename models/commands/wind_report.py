@@ -51,9 +51,10 @@ def summary(wind: LineInWind) -> list[tuple[str, str]]:
 
 
 def write(folder: Path, wind: LineInWind) -> None:
-    """Write ``wind.csv`` and the plan view ``wind.png``."""
-    titles, columns = wind.tables["wind"]
-    write_csv(folder / "wind.csv", titles, columns)
+    """Write ``wind.csv``, ``wind_arms.csv`` and the plan view ``wind.png``."""
+    for name, table in (("wind", "wind"), ("wind_arms", "arms")):
+        titles, columns = wind.tables[table]
+        write_csv(folder / f"{name}.csv", titles, columns)
     write_figure(folder / "wind.png", plan(wind), 150)
 
 

@@ -444,7 +444,8 @@ def find_slack(contacts, slack, work):
 @part
 def take_over(now, before, contacts, wires, motion, work):
     """Take the droppers of ``work.found`` for the slack ones, with the forces of those that were so before."""
-    work.change[:before] = work.lacking[:before]
+    for i in range(before):
+        work.change[i] = work.lacking[i]
     for k in range(now):
         work.lacking[k] = 0.0
         for i in range(before):
@@ -690,5 +691,7 @@ def stand(lane, strips, law, droppers, wires, memory, motion, work, outputs):
         publish(lane, p, strips[p], wires, memory, motion, work, outputs[p])
     for q in of_lane(lane, memory):
         memory.force[q] = 0.0
-    motion.known[:, lane] = 2.0 * droppers[3]
+    at_rest = droppers[3]
+    for i in range(at_rest.size):
+        motion.known[i, lane] = 2.0 * at_rest[i]
     know(lane, droppers, wires, memory, motion)

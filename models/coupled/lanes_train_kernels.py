@@ -79,7 +79,8 @@ def start(trains, lane, time, contact):
             load = trains.motion[lane, p, 2, i] + trains.air[lane, p, i]
             trains.motion[lane, p, 2, i] = load / trains.mass[lane, p, i]
         place_strip(trains, lane, p, 0.0)
-        received[: VZ + 1] = trains.strip[lane, p]
+        for i in range(VZ + 1):
+            received[i] = trains.strip[lane, p, i]
         received[AZ], received[TIME] = 0.0, time
         forces[:] = 0.0
         forces[0], forces[3], forces[KNOWN] = time, contact[p], 1.0
@@ -96,7 +97,8 @@ def receive(trains, active, times, step, order):
             speed, before = strip[VX], held[VZ]
             expected = held[X] + speed * (time - held[TIME])
             valid = time + lead_of(strip[X], expected, speed, step)
-            held[: VZ + 1] = strip
+            for i in range(VZ + 1):
+                held[i] = strip[i]
             if order >= 2 and valid > held[TIME] + _SAME_TIME:
                 held[AZ] = (strip[VZ] - before) / (valid - held[TIME])
             held[TIME] = valid

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -16,10 +17,13 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.line_state import ContactResult, StripMotion
 from models.catenary.statics.nominal_height import NominalHeight
 from models.contact_law import application_point
-from models.definition_files.parameter import ParameterError
+from models.coupled.held_coupling import HeldCoupling
 from models.pantograph.lumped.held_forces import held_forces
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.lumped.lumped_model import LumpedModel, LumpedState
+
+#: Ways for stops and friction to be that are tried in a step.
+_TRIALS: Final = 12
 
 
 @dataclass(frozen=True)
@@ -70,20 +74,20 @@ class CoupledModel:
     Raises
     ------
     ParameterError
-        If the speed of one is not constant, or it has stops or friction, which one linear system cannot hold.
+        If the speed of one is not constant.
     """
 
     def __init__(self, line: CatenaryModel, pantographs: Sequence[LumpedDefinition]) -> None:
         for pantograph in pantographs:
             pantograph.refuse_varying_speed("this run")
         self.line = line
-        for definition in pantographs:
-            _check(definition)
         self.pantographs = [LumpedModel(p) for p in pantographs]
         self.line_state = line.initial_state(len(self.pantographs))
         self.states: list[LumpedState] = [
             p.initial_state(p.load(0.0, np.zeros(2)) + _air(p.definition)) for p in self.pantographs
         ]
+        pairs = zip(self.pantographs, self.states, strict=True)
+        self._held = [HeldCoupling(p, s) if len(held_forces(p.definition)) else None for p, s in pairs]
         self._nominal = NominalHeight(line.definition)
         self.time = 0.0
 
@@ -101,16 +105,44 @@ class CoupledModel:
         rates = [self._reference_rate(i) for i in range(len(self.states))]
         each = zip(self.pantographs, self.states, loads, rates, strict=True)
         free = [p.free_response(s, step, load, rate) for p, s, load, rate in each]
-        motion = StripMotion(
-            np.array([self._strip(i, end, d[-1], self._speed(i, step, d)) for i, d in enumerate(free)]),
-            np.array([p.compliance(step)[-1] for p in self.pantographs]),
-        )
-        result = self.line.step(self.line_state, step, motion)
-        force = result.force.sum(axis=1)
+        held = [(i, h) for i, h in enumerate(self._held) if h is not None]
+        for i, own in held:
+            own.begin(self.states[i], step, free[i])
+        before = self.line_state.snapshot() if held else {}
+        for trial in range(_TRIALS if held else 1):
+            if trial:
+                self.line_state.restore(before)
+            moved = self._responses(step, free)
+            motion = StripMotion(
+                np.array([self._strip(i, end, d[-1], self._speed(i, step, d)) for i, (d, _) in enumerate(moved)]),
+                np.array([c[-1] for _, c in moved]),
+            )
+            result = self.line.step(self.line_state, step, motion)
+            force = result.force.sum(axis=1)
+            as_supposed = [own.holds(float(force[i])) for i, own in held]  # each is asked
+            if all(as_supposed):
+                break
+            if trial == _TRIALS - 2:  # two ways to be that call for each other: the last one, and as it is found in it
+                for _, own in held:
+                    own.fix()
         for i, (model, state) in enumerate(zip(self.pantographs, self.states, strict=True)):
-            model.advance(state, step, free[i] - force[i] * model.compliance(step), rates[i])
+            end_place = moved[i][0] - force[i] * moved[i][1]
+            if (kept := self._held[i]) is not None:
+                kept.end(end_place)
+            model.advance(state, step, end_place, rates[i])
         self.time = end
         return result.force, _points(result, motion.strip)
+
+    def _responses(self, step: float, free: list[FloatArray]) -> list[tuple[FloatArray, FloatArray]]:
+        """Return for every pantograph where its masses go without contact force, and how they yield to one."""
+        found = []
+        for model, held, place in zip(self.pantographs, self._held, free, strict=True):
+            compliance = model.compliance(step)
+            if held is not None:
+                own, per_force = held.response()
+                place, compliance = place - own, compliance + per_force
+            found.append((place, compliance))
+        return found
 
     @property
     def strips(self) -> FloatArray:
@@ -178,14 +210,6 @@ class CoupledModel:
             uplift=np.zeros((rows, len(line.uplift_places))),
             dropper_force=np.zeros((rows, len(line.dropper_law.stiffness))),
             dropper_slack=np.zeros((rows, len(line.dropper_law.stiffness)), dtype=np.bool_),
-        )
-
-
-def _check(definition: LumpedDefinition) -> None:
-    if len(held_forces(definition)):
-        raise ParameterError(
-            f"{definition.name}: line and pantograph as one system have no stops and no friction (lowest_height, "
-            "highest_height, stage friction); leave these out, or run a scenario"
         )
 
 

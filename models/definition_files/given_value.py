@@ -81,6 +81,8 @@ def quantity(name: str, value: float | str, wanted: str) -> float:
         found = in_si(value, wanted)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
+    except TypeError as error:
+        raise TypeError(f"{name}: {value!r} is neither a number nor a text") from error
     if not math.isfinite(found):
         raise ValueError(f"{name}: {value} is not a finite number")
     return found

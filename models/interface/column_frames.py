@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from models.arrays import BoolArray, FloatArray
+from models.definition_files.parameter import ParameterError
 
 if TYPE_CHECKING:
     import pandas
+
+
+#: A table: titles with units, and columns.
+Table = tuple[tuple[str, ...], tuple[FloatArray | BoolArray, ...]]
+
+
+def table_frame(tables: Mapping[str, Table], name: str, is_indexed: bool = False) -> pandas.DataFrame:
+    """Return one of some tables; its first column may be the index.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such table.
+    ImportError
+        If pandas is not installed.
+    """
+    if name not in tables:
+        raise ParameterError(f"there is no table '{name}'; there are {', '.join(tables)}")
+    return column_frame(*tables[name], is_indexed)
 
 
 def column_frame(

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Span
 from models.definition_files.given_value import in_si
 from models.definition_files.parameter import Definition, Parameter, ParameterError
 from models.library import catalogue

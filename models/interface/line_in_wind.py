@@ -19,9 +19,9 @@ from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.shape.track import track_at
 from models.catenary.statics.blow_off import BlowOff, blow_off
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.line_statics import LineStatics, Table, given
+from models.interface.line_statics import LineStatics, given, whole
 from models.interface.norm_judgement import Judgement, kept
 from models.library.norm_tables import lateral_norm
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 #: Strongest wind that is meant [m/s], [Pa].
 _FASTEST: Final = 100.0
 _HIGHEST: Final = 50e3
+#: Farthest from the middle of the track that a wire can be meant to be [m].
+_FARTHEST: Final = 2.0
 
 
 @dataclass(frozen=True)
@@ -116,9 +118,7 @@ class LineInWind:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name])
+        return table_frame(self.tables, name)
 
 
 def in_wind(
@@ -158,14 +158,15 @@ def in_wind(
     >>> round(blown.pressure, 1), blown.judgements[0].word
     (250.0, 'keeps')
     """
-    model, index = _section(line, section)
+    definition, index = _section(line, section)
+    own, chosen = asked_limit(limit, head)
     _, force = asked_wind(
-        model.definition,
+        definition,
         None if speed is None else given("speed", speed, "m/s", fastest=math.inf),
         None if pressure is None else given("pressure", pressure, "Pa"),
         ("speed", "pressure"),
     )
-    own, chosen = asked_limit(limit, head)
+    model = line.model if isinstance(line, LineStatics) else CatenaryModel(definition)
     return in_the_wind(model, index, force, own, chosen)
 
 
@@ -211,14 +212,30 @@ def asked_limit(limit: float | str | None, head: int | str | None) -> tuple[floa
     return None if limit is None else given("limit", limit, "m"), None if head is None else str(head)
 
 
+def check_limit(limit: float) -> None:
+    """Refuse a permissible offset that is none [m].
+
+    Raises
+    ------
+    ParameterError
+    """
+    if limit > _FARTHEST:
+        raise ParameterError(
+            f"limit {limit:g} m: no wire may be as far from the middle of the track, {_FARTHEST:g} m at most; check "
+            "the unit"
+        )
+
+
 def in_the_wind(model: CatenaryModel, index: int, pressure: float, limit: float | None, head: str | None) -> LineInWind:
     """Return a section, counted from 0, of a line at rest in a wind of some pressure [Pa].
 
     Raises
     ------
     ParameterError
-        If a height is outside the range of the permissible deviations.
+        If the limit is none, or a height is outside the range of the permissible deviations.
     """
+    if limit is not None:
+        check_limit(limit)
     definition = model.definition
     section = definition.sections[index]
     start, end = np.array([s.start for s in section.spans]), np.array([s.end for s in section.spans])
@@ -231,13 +248,15 @@ def in_the_wind(model: CatenaryModel, index: int, pressure: float, limit: float 
     return LineInWind(pressure, blow_off(model, pressure, index), start, end, limits, works, source)
 
 
-def _section(line: LineStatics | Line | str | Path, number: int) -> tuple[CatenaryModel, int]:
+def _section(line: LineStatics | Line | str | Path, number: int) -> tuple[CatenaryDefinition, int]:
+    """Return the definition of a line and the index of a section of it, from 0."""
     if isinstance(line, LineStatics):
-        return line.model, line.section
+        return line.model.definition, line.section
     definition = (line if isinstance(line, Line) else open_line(line)).definition
+    whole("section", number)
     if not 1 <= number <= len(definition.sections):
         raise ParameterError(f"section {number}: the line has sections 1 to {len(definition.sections)}")
-    return CatenaryModel(definition), number - 1
+    return definition, number - 1
 
 
 def _limit(

@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Span
 from models.catenary.definition.tensioning_definition import COLDEST, HOTTEST
 from models.catenary.statics.temperature_table import LineAtTemperature, ruling, temperature_table
 from models.catenary.statics.wire_waves import OPERATION_LIMIT
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.definition_files.si_units import OFFSETS
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.line_statics import LineStatics, Table, given
+from models.interface.line_statics import LineStatics, given, listed, whole
 from models.interface.norm_judgement import Judgement
 from models.interface.support_verdicts import clearance_at_temperatures
 from models.library.norm_tables import norm_sources, support_limits
@@ -94,9 +95,7 @@ class LineOverTemperature:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name])
+        return table_frame(self.tables, name)
 
 
 def over_temperature(
@@ -137,10 +136,11 @@ def over_temperature(
         definition, index, fast = line.model.definition, line.section, line.waves.train_speed
     else:
         definition = (line if isinstance(line, Line) else open_line(line)).definition
+        whole("section", section)
         index, fast = section - 1, given("speed", speed, "m/s")
     if not 0 <= index < len(definition.sections):
         raise ParameterError(f"section {index + 1}: the line has sections 1 to {len(definition.sections)}")
-    asked = [_kelvin(value) for value in temperatures]
+    asked = [_kelvin(value) for value in listed("temperatures", temperatures, "['-20 degC', '15 degC']")]
     if not asked:
         raise ParameterError("temperatures: give at least one, '15 degC' say")
     return at_temperatures(definition, asked, index, fast)

@@ -11,16 +11,19 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from models.arrays import FloatArray
+from models.catenary.condition.tensioning import wire_tensions
 from models.catenary.definition.line_definition import CatenaryDefinition
-from models.catenary.shape.line_mesh import contact_wire_height
+from models.catenary.definition.track_definition import TIGHTEST_RADIUS
+from models.catenary.shape.kept_form import kept_form
+from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
 from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.statics.span_table import LENGTHS, String, radii
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
-from models.interface.line_in_wind import asked_limit, asked_wind
-from models.interface.line_statics import Table, given
+from models.interface.line_in_wind import asked_limit, asked_wind, check_limit
+from models.interface.line_statics import given, listed
 from models.library.norm_tables import lateral_norm
 
 if TYPE_CHECKING:
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
 
 #: Radii for which the largest span is given unless others are asked for; infinite: straight track [m].
 RADII: Final = (200.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1000.0, 1500.0, 2000.0, 3000.0, 5000.0, math.inf)
+#: Largest stagger [m], as in definitions.
+_WIDEST: Final = 1.0
 #: Staggers at both ends of a span, positive to the outside of the curve [m].
 Staggers = tuple[float, float]
 
@@ -86,9 +91,7 @@ class SpanTable:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name], is_indexed=True)
+        return table_frame(self.tables, name, is_indexed=True)
 
 
 def span_table(
@@ -139,8 +142,8 @@ def span_table(
         None if speed is None else given("speed", speed, "m/s", fastest=math.inf),
         None if pressure is None else given("pressure", pressure, "Pa"),
         own if own is not None else straight_limit(definition, str(chosen)),
-        [given("radius", R, "m") for R in radii],
-        [(_stagger(a), _stagger(b)) for a, b in staggers],
+        [given("radius", R, "m") for R in listed("radii", radii, "[800, 1200]")],
+        [_pair(pair) for pair in listed("staggers", staggers, "[(0.2, -0.2)]")],
         ("speed", "pressure"),
     )
 
@@ -154,9 +157,17 @@ def tabulated(
     staggers: Sequence[Staggers],
     names: tuple[str, str],
 ) -> SpanTable:
-    """Return the tables of a line, all in SI; `names` are what speed and pressure are called."""
+    """Return the tables of a line, all in SI; `names` are what speed and pressure are called.
+
+    Raises
+    ------
+    ParameterError
+        If wind, limit, a radius or a stagger cannot be meant.
+    """
+    check_limit(limit)
+    _check(wanted, staggers)
     wind, found = asked_wind(definition, speed, pressure, names)
-    string = String(definition.contact_wire.tension, wind.force(definition.contact_wire.width, found))
+    string = String(_tension(definition), wind.force(definition.contact_wire.width, found))
     pairs, asked = tuple(staggers or _own_staggers(definition)), tuple(wanted or RADII)
     return SpanTable(
         pressure=found,
@@ -179,7 +190,8 @@ def straight_limit(definition: CatenaryDefinition, head: str) -> float:
     ParameterError
         If the height is outside the range of the permissible deviations.
     """
-    return lateral_norm().permissible(head, max(_heights(definition)), 0.0, 0.0).permissible
+    height = max(_heights(definition), default=definition.profile.contact_wire_height)
+    return lateral_norm().permissible(head, height, 0.0, 0.0).permissible
 
 
 def _heights(definition: CatenaryDefinition) -> Iterator[float]:
@@ -192,8 +204,32 @@ def _heights(definition: CatenaryDefinition) -> Iterator[float]:
 
 def _own_staggers(definition: CatenaryDefinition) -> list[Staggers]:
     """Return the line's largest stagger, alternating and not [m]."""
-    largest = max(abs(s.stagger) for section in definition.sections for s in section.inner_supports)
-    return [(largest, -largest), (largest, largest)]
+    largest = max((abs(s.stagger) for section in definition.sections for s in section.inner_supports), default=0.0)
+    return [(largest, -largest), (largest, largest)] if largest else [(0.0, 0.0)]
+
+
+def _tension(definition: CatenaryDefinition) -> float:
+    """Return the tension of the contact wire, at another temperature than the design's the least that it has [N]."""
+    if definition.tensioning is None or definition.tensioning.is_design:
+        return definition.contact_wire.tension
+    wires = wire_tensions(kept_form(definition, build_mesh(definition)))
+    return min(float(w.tension.min()) for w in wires if w.component == "contact_wire")
+
+
+def _check(radii: Sequence[float], staggers: Sequence[Staggers]) -> None:
+    """Refuse radii that no track has, and staggers beyond those that a definition may have."""
+    for R in radii:
+        if R < TIGHTEST_RADIUS:
+            raise ParameterError(f"radius {R:g} m: no track is as tight; {TIGHTEST_RADIUS:g} m or more")
+    for b in (b for pair in staggers for b in pair):
+        if abs(b) > _WIDEST:
+            raise ParameterError(f"stagger {b:g} m is outside -{_WIDEST:g} ... {_WIDEST:g} m: check its unit")
+
+
+def _pair(pair: Sequence[float | str]) -> Staggers:
+    if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+        raise ParameterError(f"staggers: {pair!r} is not a pair, of both ends of a span; write [(0.2, -0.2)]")
+    return _stagger(pair[0]), _stagger(pair[1])
 
 
 def _stagger(value: float | str) -> float:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from models.arrays import BoolArray, FloatArray
+from models.arrays import FloatArray
 from models.catenary import line_advice
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.overbridge_definition import Overbridge
+from models.catenary.definition.section_definition import Span
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics import elasticity as under_force
@@ -22,7 +23,7 @@ from models.catenary.statics.overbridge_room import OverbridgeRoom, overbridge_r
 from models.catenary.statics.support_loads import SupportLoads, support_loads
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import column_frame
+from models.interface.column_frames import Table, table_frame
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.norm_judgement import Judgement
 from models.interface.support_verdicts import overbridge_verdicts, support_verdicts
@@ -31,8 +32,7 @@ from models.library.norm_tables import gradient_limits, support_limits
 if TYPE_CHECKING:
     import pandas
 
-#: A table: titles with units, and columns.
-Table = tuple[tuple[str, ...], tuple[FloatArray | BoolArray, ...]]
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,7 @@ class LineStatics:
         ParameterError
             If there is no such table.
         """
-        if name not in self.tables:
-            raise ParameterError(f"there is no table '{name}'; there are {', '.join(self.tables)}")
-        return column_frame(*self.tables[name])
+        return table_frame(self.tables, name)
 
 
 def statics(
@@ -171,12 +169,17 @@ def statics(
     (0.43, 441)
     """
     found = line if isinstance(line, Line) else open_line(line)
+    whole("section", section)
+    if span is not None:
+        whole("span", span)
     values = {"speed": given("speed", speed, "m/s"), "force": given("force", force, "N")}
     return at_rest(found.definition, span, section, **values)
 
 
 #: Highest speed of a train that is meant in m/s: above it km/h were [m/s].
 FASTEST = 200.0
+#: Greatest force of an elasticity that is meant [N].
+_STRONGEST = 10e3
 
 
 def given(name: str, value: float | str, unit: str, fastest: float = FASTEST) -> float:
@@ -198,14 +201,42 @@ def given(name: str, value: float | str, unit: str, fastest: float = FASTEST) ->
     return found
 
 
+def whole(name: str, value: object) -> None:
+    """Refuse what is not a whole number where one was to be given from Python.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ParameterError(f"{name}: {value!r} is not a whole number")
+
+
+def listed(name: str, values: Iterable[_T], example: str) -> list[_T]:
+    """Return what was to be given as a list from Python.
+
+    Raises
+    ------
+    ParameterError
+        If it is a single value; `example` shows a list.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise ParameterError(f"{name}: {values!r} is not a list; write {example}")
+    return list(values)
+
+
 def at_rest(definition: CatenaryDefinition, span: int | None, section: int, speed: float, force: float) -> LineStatics:
     """Return the statics of a section and a span, both counted from 1, at a speed [m/s] and under a force [N].
 
     Raises
     ------
     ParameterError
-        If the line has no such section or span.
+        If the line has no such section or span, or speed or force are none of a train.
     """
+    if speed > FASTEST:
+        raise ParameterError(f"speed {3.6 * speed:g} km/h is faster than any train; check the unit")
+    if force > _STRONGEST:
+        raise ParameterError(f"force {force:g} N is more than any pantograph pushes with; check the unit")
     if not 1 <= section <= len(definition.sections):
         raise ParameterError(f"section {section}: the line has sections 1 to {len(definition.sections)}")
     index = section - 1

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from models.layout.sheet_problems import Place, SheetProblems
 
 #: Largest file that is read [bytes]: ten measuring runs of a whole section, every centimetre.
 LARGEST_FILE: Final = 200_000_000
+#: Text that begins as formulas do, but is no number.
+_FORMULA: Final = re.compile(r"'*(?![+-]?[\d.])[=+\-@\t\r]")
 _UTF16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 #: How files begin that are tables, but not as text.
 _OTHERS: Final = {
@@ -65,7 +68,7 @@ def read_csv(path: Path, name: str, problems: SheetProblems) -> SheetGrid | None
     rows, start = [], 1
     try:
         for cells in reader:
-            stripped = tuple(cell.strip() for cell in cells)
+            stripped = tuple(plain_text(cell.strip()) for cell in cells)
             if any(stripped) and not stripped[0].lower().startswith("sep="):
                 rows.append((start, stripped))
             start = reader.line_num + 1
@@ -74,6 +77,22 @@ def read_csv(path: Path, name: str, problems: SheetProblems) -> SheetGrid | None
         problems.add(Place(name, start), text)
         return None
     return SheetGrid(name, tuple(rows))
+
+
+def safe_text(text: str) -> str:
+    """Return text for a cell that no spreadsheet takes for a formula; ``plain_text`` undoes it.
+
+    Examples
+    --------
+    >>> safe_text("=1+1"), safe_text("-0.5 2"), safe_text("mast 3"), plain_text(safe_text("'=1"))
+    ("'=1+1", '-0.5 2', 'mast 3', "'=1")
+    """
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
+def plain_text(cell: str) -> str:
+    """Return the text that ``safe_text`` was given."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 def is_comment(cells: tuple[Cell, ...]) -> bool:

@@ -13,7 +13,8 @@ from typing import Any, Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, Support
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Support
 from models.catenary.definition.track_definition import Track
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.track import track_at

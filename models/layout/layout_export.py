@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any, Final
 
 from models.catenary.definition import line_reading
-from models.catenary.definition.line_definition import CatenaryDefinition, Section, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section, Span
 from models.catenary.definition.section_reading import SECTION_TABLES
 from models.catenary.shape.form_finding import StaticState
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.shape.support_places import SupportPlaces
 from models.definition_files.toml_reader import Table
+from models.layout.csv_sheets import safe_text
 from models.layout.definition_draft import flattened
 from models.layout.layout_import import WIRE_COLUMNS
 from models.layout.layout_sheets import ANCHOR, DROPPER, HANGER, SEAM, SUPPORT, UNREGISTERED
@@ -79,11 +81,13 @@ def csv_text(rows: Rows) -> str:
 
 
 def _shown(cell: str | float) -> str:
-    return cell if isinstance(cell, str) else f"{cell:.12g}"
+    return safe_text(cell) if isinstance(cell, str) else f"{cell:.12g}"
 
 
 def _notes(path: Path, data: Mapping[str, Any]) -> Iterator[str]:
     """Yield what of a line its layout does not say."""
+    if (surface := data.get("running_surface", {}).get("profile")) is not None:
+        yield f"{path}: {surface} is named in the layout and no part of it: copy it to where the definition will lie"
     for table in data.get("section", [data]):
         if "measured" in table:
             yield f"{path}: [measured] is not in the layout: the droppers have the lengths that its heights give"

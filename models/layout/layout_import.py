@@ -8,12 +8,12 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_type_hints
 
 import numpy as np
 
 from models.catenary.definition import line_reading
-from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_definition import CatenaryDefinition, LineType
 from models.catenary.definition.section_reading import SECTION_TABLES
 from models.definition_files.given_value import WITH_UNIT
 from models.definition_files.toml_reader import DefinitionError, Problem, Table
@@ -42,6 +42,11 @@ _UNITS: Final = {
 }  # fmt: skip
 #: Without which there is no line.
 _NEEDED: Final = ("contact_wire", "messenger_wire", "dropper")
+#: Tables of a definition, of which a key names a value, and those that have tables in them.
+_TABLES: Final = {
+    k for k, hint in get_type_hints(CatenaryDefinition).items() if hint not in (str, int, float, LineType)
+}
+_NESTED: Final = ("damping", "tensioning", "wind")
 _TRACK: Final = {"curvature": "1/m", "radius": "m", "cant": "m", "vertical_curvature": "1/m"}
 #: Tables of a definition in which something lacks where a sheet is wrong.
 _CONSEQUENT: Final = (*SECTION_TABLES, "section", "profile", "track", *WIRE_COLUMNS)
@@ -59,7 +64,7 @@ class ImportedLine:
     notes: tuple[str, ...]
 
 
-def import_layout(path: Path, name: str, design: Path | None = None) -> ImportedLine:
+def import_layout(path: Path, name: str, design: Path | None = None, out: Path | None = None) -> ImportedLine:
     """Return the line that a layout describes.
 
     Parameters
@@ -70,6 +75,8 @@ def import_layout(path: Path, name: str, design: Path | None = None) -> Imported
         Of the line.
     design : Path, optional
         Definition file of the line that gives what the layout does not.
+    out : Path, optional
+        Where the definition will lie; files that it names lie beside it.
 
     Raises
     ------
@@ -82,7 +89,7 @@ def import_layout(path: Path, name: str, design: Path | None = None) -> Imported
     maker = _Maker(layout, behind, problems)
     maker.fill(name)
     text = toml_text(maker.draft.data, f"Imported from {layout.name} by openpanto import.")
-    definition = maker.read(text)
+    definition = maker.read(text, out or Path(name))
     problems.finish()
     assert definition is not None
     return ImportedLine(definition, text, (*layout.notes, *maker.notes))
@@ -134,10 +141,10 @@ class _Maker:
             what = "alpha 1e-4 s and beta 0.0125 1/s, as the reference lines of EN 50318, were written as a choice"
             self.notes.append(f"{self.layout.name} says nothing of damping: {what}")
 
-    def read(self, text: str) -> CatenaryDefinition | None:
+    def read(self, text: str, out: Path) -> CatenaryDefinition | None:
         """Return the definition as its file will be read, or tell what is wrong, with the places in the sheets."""
         try:
-            return line_reading.read(Table.from_dict(tomllib.loads(text), "definition"))
+            return line_reading.read(Table.from_dict(tomllib.loads(text), str(out)))
         except DefinitionError as error:
             consequent = _CONSEQUENT if self.problems.found else ()
             for problem in error.problems:
@@ -152,10 +159,14 @@ class _Maker:
             return
         place = self.draft.place(problem.key)
         if place is not None and place.sheet:
-            self.problems.add(place, problem.text)
-        elif re.sub(r"^section\[\d+\]\.", "", problem.key).partition(".")[0] not in consequent:
-            where = f" (from {self.design.path})" if self.design is not None else ""
-            self.problems.add(Place(f"key {problem.key}{where}"), problem.text)
+            is_its_own = problem.key in self.draft.places
+            self.problems.add(place, problem.text if is_its_own else f"'{problem.key}' {problem.text}")
+            return
+        first = re.sub(r"^section\[\d+\]\.", "", problem.key).partition(".")[0].partition("[")[0]
+        if first not in consequent:
+            where = "" if self.design is None else f" (it may be of {self.design.path})"
+            sheet = "wires" if first in WIRE_COLUMNS else "line"
+            self.problems.add(Place(sheet), f"'{problem.key}' {problem.text}{where}")
 
     def _type(self) -> str:
         """Return the type of the line by its wires, or the design's."""
@@ -179,6 +190,12 @@ class _Maker:
                 self.problems.add(place, f"'{key}' cannot stand here: {what}")
             elif (first := seen.setdefault(key, k)) != k:
                 self.problems.add(place, f"'{key}' stands in row {sheet.rows[first]} already")
+            elif key in _TABLES:
+                self.problems.add(place, f"'{key}' is a table: name a key in it, as damping.alpha is in damping")
+            elif key.count(".") > 1 and key.partition(".")[0] not in _NESTED:
+                self.problems.add(
+                    place, f"there is no key '{key}': a table in a table is in {', '.join(_NESTED)} alone"
+                )
             else:
                 self._put_key(sheet, k, key, value)
 
@@ -235,7 +252,8 @@ class _Maker:
                 self.problems.add(Place("wires"), text)
             return
         for component in _NEEDED:
-            if component not in self.draft.data and component not in self.draft.places:
+            given = self.draft.data.get(component, {})
+            if not given.keys() & set(_UNITS) and component not in self.draft.places:
                 text = f"there is no row '{component}': add it, or name a line that has one with --design"
                 self.problems.add(Place("wires"), text)
 

@@ -149,6 +149,8 @@ def read_layout(path: Path, problems: SheetProblems) -> Layout:
     if not known:
         if not problems.found:
             there = f"; it has {', '.join(map(repr, sorted(grids)))}" if grids else ""
+            if path.is_dir() and (books := sorted(path.glob("*.xlsx"))):
+                there += f"; if {books[0].name} is one, name that file"
             what = "folder of CSV files" if path.is_dir() else "workbook"
             text = f"is no layout: a {what} with the sheets {', '.join(REQUIRED)} and wires is wanted{there}"
             problems.add(Place(""), text)

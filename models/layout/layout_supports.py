@@ -219,9 +219,7 @@ class _SectionWriter:
         kinds = self.section.kinds
         needed = np.array([k == SUPPORT or (k == UNREGISTERED and name not in _OF_ARMS) for k in kinds])
         needed |= np.array(kinds) == SEAM
-        for k in np.flatnonzero(~needed & ~np.isnan(column)):
-            what = "has no steady arm" if name in _OF_ARMS else "has both wires in one place"
-            self._tell(int(k), name, f"{kinds[k]} {what}: empty the cell")
+        self._check_others(name, needed, column)
         values = self._column(name, needed)
         if values is None:
             return
@@ -230,6 +228,17 @@ class _SectionWriter:
                 self._tell(int(k), name, f"{values[k]:g}: a side is 1, left of the wire, or -1")
         filled = np.interp(np.arange(len(values)), np.flatnonzero(needed), values[needed])
         self.values[name] = np.where(needed, values, np.rint(filled) if name == "arm_side" else filled)[self._inner]
+
+    def _check_others(self, name: str, needed: BoolArray, column: FloatArray) -> None:
+        """Tell of values where there is nothing to have them; a column filled with one value to its ends is none."""
+        held = needed & ~np.isnan(column)
+        beside = np.interp(np.arange(len(column)), np.flatnonzero(held), column[held]) if held.any() else column
+        for k in np.flatnonzero(~needed & ~np.isnan(column)):
+            if name not in _OF_ARMS:
+                self._tell(int(k), name, f"{self.section.kinds[k]} has both wires in one place: empty the cell")
+            elif abs(column[k] - beside[k]) > _SAME:
+                text = f"{self.section.kinds[k]} has no steady arm: empty the cell, or write what the next one has"
+                self._tell(int(k), name, text)
 
     @property
     def _inner(self) -> slice:

@@ -155,7 +155,7 @@ def read_table(grid: SheetGrid, declared: Sequence[SheetColumn], problems: Sheet
     if found is None:
         return None
     columns = {}
-    decimal_point = _has_decimal_point(body)
+    decimal_point = _has_decimal_point(body, [place for place, (column, _) in found.items() if column.unit])
     for place, (column, unit) in found.items():
         label = f"{_letter(place)} ({column.name})"
         cells = [row[place] if place < len(row) else None for _, row in body]
@@ -237,7 +237,12 @@ def _name_and_unit(cell: Cell) -> tuple[str, str]:
     match = _HEADING.fullmatch(cell) if isinstance(cell, str) else None
     if match is None:
         return (cell.casefold() if isinstance(cell, str) else ""), ""
-    return re.sub(r"[\s_-]+", "_", match[1].casefold()), (match[2] or "").translate(_SIGNS)
+    return _plain_name(match[1]), (match[2] or "").translate(_SIGNS)
+
+
+def _plain_name(text: str) -> str:
+    """Return a name in lower case, its words joined as declared ones are."""
+    return re.sub(r"[\s_-]+", "_", text.casefold())
 
 
 def _tell_nameless(
@@ -261,10 +266,10 @@ def _tell_nameless(
             problems.add(Place(sheet, first, _letter(k)), "stands in a column without a name: name it, or empty it")
 
 
-def _has_decimal_point(body: Sequence[tuple[int, tuple[Cell, ...]]]) -> bool:
-    """Return whether a number of a table is written with a decimal point."""
-    texts = (cell for _, cells in body for cell in cells if isinstance(cell, str) and "." in cell)
-    return any(_NUMBER.fullmatch(text) is not None for text in texts)
+def _has_decimal_point(body: Sequence[tuple[int, tuple[Cell, ...]]], places: Sequence[int]) -> bool:
+    """Return whether a number in one of the columns at some places is written with a decimal point."""
+    cells = (row[place] for _, row in body for place in places if place < len(row))
+    return any(isinstance(cell, str) and "." in cell and _NUMBER.fullmatch(cell) for cell in cells)
 
 
 def _letter(place: int) -> str:
@@ -328,9 +333,10 @@ class _ColumnReader:
         choices = self.column.choices
         if not choices:
             return text
-        if text.casefold() not in choices:
+        name = _plain_name(text)
+        if name not in choices:
             raise ValueError(f"{shown_value(text)} is none of {', '.join(choices)}{hint(text, choices)}")
-        return text.casefold()
+        return name
 
     def _number(self, cell: Cell) -> float:
         """Return the number of a cell in SI, raise ``ValueError`` saying what is wrong with it."""

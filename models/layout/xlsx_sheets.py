@@ -76,8 +76,10 @@ def workbook_bytes(sheets: Mapping[str, Sequence[Sequence[str | float | None]]])
     book.remove(book.active)
     for name, rows in sheets.items():
         sheet = book.create_sheet(name)
-        for row in rows:
+        for number, row in enumerate(rows, 1):
             sheet.append(list(row))
+            for cell in sheet[number]:
+                cell.data_type = "s" if isinstance(cell.value, str) else cell.data_type  # text with = is no formula
         for cell in sheet[1]:
             cell.font = Font(bold=True)
             sheet.column_dimensions[cell.column_letter].width = max(10.0, len(str(cell.value)) + 3.0)

@@ -7,7 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from models.catenary.definition.line_definition import CatenaryDefinition, Section
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 

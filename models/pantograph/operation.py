@@ -118,10 +118,13 @@ class Operation:
             yield "use_train", _idle_text("use_train")
 
     def check_speed(self, table: Table) -> None:
-        """Tell a definition's table of keys that say nothing beside its speed profile."""
+        """Tell a definition's table of keys that do nothing beside its speed profile, or beside inputs in its place."""
         for key in _BESIDE_PROFILE if self.speed_profile is not None else ():
             if table.has(key):
                 table.problem(key, _idle_text(key))
+        if self.use_train and self.speed_profile is None and table.has("speed"):
+            text = "does nothing with use_train = 1: the inputs train.x and train.vx say where it is"
+            table.problem("speed", f"{text}; leave out one of the two")
 
     def tunable(self, parameters: Iterable[Parameter]) -> tuple[Parameter, ...]:
         """Return those of the definition's parameters that do something."""

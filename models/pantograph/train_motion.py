@@ -124,14 +124,15 @@ class TrainMotion:
                 f"{LARGEST_ACCELERATION:g} m/s2; check its unit and its smoothness"
             )
 
-    def at(self, time: float) -> Travel:
-        """Return the motion at a time [s]."""
+    def at(self, time: float, inside: float | None = None) -> Travel:
+        """Return the motion at a time [s], with the acceleration of the piece that another lies in, if one is given."""
         if self.by_inputs:
             holds, x, speed, trend = self._last
             tau = time - holds
             return Travel(self._start + (x + tau * (speed + 0.5 * trend * tau)), speed + trend * tau, trend)
         elapsed = time - self._began
-        k = 0 if self._is_one_piece else max(0, bisect.bisect_right(self._begins, elapsed) - 1)
+        within = elapsed if inside is None else inside - self._began
+        k = 0 if self._is_one_piece else max(0, bisect.bisect_right(self._begins, within) - 1)
         begin, distance, speed, slope = self._segments[k]
         if slope == 0.0 and distance == 0.0 and begin == 0.0:
             return Travel(self._start + speed * elapsed, speed, 0.0)

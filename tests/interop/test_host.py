@@ -20,6 +20,7 @@ from fmus.loader.loader_build import INNER_SUFFIX
 from master.run_session import connected_fmus
 from master.scenario.open_scenario import open_scenario
 from master.ssp.archive import extract
+from tests.effort import rest
 from tests.interop.support import STEP
 
 linux = pytest.mark.skipif(
@@ -156,7 +157,7 @@ def test_bits_as_in_python_with_python_on_path(host, system, unpacked, in_python
 
 
 @pytest.mark.skipif(not LIBPYTHON.is_file(), reason="this Python has no shared library that could be preloaded")
-@pytest.mark.parametrize("which", ["stock", "unpacked"])
+@pytest.mark.parametrize("which", ["stock", *rest("unpacked")])
 def test_bits_as_in_python_with_libpython_preloaded(host, system, request, in_python, which):
     """As FMUs without our loader need it; with it, it does no harm."""
     path = f"{Path(sys.executable).parent}:/usr/bin:/bin"

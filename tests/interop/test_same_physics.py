@@ -17,6 +17,7 @@ from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
 from master.ssp.archive import extract
 from master.ssp.ssp_units import Conversion
+from tests.effort import rest
 
 STOP = 0.4
 ANNOTATION = '<panto:Coupling scheme="jacobi"/>'
@@ -126,7 +127,7 @@ def test_units_on_the_wires(scenario, expected, tmp_path):
     assert force(go(scenario, tmp_path / "out")) == pytest.approx(expected("jacobi"), abs=1e-6)
 
 
-@pytest.mark.parametrize("scheme", ["jacobi", "iterative"])
+@pytest.mark.parametrize("scheme", ["jacobi", *rest("iterative")])
 def test_a_continued_run_is_the_uninterrupted_one(original, tmp_path, scheme):
     whole = go(original, tmp_path / "whole", scheme=scheme, checkpoint=0.25)
     state = checkpoint.read(tmp_path / "whole" / checkpoint.NAME)
@@ -165,7 +166,7 @@ def test_energy_added_by_the_coupling_is_reported_and_falls_with_the_step(origin
         assert fine[1] < 0.75 * coarse[1]
 
 
-@pytest.mark.parametrize("scheme", ["jacobi", "gauss-seidel", "iterative"])
+@pytest.mark.parametrize("scheme", ["jacobi", *rest("gauss-seidel", "iterative")])
 def test_energy_is_kept_by_the_parts_and_nearly_by_their_coupling(original, tmp_path, expected, scheme):
     """Also where steps are repeated from saved states; and watching changes no figure."""
     watched = Overrides(STOP, scheme=scheme, energy=True, may_stop_early=True)

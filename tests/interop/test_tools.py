@@ -17,7 +17,7 @@ TOOLS = [
     ("cofmupy", "cofmupy", 1e-9),
 ]
 WHOLE = 7.8
-SHORT = 1.5
+SHORT = 0.6
 
 
 @pytest.fixture(scope="session")

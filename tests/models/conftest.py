@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import models
+from models.catenary.definition.fault_definition import FAULT_KINDS, Fault
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import read
 from models.definition_files.toml_reader import Table
@@ -71,6 +72,11 @@ def make_line(
     if spans is None:
         del data["spans"]
     return read(Table.from_dict({k: v for k, v in data.items() if v is not None}, "short.toml"))
+
+
+def make_fault(kind: str, **values: object) -> Fault:
+    """Return a fault of some kind, active unless it is said not to be."""
+    return FAULT_KINDS[kind](kind=kind, **values)
 
 
 def make_section(

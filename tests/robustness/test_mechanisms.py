@@ -87,19 +87,19 @@ MAKERS = (without_a_line, without_a_table, with_another_name, with_another_kind,
 def test_one_thing_is_wrong(tmp_path, name, maker):
     cases = list(maker(name))
     assert len(cases) > 10
-    for text in part(cases, 8):
+    for text in part(cases, 3):
         TRIED["mechanism, one thing wrong"] += 1
         analysed(tmp_path / "broken.toml", text)
 
 
-@settings(PROFILE, max_examples=count(30, 2500))
+@settings(PROFILE, max_examples=count(12, 2500))
 @given(change=changes())
 def test_blindly(tmp_path_factory, change):
     TRIED["mechanism, blindly"] += 1
     analysed(tmp_path_factory.getbasetemp() / "broken.toml", change(TEXTS["CX_multibody"].encode()))
 
 
-@settings(PROFILE, max_examples=count(4, 800))
+@settings(PROFILE, max_examples=count(2, 800))
 @given(factors=st.lists(st.floats(0.5, 2.0), min_size=4, max_size=4), name=st.sampled_from(NAMES))
 def test_masses_and_inertias_of_another_machine(tmp_path_factory, factors, name):
     """Sound ones: a pantograph of other masses has figures."""

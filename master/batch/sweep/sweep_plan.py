@@ -15,14 +15,16 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from master.batch.sweep.distributions import Distribution, Method, draw, read_distribution
+from master.batch.sweep.seed_samples import seed_samples
 from master.batch.sweep.sensitivity import LEAST_BLOCKS, SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
-from master.errors import MasterError, RequestError, said
+from master.errors import MasterError, RequestError, hint, said
+from master.scenario.overrides import FaultsOf
 from master.system.components import System
 from master.system.pantograph_motion import STATIC_FORCE
 
@@ -81,6 +83,8 @@ class SweepRequest(PlainRequest):
     faults : tuple of int
         Spans whose droppers break one after the other; the first run has none broken. The scenario must have been
         opened with them.
+    faults_of : str
+        ``each-dropper``, or ``each-arm``: the steady arms at the ends of these spans come off instead.
     stop : float, optional
         Stop time of all runs [s]; it follows the speed if not given.
     static_force, mean_force : str, optional
@@ -105,6 +109,7 @@ class SweepRequest(PlainRequest):
     sensitivity: SensitivityMethod | None = None
     table: Path | None = None
     faults: tuple[int, ...] = ()
+    faults_of: FaultsOf = "each-dropper"
     stop: float | None = None
     static_force: str | None = None
     mean_force: str | None = None
@@ -112,6 +117,27 @@ class SweepRequest(PlainRequest):
     keep: Keep = "figures"
     engine: Engine = "fmu"
     check: int = Field(1, ge=0)
+
+
+def listed_faults(faults: str | int | Sequence[int], span: int | Sequence[int]) -> dict[str, Any]:
+    """Return what a request says of faults: ``each-dropper`` or ``each-arm`` with spans, or spans alone.
+
+    Raises
+    ------
+    RequestError
+        If spans are missing, or given twice.
+    """
+    spans = (span,) if isinstance(span, int) else tuple(span)
+    if not isinstance(faults, str):
+        if spans:
+            raise RequestError("--span is of --faults each-dropper and --faults each-arm: give one of them too")
+        return {"faults": (faults,) if isinstance(faults, int) else tuple(faults)}
+    if faults not in get_args(FaultsOf):
+        known = get_args(FaultsOf)
+        raise RequestError(f"--faults: '{faults}' is none of {', '.join(known)}{hint(faults, known)}")
+    if not spans:
+        raise RequestError(f"--faults {faults} needs --span K: of which span of the line?")
+    return {"faults": spans, "faults_of": faults}
 
 
 def stored_request(folder: Path) -> dict[str, Any]:
@@ -180,9 +206,8 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     RequestError
         If something is asked for that there is not, or the parts do not go together.
     """
-    if bool(request.vary) != (request.samples is not None):
-        missing = "--samples N: how many" if request.vary else "--vary NAME=DISTRIBUTION: of what"
-        raise RequestError(f"samples need {missing}")
+    if request.vary and request.samples is None:
+        raise RequestError("samples need --samples N: how many")
     _check_sensitivity(request)
     table, names = (None, ()) if request.table is None else _read_table(system, request.table)
     if request.faults:
@@ -191,9 +216,11 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
         table, names = broken_in_turn(system)
     grid = [_listed(system, name, text) for name, text in request.over.items()]
     distributions = tuple(read_distribution(ParameterReader(system, n), text) for n, text in request.vary.items())
+    if request.samples is not None and not distributions:
+        grid.append(_Part(*seed_samples(system, request.samples, request.seed, {*request.over, *_names(table)})))
     sizes = [len(part.rows) for part in (table, *grid) if part is not None]
     each_sample = block_size(request.sensitivity, len(distributions)) if request.sensitivity else 1
-    if (count := math.prod(sizes) * (request.samples or 1) * each_sample) > MOST_RUNS:
+    if (count := math.prod(sizes) * (request.samples or 1 if distributions else 1) * each_sample) > MOST_RUNS:
         raise RequestError(f"that makes {count} runs, more than {MOST_RUNS}")
     parts = [part for part in (table, *grid) if part is not None]
     parts += [_sample(distributions, request)] if distributions else []
@@ -210,7 +237,8 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
 def _check_used(request: SweepRequest, parameters: Sequence[SweptParameter]) -> None:
     """Refuse what the runs would not heed, and values that they would not have."""
     given = request.model_fields_set
-    if not request.vary and ("method" in given or request.seed != SweepRequest.model_fields["seed"].default):
+    is_seeded = request.seed != SweepRequest.model_fields["seed"].default
+    if (not request.vary and "method" in given) or (request.samples is None and is_seeded):
         raise RequestError("--seed and --method are of samples: give --vary with --samples, or leave them out")
     if "tolerance" in given and request.mean_force is None:
         raise RequestError("--mean-tolerance is of --mean-force: give that too, or leave it out")
@@ -317,6 +345,10 @@ def broken_in_turn(system: System) -> tuple[_Part, tuple[str, ...]]:
     read = [_column(system, name, column) for (name, _), column in zip(found, cells, strict=True)]
     values = list(zip(*(column for _, column in read), strict=True))
     return _Part(tuple(p for p, _ in read), values), ("healthy", *(name for name, _ in found))
+
+
+def _names(part: _Part | None) -> list[str]:
+    return [] if part is None else [name for p in part.parameters for name in (p.targets or (p.name,))]
 
 
 def _read_lines(path: Path) -> list[tuple[int, list[str]]]:

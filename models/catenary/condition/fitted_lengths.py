@@ -16,6 +16,8 @@ from models.catenary.shape.line_mesh import CatenaryMesh
 _MAX_ROUNDS: Final = 30
 #: A dropper of given length that is surely slack is this much longer than designed [m].
 _LOOSE: Final = 1.0
+#: A dropper that carries nothing is taken to be barely taut, by so much [m]: shortening it acts at once.
+_BARELY: Final = 1e-7
 #: A wire that hangs lower than measured by more than this is held by its dropper [m].
 _TOLERANCE: Final = 1e-6
 
@@ -30,7 +32,7 @@ class FittedLengths:
         The line at rest with these lengths.
     length : ndarray, shape (n_droppers,)
         Unstrained [m]: what gives the measured height; as designed where none was measured. A slack one is as long as
-        the distance that it spans, and may be longer.
+        the distance that it spans, barely taut, and may be longer.
     is_slack : ndarray, shape (n_droppers,)
         Droppers that would have to push to hold the wire as low as it was measured.
     """
@@ -110,7 +112,7 @@ def find_fitted_lengths(design: StaticState, height: FloatArray) -> FittedLength
             pushes = measured & ~slack & (state.dropper_force < 0.0)
             needed = slack & (state.positions[lower, 2] < height - _TOLERANCE)
         if not (pushes.any() or needed.any()):
-            length = np.where(slack, state.droppers.length + _TOLERANCE, state.unstrained_length)
+            length = np.where(slack, state.droppers.length - _BARELY, state.unstrained_length)
             return FittedLengths(with_errors(design, length - design.unstrained_length), length, slack)
         slack = (slack | pushes) & ~needed
     raise EquilibriumError(

@@ -8,9 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.condition.faults import active_faults, broken_droppers, slips
+from models.catenary.condition.as_found import as_found
+from models.catenary.condition.faults import (
+    active_faults,
+    area_left,
+    broken_droppers,
+    hard_point_mass,
+    settlements,
+    slips,
+    tension_left,
+)
 from models.catenary.condition.fitted_lengths import checked_lengths, fitted_errors
-from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
+from models.catenary.condition.irregularities import dropper_length_errors, stagger_errors, support_height_errors
 from models.catenary.condition.tensioning import WireTension, mast_sides, swing, tension_factors, wire_tensions
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.form_finding import StaticState, find_rest
@@ -23,21 +32,26 @@ def find_condition(design: StaticState) -> StaticState:
     Raises
     ------
     EquilibriumError
-        If a dropper would have no length left, or the line no equilibrium.
+        If a dropper would have no length or no place left, a wire no tension, or the line no equilibrium.
     """
-    definition, mesh = design.shape.definition, design.shape.mesh
+    definition, designed = design.shape.definition, design.shape.mesh
     if not _differs(definition):
         return design
-    raised = support_height_errors(definition.irregularity, mesh)
+    raised = support_height_errors(definition.irregularity, designed) - settlements(definition)
     wires = () if definition.tensioning is None or definition.tensioning.is_design else wire_tensions(design)
+    found = as_found(design)
+    mesh = found.shape.mesh
     changed = replace(
         mesh,
-        tension_factor=tension_factors(design, wires),
+        tension_factor=tension_factors(mesh, wires) * tension_left(definition, mesh),
+        area_factor=area_left(definition, mesh),
+        clamp_mass=mesh.clamp_mass + hard_point_mass(definition, mesh),
         given_length=_lengths(design),
-        broken=broken_droppers(definition, mesh),
+        broken=broken_droppers(definition, designed),
         seat=mesh.seat + raised,
     )
-    return find_rest(design, changed, _held(design, raised, wires))
+    aside = stagger_errors(definition.irregularity, designed)
+    return find_rest(found, changed, _held(found, raised, aside, wires))
 
 
 def _differs(definition: CatenaryDefinition) -> bool:
@@ -45,7 +59,13 @@ def _differs(definition: CatenaryDefinition) -> bool:
     errors, tensioning = definition.irregularity, definition.tensioning
     changed = tensioning is not None and not tensioning.is_design
     changed = changed or any(any(section.length_errors) for section in definition.sections)
-    return bool(changed or errors.dropper_length_sigma or errors.support_height_sigma or active_faults(definition))
+    sigmas = (
+        errors.dropper_length_sigma,
+        errors.dropper_position_sigma,
+        errors.support_height_sigma,
+        errors.stagger_sigma,
+    )
+    return bool(changed or any(sigmas) or active_faults(definition))
 
 
 def _lengths(design: StaticState) -> FloatArray:
@@ -55,7 +75,7 @@ def _lengths(design: StaticState) -> FloatArray:
     return checked_lengths(design, lengths + fitted_errors(definition, mesh))
 
 
-def _held(design: StaticState, raised: FloatArray, wires: Sequence[WireTension]) -> FloatArray:
+def _held(design: StaticState, raised: FloatArray, aside: FloatArray, wires: Sequence[WireTension]) -> FloatArray:
     """Return the design's points with the supports as they stand: messenger wire and registration ends, (n, 3) [m].
 
     Cantilevers that the contact wire has swung along the track bring the registration ends nearer to the masts.
@@ -65,6 +85,7 @@ def _held(design: StaticState, raised: FloatArray, wires: Sequence[WireTension])
     rise[mesh.sprung] = raised
     rise[mesh.arms[:, 0]] = _at_arms(mesh, raised)
     points[:, 2] += rise[mesh.owner]
+    points[mesh.arms[:, 0], 1] += _at_arms(mesh, aside)
     for wire in wires:
         if wire.component == "contact_wire":
             points[:, 1] += _towards_masts(design, wire)

@@ -15,10 +15,15 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, Section
+from models.catenary.condition.faults import active_of
+from models.catenary.definition.fault_definition import HardPoint, Wear
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.surface_definition import RunningSurface as Surface
 from models.numerics.random_numbers import uniform_numbers
 
+#: Length over which the underside rises from a new wire to a worn one [m].
+_RAMP: Final = 1.0
 #: Stream of random numbers, beside those of `irregularities`; never renumber it.
 _STREAM: Final = 5
 #: Waves of a generated surface, and knots in its shortest one: cubics between these are off by 4e-6 of its amplitude.
@@ -148,6 +153,18 @@ def _pieces(definition: CatenaryDefinition, number: int, section: Section) -> It
         yield SurfacePiece.through(*np.array(surface.points).T)
     if surface is not None and surface.sigma:
         yield _generated(surface, number, section)
+    for lap in (-section.period, 0.0, section.period) if section.periodic else (0.0,):
+        yield from _of_faults(definition, number, lap)
+
+
+def _of_faults(definition: CatenaryDefinition, number: int, lap: float) -> Iterator[SurfacePiece]:
+    """Yield what faults do to the underside of the wire of a section, counted from 0, in some lap [m]."""
+    for worn in active_of(definition, Wear):
+        if worn.section - 1 == number and worn.lost_thickness:
+            yield SurfacePiece.raised(worn.from_ + lap, worn.to + lap, worn.lost_thickness, _RAMP)
+    for point in active_of(definition, HardPoint):
+        if point.section - 1 == number and point.height and point.length:
+            yield SurfacePiece.bump(point.position + lap, point.length, point.height)
 
 
 def spectrum(surface: Surface) -> tuple[FloatArray, FloatArray]:

@@ -15,10 +15,12 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition, Section, Wire
+from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition, Wire
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState
+from models.catenary.shape.line_mesh import CatenaryMesh
 
 #: Wires with a tensioning device of their own, and what droppers and hangers hang from what.
 WIRES: Final = ("contact_wire", "messenger_wire", "auxiliary_wire")
@@ -175,9 +177,8 @@ def wire_tensions(design: StaticState) -> tuple[WireTension, ...]:
     return tuple(wire for index, section in enumerate(definition.sections) for wire in _section(design, section, index))
 
 
-def tension_factors(design: StaticState, wires: Sequence[WireTension]) -> FloatArray:
+def tension_factors(mesh: CatenaryMesh, wires: Sequence[WireTension]) -> FloatArray:
     """Return the tension of every beam element over that of the design, shape (n_beams,)."""
-    mesh = design.shape.mesh
     result = np.ones(len(mesh.beams))
     middle = mesh.points[mesh.beams, 0].mean(axis=1)
     of_section = mesh.section[mesh.beams[:, 0]]
@@ -202,6 +203,7 @@ def _section(design: StaticState, section: Section, index: int) -> list[WireTens
     half = max(ends[-1] - fixed_point, fixed_point - ends[0])
     devices = {name: _device(design, name, section, index, half) for name in WIRES if getattr(definition, name)}
     distance = np.abs(ends[1:-1] - fixed_point)
+    _check_swing(definition, {name: abs(strain) * distance.max(initial=0.0) for name, (_, strain) in devices.items()})
     lost = _losses(design, index, ends, {name: strain * distance for name, (_, strain) in devices.items()})
     return [
         WireTension(
@@ -216,6 +218,18 @@ def _section(design: StaticState, section: Section, index: int) -> list[WireTens
         )
         for name, (tension, strain) in devices.items()
     ]
+
+
+def _check_swing(definition: CatenaryDefinition, moved: dict[str, float]) -> None:
+    """Refuse wires that move farther than cantilevers reach, by the largest movement at a support [m]."""
+    tensioning = _tensioning(definition)
+    for name, movement in moved.items():
+        if movement >= tensioning.cantilever_length:
+            raise EquilibriumError(
+                f"line '{definition.name}': at {tensioning.temperature - 273.15:g} degC the {name.replace('_', ' ')} "
+                f"moves by {movement:.2f} m at a support, and cantilevers are {tensioning.cantilever_length:g} m long; "
+                "check cantilever_length, expansion and the length of the section"
+            )
 
 
 def _tensioning(definition: CatenaryDefinition) -> Tensioning:

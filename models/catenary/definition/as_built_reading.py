@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from models.catenary.definition.line_definition import Span
+from models.catenary.definition.section_definition import Span
 from models.definition_files.toml_reader import Table
 
 #: Largest error of a length that can be meant [m].

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from models.catenary.definition.calculation_definition import Dynamics, Mesh
-from models.catenary.definition.condition_definition import Fault, Irregularity
+from models.catenary.definition.condition_definition import Irregularity
+from models.catenary.definition.fault_definition import Fault
 from models.catenary.definition.overbridge_definition import Overbridge
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.surface_definition import RunningSurface
 from models.catenary.definition.tensioning_definition import Tensioning
 from models.catenary.definition.track_definition import Track
@@ -117,7 +119,7 @@ class SteadyArm:
     youngs_modulus: float = quantity("Pa", "Young's modulus", positive=True, minimum=1e9, maximum=1e12)
     length: float = quantity("m", "length", positive=True, minimum=0.1, maximum=10.0)
     angle: float = quantity(
-        "rad", "angle to the horizontal, from the registration end; negative: falls towards the wire",
+        "rad", "angle to the rail plane, from the registration end; negative: falls towards the wire",
         minimum=-1.2, maximum=1.2,
     )  # fmt: skip
 
@@ -183,117 +185,6 @@ class Contact:
     restitution: float = quantity("1", "coefficient of restitution", default=1.0, minimum=0.0, maximum=1.0)
     wire_radius: float = quantity("m", "radius of the contact wire", default=0.0, minimum=0.0, maximum=0.05)
     strip_radius: float = quantity("m", "radius of the collector strip", default=0.0, minimum=0.0, maximum=0.5)
-
-
-@dataclass(frozen=True)
-class Span:
-    """A span: its ends, its droppers, and in a compound line the hangers of its auxiliary wire.
-
-    Attributes
-    ----------
-    start, end : float
-        Supports [m].
-    droppers, hangers : tuple of float
-        Positions along the track [m].
-    dropper_lengths, hanger_lengths : tuple of float or empty
-        Given unstrained lengths [m]; empty if form finding determines them.
-    """
-
-    start: float
-    end: float
-    droppers: tuple[float, ...]
-    hangers: tuple[float, ...] = ()
-    dropper_lengths: tuple[float, ...] = ()
-    hanger_lengths: tuple[float, ...] = ()
-
-    @property
-    def length(self) -> float:
-        """Return the distance between the supports [m]."""
-        return self.end - self.start
-
-
-@dataclass(frozen=True)
-class Support:
-    """A support of the messenger wire; with a steady arm where the contact wire is registered.
-
-    What is None is line-wide: of the profile, of the steady arms. The messenger wire is then above the contact wire,
-    and the arm on the side from which it pulls. ``structure`` names the mast.
-    """
-
-    x: float
-    stagger: float
-    has_steady_arm: bool
-    contact_wire_height: float | None = None
-    encumbrance: float | None = None
-    messenger_stagger: float | None = None
-    arm_length: float | None = None
-    arm_angle: float | None = None
-    arm_side: int | None = None
-    structure: str = ""
-
-
-@dataclass(frozen=True)
-class EndSpans:
-    """The wires' rise to their anchors: parabolas outside the registered part of the line.
-
-    Attributes
-    ----------
-    anchors, working : (float, float)
-        Positions at which the wires end, and at which they leave the working height [m].
-    rises : (float, float)
-        Height of the contact wire above its working height at the anchors [m].
-    """
-
-    anchors: tuple[float, float]
-    working: tuple[float, float]
-    rises: tuple[float, float]
-
-    def rise_at(self, x: float) -> float:
-        """Return the height above the working height at ``x`` [m]."""
-        (start, end), (first, last) = self.anchors, self.working
-        if x < first:
-            return self.rises[0] * ((first - x) / (first - start)) ** 2
-        if x > last:
-            return self.rises[1] * ((x - last) / (end - last)) ** 2
-        return 0.0
-
-
-@dataclass(frozen=True)
-class Section:
-    """One mechanically independent set of wires.
-
-    Attributes
-    ----------
-    supports : tuple of Support
-        From anchor to anchor; the first and last are the anchors of the wires. In a periodic line all are supports, and
-        the first is the one where it closes.
-    spans : tuple of Span
-    ends : EndSpans
-        Where the wires rise to their anchors.
-    measured : tuple of (x, z) or empty
-        Specified heights of the contact wire, in place of nominal height minus pre-sag.
-    periodic : bool
-        Whether the last span ends at the support where the first begins.
-    length_errors : tuple of float or empty
-        What each dropper is longer than designed, in the order of the track [m].
-    """
-
-    supports: tuple[Support, ...]
-    spans: tuple[Span, ...]
-    ends: EndSpans
-    measured: tuple[tuple[float, float], ...] = ()
-    periodic: bool = False
-    length_errors: tuple[float, ...] = ()
-
-    @property
-    def inner_supports(self) -> tuple[Support, ...]:
-        """Return the supports without the anchors, which a periodic line has not."""
-        return self.supports if self.periodic else self.supports[1:-1]
-
-    @property
-    def period(self) -> float:
-        """Return the length after which a periodic line repeats [m]; 0 if it does not."""
-        return self.spans[-1].end - self.spans[0].start if self.periodic else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -377,14 +268,11 @@ class CatenaryDefinition:
         }
 
     def _with_place(self, parameter: Parameter) -> Parameter:
-        """Return a parameter; the description of one that makes a fault act says which dropper it is of."""
+        """Return a parameter; the description of one that makes a fault act says what it is of."""
         match = _ACTIVE.fullmatch(parameter.name)
         if match is None:
             return parameter
-        fault = self.fault[int(match[1]) - 1]
-        x = self.sections[fault.section - 1].spans[fault.span - 1].droppers[fault.dropper - 1]
-        section = f" of section {fault.section}" if len(self.sections) > 1 else ""
-        place = f"dropper {fault.dropper} of span {fault.span}{section} at {x:.2f} m"
+        place = self.fault[int(match[1]) - 1].described(self.sections)
         return replace(parameter, description=f"{parameter.description}; {place}")
 
     def with_values(self, values: Mapping[str, float]) -> CatenaryDefinition:

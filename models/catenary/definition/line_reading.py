@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from models.catenary.definition.condition_definition import Fault
-from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition, Section
+from models.catenary.definition.fault_reading import check_faults, read_faults
+from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition
 from models.catenary.definition.overbridge_definition import Overbridge
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.section_reading import SECTION_TABLES, read_section
 from models.catenary.definition.surface_definition import RunningSurface
 from models.catenary.definition.surface_reading import place_problem, with_surface
@@ -45,17 +46,16 @@ def read(table: Table, *, carried: bool = False) -> CatenaryDefinition:
         _check_places(table)
     sections = tuple(read_section(t, has_arms=has_arms, has_hangers=has_hangers) for t in tables)
     faults = table.tables("fault")
-    listed = tuple(field_schema.read(Fault, t) for t in faults)
     overbridges = table.tables("overbridge")
     over = tuple(field_schema.read(Overbridge, t) for t in overbridges)
-    definition = dataclasses.replace(line, sections=sections, fault=listed, overbridge=over)
+    definition = dataclasses.replace(line, sections=sections, fault=read_faults(faults), overbridge=over)
     if line.running_surface is not None:
         surface = with_surface(table, line.running_surface, carried=carried)
         definition = dataclasses.replace(definition, running_surface=surface)
         _check_profile(table, surface, sections)
     for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track, _check_tensioning):
         check(table, definition)
-    _check_faults(faults, definition)
+    check_faults(faults, definition)
     _check_overbridges(overbridges, definition)
     table.finish()
     return definition
@@ -177,19 +177,6 @@ def _check_periodic(table: Table, definition: CatenaryDefinition) -> None:
         table.problem("stitch_wire", f"{text}; take type 'simple' or 'compound'")
 
 
-def _check_faults(tables: Sequence[Table], definition: CatenaryDefinition) -> None:
-    """Check that every fault is one of a dropper that the line has, and no two are of the same one."""
-    seen: dict[tuple[int, int, int], int] = {}
-    for number, (table, fault) in enumerate(zip(tables, definition.fault, strict=True), 1):
-        place = fault.section, fault.span, fault.dropper
-        if key := _missing_part(definition, fault):
-            table.problem(*key)
-        elif (other := seen.setdefault(place, number)) != number:
-            table.problem(
-                "dropper", f"dropper {fault.dropper} of span {fault.span} has a fault already, fault[{other}]"
-            )
-
-
 def _check_overbridges(tables: Sequence[Table], definition: CatenaryDefinition) -> None:
     """Check that every bridge stands over the line, and no two have one name, by which verdicts call them."""
     first = min((section.spans[0].start for section in definition.sections if section.spans), default=-math.inf)
@@ -203,19 +190,6 @@ def _check_overbridges(tables: Sequence[Table], definition: CatenaryDefinition) 
         for key, x in (("start", over.start), ("end", over.end)):
             if key not in mistaken and not first <= x <= last:
                 table.problem(key, f"{x:g} m lies outside the line, {first:g} ... {last:g} m")
-
-
-def _missing_part(definition: CatenaryDefinition, fault: Fault) -> tuple[str, str] | None:
-    """Return the key and the text if the line has no such section, span or dropper."""
-    if fault.section > len(definition.sections):
-        return "section", f"there is no section {fault.section}: the line has {len(definition.sections)}"
-    spans = definition.sections[fault.section - 1].spans
-    if fault.span > len(spans):
-        return "span", f"there is no span {fault.span}: the section has {len(spans)}"
-    count = len(spans[fault.span - 1].droppers)
-    if fault.dropper > count:
-        return "dropper", f"there is no dropper {fault.dropper}: span {fault.span} has {count}"
-    return None
 
 
 def _check_type(table: Table, definition: CatenaryDefinition) -> None:

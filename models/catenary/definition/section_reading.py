@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Final
 
 from models.catenary.definition.as_built_reading import read_length_errors
-from models.catenary.definition.line_definition import EndSpans, Section, Span, Support
+from models.catenary.definition.section_definition import EndSpans, Section, Span, Support
 from models.catenary.definition.support_reading import listed_stagger, with_own_values
 from models.definition_files.toml_reader import Table
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
-from models.catenary.definition.line_definition import Support
+from models.catenary.definition.section_definition import Support
 from models.definition_files.toml_reader import Table
 
 #: Key of the table -> unit and range; the field of a support has the same name.
-_QUANTITIES: Final[dict[str, tuple[str, float, float]]] = {
+QUANTITIES: Final[dict[str, tuple[str, float, float]]] = {
     "contact_wire_height": ("m", 2.0, 10.0),
     "encumbrance": ("m", 0.05, 5.0),
     "messenger_stagger": ("m", -2.0, 2.0),
@@ -23,10 +24,10 @@ AUTO: Final = "auto"
 
 
 def listed_stagger(own: Table | None, count: int) -> tuple[float, ...]:
-    """Return the stagger of all supports between the anchors, if the table [supports] gives it [m]."""
+    """Return the stagger of all supports between the anchors, if the table [supports] gives it [m]; NaN if wrongly."""
     if own is None or not own.has("stagger"):
         return ()
-    return _each(own, "stagger", count, "m", -1.0, 1.0)
+    return _each(own, "stagger", count, "m", -1.0, 1.0) or (math.nan,) * count
 
 
 def with_own_values(own: Table, supports: Sequence[Support], *, periodic: bool, has_arms: bool) -> tuple[Support, ...]:
@@ -36,18 +37,18 @@ def with_own_values(own: Table, supports: Sequence[Support], *, periodic: bool, 
     """
     supports = _named(own, supports, periodic=periodic)
     inner = supports if periodic else supports[1:-1]
-    for name in (*_QUANTITIES, "stagger", "arm_side"):
+    for name in (*QUANTITIES, "stagger", "arm_side"):
         own.offers(name)
     columns = {
         name: _each(own, name, len(inner), unit, low, high)
-        for name, (unit, low, high) in _QUANTITIES.items()
+        for name, (unit, low, high) in QUANTITIES.items()
         if own.has(name)
     }
     columns["arm_side"] = _sides(own, len(inner))
     columns = {name: values for name, values in columns.items() if values}
     if not has_arms and (named := [name for name in _OF_ARMS if own.has(name)]):
         own.problem(named[0], "the line has no steady arms: it needs a table [steady_arm]")
-    if not set(own.names()) & {*_QUANTITIES, "arm_side", "stagger", "structure"}:
+    if not set(own.names()) & {*QUANTITIES, "arm_side", "stagger", "structure"}:
         own.problem("", "gives nothing of any support: fill it, or remove it")
     changed = [_changed(s, {name: values[i] for name, values in columns.items()}) for i, s in enumerate(inner)]
     if periodic or not changed:
@@ -105,8 +106,9 @@ def _is_empty_list(entry: Any) -> bool:
 def _sides(own: Table, count: int) -> tuple[float, ...]:
     if not own.has("arm_side"):
         return ()
-    if isinstance(own.data["arm_side"], str):
-        own.text("arm_side", choices=(AUTO,))
+    if isinstance(side := own.data["arm_side"], str):
+        if own.text("arm_side") != AUTO:
+            own.problem("arm_side", f"'{side}': a side is 1, to the left of the wire, or -1, or all of them 'auto'")
         return ()
     sides = _each(own, "arm_side", count, "1", -1.0, 1.0)
     if wrong := [side for side in sides if abs(side) != 1.0]:

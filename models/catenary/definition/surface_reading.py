@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
-from models.catenary.definition.line_definition import Section
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.surface_definition import LARGEST_HEIGHT, RunningSurface
 from models.definition_files.message_text import said
 from models.definition_files.si_units import shown, to_si

@@ -14,6 +14,8 @@ TIGHTEST_RADIUS: Final = 15.0
 _TIGHTEST: Final = 1.0 / TIGHTEST_RADIUS
 #: Largest cant of any track, with the sign of a mistake in the unit well beyond it [m].
 _LARGEST_CANT: Final = 0.3
+#: Distance of the wheel circles of standard gauge [m].
+_BASE: Final = 1.5
 #: Steepest ramp of a cant [1]; railways build 1 in 400.
 STEEPEST_RAMP: Final = 0.05
 #: Knots closer than this are the same place, at which a quantity jumps [m].
@@ -49,7 +51,7 @@ class Track:
         default=(), minimum=-0.01, maximum=0.01,
     )  # fmt: skip
     base: float = quantity(
-        "m", "distance of the wheel circles, over which the cant is measured", default=1.5, minimum=0.4, maximum=2.5
+        "m", "distance of the wheel circles, over which the cant is measured", default=_BASE, minimum=0.4, maximum=2.5
     )
 
     @property
@@ -96,6 +98,8 @@ class Track:
             yield "radius", "says what curvature says: give one of them"
         if tight := [R for R in self.radius if 0.0 < abs(R) < TIGHTEST_RADIUS]:
             yield "radius", f"{tight[0]:g} m: no track is as tight; {TIGHTEST_RADIUS:g} m or more, or 0 for straight"
+        if self.base != _BASE and not any(self.cant):
+            yield "base", f"{self.base:g} m says nothing where no cant is measured over it: give a cant, or remove it"
         yield from self._cant_problems()
 
     def _cant_problems(self) -> Iterator[tuple[str, str]]:

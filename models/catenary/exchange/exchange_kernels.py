@@ -15,7 +15,11 @@ _POSITION, _VELOCITY, _ACCELERATION = 1, 7, 13
 _STAMP_TOLERANCE = 0.25
 _LEAST_TRAVEL = 1e-9
 
+#: What is called from Python, and what by other kernels alone: nothing is made for Python then, which takes long.
 _compiled = njit(cache=True, error_model="numpy")
+_part = njit(  # type: ignore[call-overload]
+    error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
 
 
 @_compiled
@@ -99,7 +103,7 @@ def publish(force, point, strips, attached, places, outputs):
         outputs[first + i] = attached[0, places[i]]
 
 
-@_compiled
+@_part
 def _apply(force, point, strip, total, place):
     """Write where the resultant on a strip acts into ``place``, as `models.contact_law.application_point` says."""
     place[:] = 0.0
@@ -109,7 +113,8 @@ def _apply(force, point, strip, total, place):
                 for axis in range(3):
                     place[axis] += force[s] * point[s, axis]
         elif not math.isnan(point[s, 0]):
-            place[:] = point[s]
+            for axis in range(3):
+                place[axis] = point[s, axis]
             return
     for axis in range(3):
         if total > 0.0:

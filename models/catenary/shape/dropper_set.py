@@ -32,7 +32,7 @@ class DropperSet:
         Weight of the rate of elongation in the condition for slack [s]: alpha under the law "tension", by which spring
         and damper go slack together, k (e + alpha e') < 0; 0 under "elastic_only", by which the spring does alone.
     mass : ndarray, shape (n_droppers,)
-        [kg].
+        Of the distance between its ends; a broken one's is left to its wires [kg].
     """
 
     rows: sp.csr_matrix
@@ -57,7 +57,7 @@ def dropper_set(definition: CatenaryDefinition, mesh: CatenaryMesh, points: Floa
         stiffness=np.where(mesh.broken, 0.0, each(lambda dropper: _stiffness(dropper, length))),
         compression_ratio=each(lambda dropper: dropper.compression_ratio),
         slack_delay=each(lambda dropper: alpha if dropper.slack_law == "tension" else 0.0),
-        mass=each(lambda dropper: dropper.mass) * np.where(mesh.broken, mesh.given_length, length),
+        mass=each(lambda dropper: dropper.mass) * length,
     )
 
 

@@ -18,18 +18,21 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from models.arrays import BoolArray, FloatArray
-from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
+from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
+from models.catenary.shape.dropper_conditions import DropperConditions, dropper_conditions
 from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set
 from models.catenary.shape.line_matrices import (
     Matrices,
     arm_load,
     axial_stiffness,
+    beam_properties,
     pendulum_stiffness,
     steady_arm_tension,
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.line_shape import LineShape, line_shape
+from models.catenary.shape.steady_arms import arms_without_side, carry_arms, pushing_arms, with_arms_turned
 from models.catenary.shape.wire_intervals import attachments
 
 #: Form finding has converged when no reference point moves by more than this [m].
@@ -97,17 +100,30 @@ class StaticState:
 def find_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState:
     """Find the dropper lengths for the specified contact-wire profile, or the profile for given lengths.
 
+    A steady arm whose side is not given, and which turns out to push, stands on the other side: each is turned once at
+    most, all that push together. On which side it pulls follows from the place of the wires, but for some 25 N that
+    bending and inclined droppers add.
+
     Returns
     -------
     StaticState
+        With the mesh of the sides on which the arms pull.
 
     Raises
     ------
     EquilibriumError
-        If a dropper would have to push to give the specified profile, if the equations are singular, or if the
-        iteration does not converge.
+        If a dropper would have to push to give the specified profile, or an arm on a side that is given or on both, if
+        the equations are singular, or if the iteration does not converge.
     """
-    return _settled(definition, mesh, mesh.points.copy(), None)
+    turnable = arms_without_side(definition)
+    while True:
+        state = _settled(definition, mesh, mesh.points.copy(), None)
+        turning = turnable & pushing_arms(state.shape, state.arm_force)
+        if not turning.any():
+            _check_arms(state.shape, state.arm_force)
+            return state
+        turnable &= ~turning
+        mesh = with_arms_turned(mesh, turning)
 
 
 def find_rest(design: StaticState, mesh: CatenaryMesh, points: FloatArray) -> StaticState:
@@ -149,6 +165,7 @@ def _settled(
     definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, design: StaticState | None
 ) -> StaticState:
     """Move reference points until the line is at rest about them: of the wanted form, or as a design has become."""
+    _check_wires(definition, mesh)
     movable = _movable(mesh, carries_arms=design is None)
     unstretched = np.zeros(mesh.fixed.shape)
     unstretched[:, :3] = movable
@@ -163,7 +180,7 @@ def _settled(
         stretch = axial_stiffness(definition, mesh, points, arms=design is None) @ sp.diags(unstretched.ravel())
         # Likewise the guides act on moves of the reference only, and vanish from the result with them.
         guides = _swing(shape, force, design) @ sp.diags(unstretched.ravel())
-        conditions = _conditions(shape, slack)
+        conditions = dropper_conditions(shape, slack)
         load = matrices.load if design is None else matrices.load + (guides - stretch) @ kept.ravel()
         displacement, force = _solve(shape, matrices.K - stretch + guides, conditions, load)
         move = np.where(movable, (displacement.reshape(-1, NODE_DOFS) - kept)[:, :3], 0.0)
@@ -175,7 +192,7 @@ def _settled(
         _straighten(mesh, points, move)
         points = points + move
         if design is None:
-            _carry_arms(mesh, points, move)
+            carry_arms(mesh, points, move)
         if design is not None or iteration >= _TAUT_ITERATIONS:
             slack = now_slack
     search = "form finding of" if design is None else "the search for the condition of"
@@ -236,46 +253,6 @@ def _straighten(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> Non
         move[chain.nodes, 1] = np.interp(x, x[fixed], move[chain.nodes[fixed], 1])
 
 
-def _carry_arms(mesh: CatenaryMesh, points: FloatArray, move: FloatArray) -> None:
-    """Move the registration ends with the wire, so that the arms keep their angle and length."""
-    points[mesh.arms[:, 0], 2] += move[mesh.arms[:, 1], 2]
-
-
-@dataclass(frozen=True)
-class _Conditions:
-    """The equation of every dropper: rows @ d - flexibility * N = right.
-
-    Attributes
-    ----------
-    rows : sparse, shape (n_droppers, 6 n)
-    flexibility, right : ndarray, shape (n_droppers,)
-    """
-
-    rows: sp.csr_matrix
-    flexibility: FloatArray
-    right: FloatArray
-
-
-def _conditions(shape: LineShape, slack: np.ndarray) -> _Conditions:
-    """Return the droppers' conditions: height of the lower end, or elongation of a given length by the force."""
-    mesh, droppers = shape.mesh, shape.droppers
-    lower = mesh.droppers[:, 0]
-    n = len(lower)
-    heights = sp.csr_matrix((np.ones(n), (np.arange(n), lower * NODE_DOFS + 2)), shape=(n, mesh.fixed.size))
-    given = ~np.isnan(mesh.given_length)
-    stiffness = np.where(slack, droppers.compression_ratio, 1.0) * droppers.stiffness
-    limp = given & (stiffness == 0.0)
-    stiffness[limp] = 1.0  # N / 1 = 0
-    rows = sp.diags(np.where(given, 0.0, 1.0)) @ heights
-    rows = rows + sp.diags(np.where(given & ~limp, 1.0, 0.0)) @ droppers.rows
-    too_short = np.where(limp, 0.0, np.nan_to_num(mesh.given_length) - droppers.length)
-    return _Conditions(
-        rows.tocsr(),
-        np.where(given, 1.0 / stiffness, 0.0),
-        np.where(given, too_short, mesh.target - shape.points[lower, 2]),
-    )
-
-
 def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
     """Return which droppers of given length are longer than the distance they span."""
     with np.errstate(invalid="ignore"):
@@ -284,7 +261,7 @@ def _slack(mesh: CatenaryMesh, positions: FloatArray) -> np.ndarray:
 
 
 def _solve(
-    shape: LineShape, K: sp.csc_matrix, conditions: _Conditions, load: FloatArray
+    shape: LineShape, K: sp.csc_matrix, conditions: DropperConditions, load: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Solve [[K, B^T], [R, -D]] [d; N] = [load; right], with R, D and right from the droppers' conditions."""
     mesh = shape.mesh
@@ -326,7 +303,8 @@ def _static_state(
         _check_tension(shape, force)
     uncut = None if design is None else design.shape.points
     arm_force = steady_arm_tension(shape.definition, shape.mesh, shape.points, displacement, uncut)
-    _check_arms(shape, arm_force)
+    if design is not None:
+        _check_arms(shape, arm_force)
     droppers = dropper_set(shape.definition, shape.mesh, _displaced(shape.points, displacement))
     stiffness, given = shape.droppers.stiffness, shape.mesh.given_length
     with np.errstate(invalid="ignore"):  # 0 / 0 of a broken dropper, whose length is given
@@ -352,6 +330,27 @@ def weight(matrices: Matrices) -> float:
     return float(GRAVITY * (up.ravel() @ (matrices.M @ up.ravel())))
 
 
+def _check_wires(definition: CatenaryDefinition, mesh: CatenaryMesh) -> None:
+    """Reject wires without tension: beside a stitch wire, or where losses have taken it."""
+    tension = beam_properties(definition, mesh).tension
+    tension[mesh.component == COMPONENTS.index("steady_arm")] = np.inf
+    worst = int(tension.argmin())
+    if tension[worst] > 0.0:
+        return
+    name = COMPONENTS[mesh.component[worst]].replace("_", " ")
+    stitched = mesh.beside_stitch[worst]
+    why = "under a stitch wire, which takes its own tension from it," if stitched else "after its losses"
+    raise EquilibriumError(
+        f"line '{definition.name}': at {mesh.points[mesh.beams[worst, 0], 0]:.2f} m the {name} {why} has a tension of "
+        f"{tension[worst]:.0f} N: a wire must pull; "
+        + (
+            "give the stitch wire less (stitch_wire.tension), or let the messenger wire lose less"
+            if stitched
+            else "let it lose less"
+        )
+    )
+
+
 def _check_tension(shape: LineShape, force: FloatArray) -> None:
     slack = np.flatnonzero((force <= 0.0) & np.isnan(shape.mesh.given_length))
     if slack.size:
@@ -367,13 +366,8 @@ def _check_tension(shape: LineShape, force: FloatArray) -> None:
 
 
 def _check_arms(shape: LineShape, force: FloatArray) -> None:
-    """Reject steady arms that push by more than their own weight, which says nothing about the pull of the wire."""
-    arm = shape.definition.steady_arm
-    if arm is None:
-        return
-    end, node = shape.mesh.arms.T
-    length = np.linalg.norm(shape.points[node] - shape.points[end], axis=1)
-    pushing = np.flatnonzero(force < -GRAVITY * arm.mass * length)
+    """Reject steady arms that push."""
+    pushing = np.flatnonzero(pushing_arms(shape, force))
     if pushing.size:
         x = shape.points[shape.mesh.arms[pushing, 1], 0]
         listed = ", ".join(

@@ -11,7 +11,7 @@ import os
 import platform
 import sys
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Final
@@ -20,7 +20,8 @@ import numpy as np
 import scipy
 
 from models.arrays import FloatArray, Snapshot
-from models.catenary.definition import line_definition, track_definition
+from models.catenary.definition import line_definition, section_definition, track_definition
+from models.catenary.definition.condition_definition import Irregularity
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_set import dropper_set
@@ -31,6 +32,8 @@ from models.numerics.user_cache import keep_arrays, kept_arrays
 
 #: What of a static state is kept; its shape, its droppers and their matrices follow.
 _KEPT: Final = ("displacement", "dropper_force", "unstrained_length", "arm_force", "elastic_force")
+#: Modules of the definition whose rules a form follows.
+_DEFINING: Final = (line_definition, section_definition, track_definition)
 #: What libraries of linear algebra choose their code by, and with it how they round.
 _CHOICES: Final = ("OPENBLAS_CORETYPE", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -56,6 +59,10 @@ def kept_form(definition: CatenaryDefinition, mesh: CatenaryMesh) -> StaticState
 
 def _state(definition: CatenaryDefinition, mesh: CatenaryMesh, kept: Mapping[str, FloatArray]) -> StaticState:
     points = kept["points"]
+    # Arms that pushed stand on the other side since.
+    ends = mesh.points.copy()
+    ends[mesh.arms[:, 0], 1] = points[mesh.arms[:, 0], 1]
+    mesh = replace(mesh, points=ends)
     positions = points + kept["displacement"].reshape(-1, NODE_DOFS)[:, :3]
     return StaticState(
         shape=line_shape(definition, mesh, points),
@@ -80,12 +87,16 @@ def _key(definition: CatenaryDefinition, mesh: CatenaryMesh) -> str:
     """Return a hash of definition, mesh, code, libraries and processor; empty where the code cannot be read."""
     whole = hashlib.sha256()
     try:
-        for path in (*sorted(Path(__file__).parent.glob("*.py")), *map(_source, (line_definition, track_definition))):
+        for path in (
+            *sorted(Path(__file__).parent.glob("*.py")),
+            *map(_source, (line_definition, section_definition, track_definition)),
+        ):
             whole.update(path.read_bytes())
     except OSError:
         return ""
     whole.update("\0".join((sys.version, np.__version__, scipy.__version__, *_processor())).encode())
-    whole.update(repr(definition).encode())
+    # Errors and faults come after the form: all samples of them share one.
+    whole.update(repr(replace(definition, irregularity=Irregularity(), fault=())).encode())
     for field in fields(mesh):
         value = getattr(mesh, field.name)
         for array in (value,) if isinstance(value, np.ndarray) else (chain.nodes for chain in value):

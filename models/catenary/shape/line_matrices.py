@@ -61,10 +61,14 @@ class Matrices:
 
 
 def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamProperties:
-    """Return the properties of every beam element by its component type."""
+    """Return the properties of every beam element by its component type, and by what its wire has become."""
     table = np.array([_component(definition, name) for name in COMPONENTS])
     properties = BeamProperties(*table[mesh.component].T.copy())
     properties.tension[:] *= mesh.tension_factor
+    for value in (properties.EA, properties.mass, properties.gyration):
+        value[:] *= mesh.area_factor
+    for value in (properties.EI, properties.GJ):
+        value[:] *= mesh.area_factor**2
     if definition.stitch_wire is not None:
         # Balance along the track at the clamps: the messenger wire between them lacks what the stitch wire pulls.
         properties.tension[mesh.beside_stitch] -= definition.stitch_wire.tension

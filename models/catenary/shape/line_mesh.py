@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from models.arrays import BoolArray, FloatArray, IntArray
-from models.catenary.definition.line_definition import COMPONENTS, CatenaryDefinition, Section, Span
+from models.catenary.definition.line_definition import COMPONENTS, CatenaryDefinition
+from models.catenary.definition.section_definition import Section, Span
 from models.catenary.shape.support_places import SupportPlaces
 
 #: Positions closer than this coincide [m].
@@ -67,6 +68,9 @@ class CatenaryMesh:
         Height of the supports' seats, where an elastic one is unloaded [m].
     tension_factor : ndarray, shape (n_beams,)
         Tension of a beam element over that of the definition.
+    area_factor : ndarray, shape (n_beams,)
+        Cross-section of a beam element over that of the definition, as of a worn wire: mass goes with it, bending
+        stiffness with its square.
     clamp_mass : ndarray, shape (n,)
         Lumped mass [kg].
     support_nodes : ndarray, shape (n_supports,)
@@ -96,6 +100,7 @@ class CatenaryMesh:
     sprung: IntArray
     seat: FloatArray
     tension_factor: FloatArray
+    area_factor: FloatArray
     clamp_mass: FloatArray
     support_nodes: IntArray
     arms: IntArray
@@ -183,13 +188,30 @@ class _Wire:
         self.draft.chains.append((self.component, self.section, self.nodes))
 
 
-def build_mesh(definition: CatenaryDefinition) -> CatenaryMesh:
-    """Return the mesh of a line, the contact wire at its specified profile, the other wires at a first guess."""
+def build_mesh(definition: CatenaryDefinition, marks: Mapping[int, Sequence[float]] | None = None) -> CatenaryMesh:
+    """Return the mesh of a line, the contact wire at its specified profile, the other wires at a first guess.
+
+    Parameters
+    ----------
+    marks : mapping of int to sequence of float, optional
+        Section from 0 -> places where its contact wire has a node besides those at supports and droppers [m].
+    """
     draft = _Draft()
     for index, section in enumerate(definition.sections):
         draft.current = index
-        _SectionMesher(definition, section, index, draft).build()
+        _SectionMesher(definition, section, index, draft).build((marks or {}).get(index, ()))
     return _numbered(draft)
+
+
+def stitch_clamps(definition: CatenaryDefinition, section: Section) -> list[tuple[float, float]]:
+    """Return the ends of the stitch wires of a section, one at every registered support [m]."""
+    stitch = definition.stitch_wire
+    if stitch is None:
+        return []
+    half = stitch.length / 2.0
+    first, last = section.ends.working
+    inner = [s.x for s in section.supports[1:-1] if first <= s.x <= last]
+    return [(x - half, x + half) for x in inner]
 
 
 def contact_wire_height(places: SupportPlaces, x: float) -> float:
@@ -234,9 +256,9 @@ class _SectionMesher:
         self.lengths = _given_lengths((s.droppers, s.dropper_lengths) for s in section.spans)
         self.hanger_lengths = _given_lengths((s.hangers, s.hanger_lengths) for s in section.spans)
 
-    def build(self) -> None:
-        contact = self._wire("contact_wire", [*self.boundaries, *self.droppers], self._contact_height)
-        clamps = self._stitch_clamps()
+    def build(self, marks: Sequence[float]) -> None:
+        contact = self._wire("contact_wire", [*self.boundaries, *self.droppers, *marks], self._contact_height)
+        clamps = stitch_clamps(self.definition, self.section)
         hung = [x for x in self.droppers if not _inside(x, clamps)] if clamps else self.droppers
         on_messenger = self.hangers if self.definition.auxiliary_wire is not None else hung
         ends = [x for pair in clamps for x in pair]
@@ -321,16 +343,6 @@ class _SectionMesher:
                 self.draft.arms.append((end, node))
                 self.draft.mass[node] += self.definition.clamps.steady_arm
 
-    def _stitch_clamps(self) -> list[tuple[float, float]]:
-        """Return the ends of the stitch wires, one at every registered support."""
-        stitch = self.definition.stitch_wire
-        if stitch is None:
-            return []
-        half = stitch.length / 2.0
-        first, last = self.section.ends.working
-        inner = [s.x for s in self.section.supports[1:-1] if first <= s.x <= last]
-        return [(x - half, x + half) for x in inner]
-
     def _stitches(self, messenger: _Wire, clamps: Sequence[tuple[float, float]]) -> list[tuple[_Wire, list[float]]]:
         result = []
         for start, end in clamps:
@@ -407,6 +419,7 @@ def _numbered(draft: _Draft) -> CatenaryMesh:
         sprung=new[np.array(draft.sprung, dtype=np.int64)],
         seat=points[np.array(draft.sprung, dtype=np.int64), 2],
         tension_factor=np.ones(len(draft.beams)),
+        area_factor=np.ones(len(draft.beams)),
         clamp_mass=np.array(draft.mass)[order],
         support_nodes=new[np.array(draft.supports, dtype=np.int64)],
         arms=new[np.array(draft.arms, dtype=np.int64).reshape(-1, 2)],

@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition, Section, Support
+from models.catenary.definition.line_definition import GRAVITY, CatenaryDefinition
+from models.catenary.definition.section_definition import Section, Support
 from models.catenary.shape.track import curve_force, track_at, twist_jumps
 from models.numerics.gauss_points import gauss_points
 

@@ -15,7 +15,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.contact_and_slack.contact_wire import ContactWire
 from models.catenary.contact_and_slack.local_problem import LocalProblem
-from models.catenary.definition.line_definition import Span
+from models.catenary.definition.section_definition import Span
 from models.catenary.line_model import CatenaryModel
 from models.catenary.linear_motion.attachment_solver import factorised
 from models.catenary.linear_motion.compliance import Compliance

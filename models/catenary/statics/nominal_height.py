@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import CatenaryDefinition, Section
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Section
 from models.catenary.shape.line_mesh import contact_wire_height
 from models.catenary.shape.support_places import SupportPlaces
 

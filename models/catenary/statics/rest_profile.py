@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import BoolArray, FloatArray
-from models.catenary.definition.line_definition import Span
+from models.catenary.definition.section_definition import Span
 from models.catenary.line_model import CatenaryModel
 
 

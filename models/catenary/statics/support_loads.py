@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.definition.line_definition import Section
+from models.catenary.definition.section_definition import Section
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.line_mesh import contact_wire_height
 from models.catenary.shape.support_places import SupportPlaces
@@ -71,6 +71,8 @@ def support_loads(model: CatenaryModel, section: int = 0) -> SupportLoads:
 
 def _gradients(x: FloatArray, height: FloatArray, section: Section) -> FloatArray:
     """Return the gradient from every support to the next one; NaN where the wires rise to their anchors."""
+    if not len(x):
+        return x.copy()
     if section.periodic:
         return (np.roll(height, -1) - height) / np.diff(np.append(x, x[0] + section.period))
     first, last = section.ends.working

@@ -107,7 +107,8 @@ def _changed(work, of_contacts):
         work.slack[j] = work.pull[j] < 0.0
         count += work.slack[j]
     slack, forces, k = np.empty(count, dtype=np.int64), np.empty(n + count), 0
-    forces[:n] = of_contacts
+    for i in range(n):
+        forces[i] = of_contacts[i]
     for j in range(work.pull.size):
         if work.slack[j]:
             slack[k], forces[n + k] = j, work.lacks[j]

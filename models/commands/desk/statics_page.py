@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from models.catenary.definition.line_definition import CatenaryDefinition, Span
+from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.section_definition import Span
 from models.catenary.shape.track import track_at
 from models.catenary.statics.rest_profile import Droppers
 from models.commands import route_plots, statics_plots, temperature_report, wind_report
@@ -105,9 +106,15 @@ def conditions(definition: CatenaryDefinition, section: int) -> Iterator[tuple[s
     if definition.track is not None:
         yield "track", _track(definition, section)
     e = definition.irregularity
-    if e.dropper_length_sigma or e.support_height_sigma:
-        sigma = f"{1e3 * e.dropper_length_sigma:g} mm in droppers, {1e3 * e.support_height_sigma:g} mm in supports"
-        yield "errors of assembly", f"sigma {sigma}, seed {e.seed}"
+    sigmas = {
+        "dropper lengths": e.dropper_length_sigma,
+        "dropper places": e.dropper_position_sigma,
+        "support heights": e.support_height_sigma,
+        "stagger": e.stagger_sigma,
+    }
+    if any(sigmas.values()):
+        sigma = ", ".join(f"{name} {1e3 * value:g} mm" for name, value in sigmas.items() if value)
+        yield "errors of assembly, sigma", f"{sigma}; seed {e.seed}"
     if count := sum(fault.active for fault in definition.fault):
         yield "faults that act", str(count)
 
@@ -118,20 +125,20 @@ def _track(definition: CatenaryDefinition, section: int) -> str:
     along = track_at(track, np.linspace(spans[0].start, spans[-1].end, 2001))
     tightest = float(np.abs(along.curvature).max())
     cant = float(np.abs(np.sin(along.cant)).max() * track.base)
-    return f"smallest radius {1.0 / tightest:.0f} m, largest cant {1e3 * cant:.0f} mm" if tightest else (
-        f"straight, largest cant {1e3 * cant:.0f} mm"
-    )  # fmt: skip
+    course = f"smallest radius {1.0 / tightest:.0f} m" if tightest else "straight"
+    return f"{course}, largest cant {1e3 * cant:.0f} mm" if cant else f"{course}, without cant"
 
 
 def _figures(result: LineStatics) -> Part:
     e, w, d = result.elasticity, result.waves, result.span_droppers
+    hung = "droppers and hangers" if d.is_hanger.any() else "droppers"
     body = [
         markup.tiles([
             (f"elasticity at {e.force:g} N, least", f"{1e3 * e.minimum:.3f}", "mm/N"),
             (f"elasticity at {e.force:g} N, greatest", f"{1e3 * e.maximum:.3f}", "mm/N"),
             ("non-uniformity u", f"{100.0 * e.non_uniformity:.1f}", "%"),
-            ("droppers, shortest", f"{1e3 * d.length.min():.0f}" if len(d.length) else NOTHING, "mm"),
-            ("droppers, longest", f"{1e3 * d.length.max():.0f}" if len(d.length) else NOTHING, "mm"),
+            (f"{hung}, shortest", f"{1e3 * d.length.min():.0f}" if len(d.length) else NOTHING, "mm"),
+            (f"{hung}, longest", f"{1e3 * d.length.max():.0f}" if len(d.length) else NOTHING, "mm"),
             ("wave speed C", f"{3.6 * w.speed:.0f}", "km/h"),
             ("limit of operation 0.7 C", f"{3.6 * w.limit:.0f}", "km/h"),
             ("reflection factor r", f"{w.reflection:.3f}", ""),
@@ -161,13 +168,15 @@ def _supports(result: LineStatics) -> Iterator[str]:
     s = result.supports
     if not len(s.x):
         return
+    names = [support.structure for support in result.model.definition.sections[result.section].inner_supports]
     heads = ("support", "x [m]", "height [m]", "encumbrance [m]", "stagger [mm]", "arm", "lateral [N]", "lift [N]",
              "N [N]", "N/l [N/m]", "gradient [\u2030]", "change [\u2030]")  # fmt: skip
     rows = [
         (
-            str(k + 1), f"{s.x[k]:.2f}", f"{s.height[k]:.3f}", f"{s.encumbrance[k]:.3f}", f"{1e3 * s.stagger[k]:.0f}",
-            _SIDES.get(float(s.side[k]), NOTHING), _cell(s.lateral[k], 0), _cell(s.lift[k], 0),
-            _cell(s.tension[k], 0), _cell(s.pendulum[k], 0), _cell(1e3 * s.gradient[k], 2), _cell(1e3 * s.change[k], 2),
+            names[k] or str(k + 1), f"{s.x[k]:.2f}", f"{s.height[k]:.3f}", f"{s.encumbrance[k]:.3f}",
+            f"{1e3 * s.stagger[k]:.0f}", _SIDES.get(float(s.side[k]), NOTHING), _cell(s.lateral[k], 0),
+            _cell(s.lift[k], 0), _cell(s.tension[k], 0), _cell(s.pendulum[k], 0), _cell(1e3 * s.gradient[k], 2),
+            _cell(1e3 * s.change[k], 2),
         )
         for k in range(len(s.x))
     ]  # fmt: skip
@@ -259,6 +268,14 @@ def _wind(wind: LineInWind | None) -> Iterator[str]:
         "Offset: largest distance of the contact wire from the middle of the track, wind from either side, found with "
         "the mesh; beside it that of the contact wire as a string between its supports."
     )
+    f = wind.found
+    if f.lift.size:
+        rows = [
+            (f"{x:.2f}", _cell(1e3 * left, 1), _cell(1e3 * right, 1))
+            for x, (left, right) in zip(f.arm_x.tolist(), f.lift.tolist(), strict=True)
+        ]
+        yield "<h3>How far the contact wire rises at the arms</h3>"
+        yield markup.table(("x [m]", "wind to the left [mm]", "wind to the right [mm]"), rows, leading=0)
 
 
 def _droppers(result: LineStatics) -> Iterator[str]:

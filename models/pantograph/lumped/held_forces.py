@@ -75,8 +75,28 @@ class HeldForces:
         work, lifting : float
             Work that they take [J]; mean force, in the step, that they lift the roof with [N].
         """
-        rows, free = self.rows.tolist(), self._relative(motion, roof)
-        give = [self._given(transition, port) for port in self._ports]
+        force = self.forces(self._relative(motion, roof), [self._given(transition, port) for port in self._ports])
+        n = len(motion) // 3
+        for (upper, lower), value in zip(self._ports, force, strict=True):
+            motion -= value * _load_column(transition, n, upper, lower)
+        places = [x for x, _ in self._relative(motion, roof)]
+        moved = np.array(places) - self.rows[:, PLACE]
+        mean = 0.5 * (self.rows[:, FORCE] + np.array(force))
+        lifting = sum(f for f, (_, lower) in zip(mean.tolist(), self._ports, strict=True) if lower < 0)
+        self.rows[:, FORCE], self.rows[:, PLACE] = force, places
+        return float(mean @ moved), lifting
+
+    def forces(self, free: list[tuple[float, float]], give: list[list[tuple[float, float]]]) -> list[float]:
+        """Return the forces at the end of a step [N]; the state stays as it is.
+
+        Parameters
+        ----------
+        free : list of (float, float)
+            Displacement and velocity against each other, without the forces, of what each joins [m, m/s].
+        give : list of lists
+            By how much these fall per force of every element.
+        """
+        rows = self.rows.tolist()
         force = [row[FORCE] for row in rows]
         for _ in range(_SWEEPS):
             change = 0.0
@@ -90,15 +110,7 @@ class HeldForces:
                 change, force[k] = max(change, abs(new - force[k])), new
             if change <= _SETTLED:
                 break
-        n = len(motion) // 3
-        for (upper, lower), value in zip(self._ports, force, strict=True):
-            motion -= value * _load_column(transition, n, upper, lower)
-        places = [x for x, _ in self._relative(motion, roof)]
-        moved = np.array(places) - self.rows[:, PLACE]
-        mean = 0.5 * (self.rows[:, FORCE] + np.array(force))
-        lifting = sum(f for f, (_, lower) in zip(mean.tolist(), self._ports, strict=True) if lower < 0)
-        self.rows[:, FORCE], self.rows[:, PLACE] = force, places
-        return float(mean @ moved), lifting
+        return force
 
     @property
     def stored(self) -> float:

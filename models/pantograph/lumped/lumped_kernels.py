@@ -32,7 +32,11 @@ Constants = namedtuple(
     ),
 )
 
+#: What is called from Python, and what by other kernels alone: nothing is made for Python then, which takes long.
 _compiled = njit(cache=True, error_model="numpy")
+_part = njit(  # type: ignore[call-overload]
+    error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
 
 
 @_compiled
@@ -84,7 +88,8 @@ def step(
     for k in range(1, count + 1):
         end = time + k * h
         height, velocity = base[0] + k * h * base[1], base[1]
-        values[rows:] = own[:n]
+        for i in range(n):
+            values[rows + i] = own[i]
         uplift = c.balance + (c.static_force - c.balance) * raised(end - began, c.raise_start, c.raise_duration)
         values[rows] += uplift + (c.stiffness * height + c.damping * velocity)
         before = values[0] - roof
@@ -98,20 +103,21 @@ def step(
             result[i] = total
         if len(own) > n:
             hold(own[n:].reshape(-1, _WIDTH), transition, result, height, velocity)
-        values[:rows] = result
+        for i in range(rows):
+            values[i] = result[i]
         reference += following[3] * (values[0] - height)
         roof = height
     place(values, way[2], way[3], c.reference_height, n, outputs)
     return reference
 
 
-@_compiled
+@_part
 def constants_of(array):
     """Return the constants as a tuple."""
     return array[0], array[1], array[2], array[3], array[4], array[5], array[6], array[7]
 
 
-@_compiled
+@_part
 def hold(table, transition, motion, z, vz):
     """Let stops and friction act in a step; see `held_forces.HeldForces.act`."""
     count, n = len(table), len(motion) // 3
@@ -146,7 +152,7 @@ def hold(table, transition, motion, z, vz):
         table[k, _HELD], table[k, _HELD + 1] = force[k], free[k, 0]
 
 
-@_compiled
+@_part
 def relative(row, motion, z, vz, out):
     """Write displacement and velocity against each other of what a force joins."""
     upper, lower = int(row[0]), int(row[1])
@@ -155,7 +161,7 @@ def relative(row, motion, z, vz, out):
     out[0], out[1] = motion[3 * upper] - z, motion[3 * upper + 1] - vz
 
 
-@_compiled
+@_part
 def held(row, x, v, give, give_rate):
     """Return the force of friction, sticking or at its limit, or of a stop; see `held_forces`."""
     stiffness, second = row[3], row[4]
@@ -169,7 +175,7 @@ def held(row, x, v, give, give_rate):
     return row[6] * max(0.0, min(force, beyond / give))
 
 
-@_compiled
+@_part
 def place(values, x, speed, reference_height, n, outputs):
     """Write where the ends of the strip are and what is observed of the masses."""
     for side in range(0, 12, 6):
@@ -181,7 +187,7 @@ def place(values, x, speed, reference_height, n, outputs):
         outputs[13 + i], outputs[14 + i] = values[i + 1], values[i + 2]
 
 
-@_compiled
+@_part
 def raised(time, start, duration):
     """Return the share of the uplift that acts; see `Operation.raised`."""
     if time < start:
@@ -191,7 +197,7 @@ def raised(time, start, duration):
     return min(1.0, (time - start) / duration)
 
 
-@_compiled
+@_part
 def receive(known, time, force, x, expected, speed, step):
     """Take a force for a step that begins at ``time``; see `ForceExtrapolation.receive_at`."""
     travel = speed * step
@@ -206,7 +212,7 @@ def receive(known, time, force, x, expected, speed, step):
     known[_KNOWN] = min(known[_KNOWN] + 1.0, 3.0)
 
 
-@_compiled
+@_part
 def at(known, order, time):
     """Return the force at ``time``; see `ForceExtrapolation.at`."""
     t0, t1, t2 = known[_TIME], known[_TIME + 1], known[_TIME + 2]

@@ -116,6 +116,13 @@ class LumpedModel:
         result: FloatArray = self._effective(step)[1][:, -1]
         return result
 
+    def compliances(self, step: float) -> tuple[FloatArray, float]:
+        """Return the displacements within a step per force on every mass, shape (n, n) [m/N], and the velocity that
+        belongs to a displacement besides [1/s].
+        """
+        newmark, inverse = self._effective(step)
+        return inverse, newmark.a1
+
     def velocity_of(self, state: LumpedState, step: float, displacement: FloatArray) -> FloatArray:
         """Return the velocity that belongs to a new displacement, shape (n,)."""
         return np.array(self._rates(state, step, displacement)[0])

@@ -155,7 +155,7 @@ class Mechanism:
         self.forces.compile(self.pool)
         strip = definition.strip
         self.strip_body = self.numbers[strip.body] if strip is not None else -1
-        self._strip_point = np.array([0.0, definition.strip_offset, strip.height if strip is not None else 0.0])
+        self.strip_point = np.array([0.0, definition.strip_offset, strip.height if strip is not None else 0.0])
         self._strip_halves = np.array([[0.0, 0.5, 0.0], [0.0, -0.5, 0.0]]) * definition.strip_length
 
     def _list_rows(self, A: FloatArray) -> None:
@@ -188,6 +188,15 @@ class Mechanism:
         self._base_rest = np.concatenate([part.ravel() for part in rest])
         self._base_z = np.arange(d) * 3 + 2
         self._base_vz = 7 * d + self._base_z
+
+    def body_table(self) -> FloatArray:
+        """Return roots of inverse mass and inertia, inertia, mass and weight of every body, shape (n, 9)."""
+        columns = (self._root_mass, self._root_inertia, self.inertia, self.mass, self._weights[:, 2])
+        return np.column_stack(columns)
+
+    def base_table(self) -> FloatArray:
+        """Return positions and Euler parameters of the bodies of prescribed motion at rest, shape (d, 7)."""
+        return np.concatenate([self._written, self._written_p], axis=1)[: self.driven]
 
     def written_state(self) -> FloatArray:
         """Return the state of the definition: bodies where it says, at rest."""
@@ -280,7 +289,7 @@ class Mechanism:
             Rotation matrix of the strip's body, if it is known.
         """
         A = self._strip_frame(y)[:3] if frame is None else frame
-        centre = A @ self._strip_point
+        centre = A @ self.strip_point
         along = (inputs.lateral - y[3 * self.strip_body + 1] - centre[1]) / A[1, 1]
         x, side, _ = (centre + along * A[:, 1]).tolist()
         return np.array([0.0, 0.0, -inputs.force, -side * inputs.force, x * inputs.force, 0.0])
@@ -506,7 +515,7 @@ class Mechanism:
         """Return the strip's ends, shape (2, 2, 3): left A and right B; position, velocity [m, m/s]."""
         if self.strip_body < 0:
             raise MechanismError(f"'{self.definition.name}' has no collector strip")
-        local = self._strip_point + self._strip_halves
+        local = self.strip_point + self._strip_halves
         s, k = self.split(y), self.strip_body
         ends = (local @ self._strip_frame(y).T).reshape(2, 2, 3)
         ends[:, 0] += s.r[k]

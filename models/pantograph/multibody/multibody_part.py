@@ -13,12 +13,14 @@ from models.pantograph.excursions import Place
 from models.pantograph.multibody.analysis.cam_design import fit_force
 from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.base_motion import BaseMotion, LateralExtrapolation, SwayMotion
+from models.pantograph.multibody.compiled.compiled_equations import compiled_equations
+from models.pantograph.multibody.compiled.mechanism_tables import unknown_to_kernels
 from models.pantograph.multibody.mechanism import Evaluation, Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_advice import mechanism_warning, working_height_warning
 from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 from models.pantograph.multibody.mechanism_energy import MechanismBalance
-from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator
+from models.pantograph.multibody.mechanism_integrator import Advance, History, Integrator, ends_of_pieces
 from models.pantograph.multibody.range_watch import RangeWatch
 from models.pantograph.multibody.reduced.reduced_motion import ReducedMotion, reduced_if_possible
 from models.pantograph.multibody.reduced.reduction import unsuitable_drive
@@ -77,6 +79,8 @@ class MultibodyPantographPart:
         self._observation = np.zeros(len(self.observed))
         self._reduced: ReducedMotion | None = None  # in what form it moves: the general one if there is none
         self._is_shown = True
+        self._ends = np.zeros((2, 2, 3))
+        self._evaluation: Evaluation | None = None  # of the general form, at the end of the last step
         self._left = ""  # why it went on in the general form
         self._built: _Built | None = None
         self._balance: MechanismBalance | None = None
@@ -123,9 +127,10 @@ class MultibodyPantographPart:
             self._reduced.begin(self._given())
             self._show_reduced()
             return
+        built.compile()
         inputs = self._inputs(0.0)
         self._y = built.mechanism.standing_on(built.standing, inputs)
-        self._remember(built.mechanism.evaluate(self._y, inputs, respond=True), inputs)
+        self._remember(built.integrator.equations.evaluate(self._y, inputs, respond=True), inputs)
         watched = self.definition.monitor_energy
         self._balance = MechanismBalance(built.mechanism, self._y) if watched else None
 
@@ -169,15 +174,14 @@ class MultibodyPantographPart:
         elapsed = self.time - self._start_time
         raising = (operation.raise_start - elapsed, operation.raise_start + operation.raise_duration - elapsed)
         kinks = (*raising, *self._train.kinks(self.time))
-        first, history = self._continuation()
+        first, history = self._continuation(0.5 * ends_of_pieces(step, kinks)[0])
         done = built.integrator.advance(self._y, self._inputs, step, self._substep, kinks, first, history)
         self._account(step, first, done)
         self._y, self._substep, self._history = done.y, done.step, done.history
-        inputs = self._inputs(step)
         self._base.finish(step)
         self._sway.finish(step)
         self.time += step
-        self._remember(done.evaluation, inputs)
+        self._remember(done.evaluation, done.inputs)
 
     def _look(self, built: _Built, force: float, point: FloatArray) -> None:
         """Note stops that are touched and ranges that are left as a step begins."""
@@ -185,12 +189,11 @@ class MultibodyPantographPart:
         if watch is None or not watch.is_due(self.time, force):
             return
         x, z = (0.5 * (self.strip.item(k) + self.strip.item(6 + k)) for k in (0, 2))
-        watch.look(
-            self._y if self._reduced is None else self._reduced.posture(self._base.now),
-            Place(self.time, x, z),
-            force,
-            point.item(2),
-        )
+        watch.look_at_contact(force, Place(self.time, x, point.item(2)))
+        if self._reduced is None:
+            watch.look(self._y, Place(self.time, x, z), force)
+        elif not self._reduced.is_free(*watch.cam_range):
+            watch.look(self._reduced.posture(self._base.now), Place(self.time, x, z), force)
         self.told += watch.told
         watch.told.clear()
 
@@ -207,7 +210,7 @@ class MultibodyPantographPart:
     def observation_values(self) -> FloatArray:
         """Return the values of ``observed``."""
         if not self._is_shown:
-            self._observe_reduced()
+            self._observe()
         return self._observation.copy()
 
     def working_height_warning(self, x: float, z: float) -> str:
@@ -227,7 +230,10 @@ class MultibodyPantographPart:
 
     def form(self) -> str:
         """Say in which form the equations of motion are solved, and why if it is the general one."""
-        return f"general form of the equations of motion: {self._left}" if self._left else self._ready().form
+        built = self._ready()
+        text = f"general form of the equations of motion: {self._left}" if self._left else built.form
+        unknown = unknown_to_kernels(built.mechanism) if self._left or built.reduced is None else ""
+        return f"{text}; without kernels, which know no {unknown}" if unknown else text
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""
@@ -259,6 +265,8 @@ class MultibodyPantographPart:
         self._history = restored_history(snapshot)
         self._is_shown = True
         self._reduced = self._restored_motion(snapshot)
+        if self._reduced is None:
+            self._ready().compile()
         went_on = self._reduced is None and self._ready().reduced is not None
         self._left = self._left or "the state that was restored is in it" if went_on else ""
         self._force.restore(snapshot)
@@ -284,6 +292,7 @@ class MultibodyPantographPart:
         if not reason:
             reason = motion.step(self._given(), step)
         if reason:
+            self._ready().compile()
             self._y = motion.cartesian(self._base.now)
             self._reduced, self._left, self._is_shown = None, f"from {self.time:.6g} s on, {reason}", True
             self._last, self._history, self._substep = None, None, self.definition.time_step
@@ -316,15 +325,21 @@ class MultibodyPantographPart:
         self._reduced.place_strip((travel.x - built.strip_x, z + built.base_height, travel.speed, vz), self.strip)
         self._is_shown = False
 
-    def _observe_reduced(self) -> None:
-        assert self._reduced is not None
-        motion, built, base = self._reduced, self._ready(), self._base
+    def _observe(self) -> None:
+        """Bring what is observed up to the state."""
+        self._is_shown = True
+        if self._reduced is not None:
+            self._observe_reduced(self._reduced)
+        elif self._evaluation is not None:
+            self._observe_general(self._evaluation)
+
+    def _observe_reduced(self, motion: ReducedMotion) -> None:
+        built, base = self._ready(), self._base
         z, vz = base.now.tolist()
         bodies = motion.bodies((z + built.base_height, vz, motion.base_acceleration))
-        held = (motion.lift[0],) if self.definition.holds_force else ()
+        held = (motion.lift[0],) if self._holds else ()
         self._observation[: bodies.size] = bodies.ravel()
         self._observation[bodies.size :] = (*self._seen(self.strip), motion.lift_value(), *held, 0.0, 0.0)
-        self._is_shown = True
 
     def _seen(self, ends: FloatArray) -> tuple[float, float, float]:
         """Return roll, roll rate, and place of the contact along the strip for its ends, shape (2, 2, 3)."""
@@ -345,25 +360,26 @@ class MultibodyPantographPart:
     def _remember(self, evaluation: Evaluation, inputs: Inputs) -> None:
         """Keep the equations of motion at the end of a step: they begin the next one."""
         self._last = LastEvaluation(evaluation.acceleration, evaluation.response, inputs)
-        self._show(evaluation)
+        self._evaluation = evaluation
+        self._show()
 
     def _account(self, step: float, first: FloatArray | None, done: Advance) -> None:
         """Add a step to the energy balance, if it is kept."""
         if self._balance is None:
             return
         if first is None:
-            first = self._ready().mechanism.evaluate(self._y.copy(), self._inputs(0.0)).rates
+            first = self._ready().integrator.equations.evaluate(self._y.copy(), self._inputs(0.0)).rates
         self._balance.add(step, (self._y, first), (done.y, done.evaluation.rates), self._inputs)
 
-    def _continuation(self) -> tuple[FloatArray | None, History | None]:
+    def _continuation(self, inside: float) -> tuple[FloatArray | None, History | None]:
         """Return the rates at the step's beginning under the inputs just received, and those before as if these had
-        acted, as far as they follow from the last inputs.
+        acted, as far as they follow from the last inputs; ``inside`` is a time in the step's first piece.
         """
-        last, inputs, history = self._last, self._inputs(0.0), self._history
+        last, inputs, history = self._last, self._inputs(0.0, inside), self._history
         if last is None or beyond_response(last.inputs) != beyond_response(inputs):
             return None, None
-        mechanism = self._ready().mechanism
-        first, change = mechanism.with_inputs(self._y, last.acceleration, last.response, last.inputs, inputs)
+        equations = self._ready().integrator.equations
+        first, change = equations.with_inputs(self._y, last.acceleration, last.response, last.inputs, inputs)
         if history is not None:
             history = History(history.step, history.middle + change, history.begin + change)
         return first, history
@@ -383,13 +399,16 @@ class MultibodyPantographPart:
         else:
             self._lateral.start(time, float(point[1]))
 
-    def _inputs(self, tau: float) -> Inputs:
-        """Return what acts ``tau`` [s] after the beginning of the step."""
+    def _inputs(self, tau: float, inside: float | None = None) -> Inputs:
+        """Return what acts ``tau`` [s] after the beginning of the step, in the piece that another time lies in."""
         built, drive, time = self._ready(), self._drive, self.time + tau
+        within = time if inside is None else self.time + inside
         force = self._force.at(time)
-        _, speed, pull = self._train.at(time)
-        lift, uplift = self._lift(time), self.definition.aerodynamic_force(drive.air, speed) + drive.uplift
-        if self.definition.holds_force:
+        _, speed, pull = self._train.at(time, within)
+        lift, uplift = self._lift(time, within), drive.uplift
+        if self._is_blown:
+            uplift = self.definition.aerodynamic_force(drive.air, speed) + uplift
+        if self._holds:
             lift, uplift = lift + uplift, 0.0
         driven = drive.lift if self.definition.lift_input else None
         against = speed - drive.air if built.mechanism.forces.air.count else 0.0
@@ -416,28 +435,32 @@ class MultibodyPantographPart:
             built = self._ready()
             fit_force(built.mechanism, built.reference)
 
-    def _lift(self, time: float) -> float:
+    def _lift(self, time: float, within: float) -> float:
         built = self._ready()
-        share = self.definition.raised(time - self._start_time)
-        return built.balance + share * (self.definition.lift - built.balance)
+        jumps = self.definition.raise_duration == 0.0
+        share = self.definition.raised((within if jumps else time) - self._start_time)
+        return built.balance + share * (self._lifted - built.balance)
 
-    def _show(self, evaluation: Evaluation) -> None:
-        """Bring strip and observations up to the state."""
-        built = self._ready()
-        mechanism, operation = built.mechanism, self.definition
-        ends = mechanism.strip_ends(self._y)
-        travel = self._train.at(self.time)
-        self.strip[...] = ends
+    def _show(self) -> None:
+        """Bring the strip up to the state; what is observed waits until somebody asks."""
+        built, travel = self._ready(), self._train.at(self.time)
+        self._ends = built.integrator.equations.strip_ends(self._y)
+        self.strip[...] = self._ends
         self.strip[:, 0, 0] += travel.x - built.strip_x
         self.strip[:, 0, 2] += built.base_height
         self.strip[:, 1, 0] += travel.speed
+        self._is_shown = False
+
+    def _observe_general(self, evaluation: Evaluation) -> None:
+        built = self._ready()
+        mechanism = built.mechanism
         s, free = mechanism.split(self._y), slice(mechanism.driven, None)
         bodies = np.stack([s.r[free, 2] + built.base_height, s.v[free, 2], evaluation.acceleration[free, 2]], axis=1)
         values = evaluation.constraints
         acting = self._inputs(0.0) if self._last is None else self._last.inputs
-        held = (mechanism.held_force(self._y, acting),) if operation.holds_force else ()
+        held = (mechanism.held_force(self._y, acting),) if self._holds else ()
         own = (
-            *self._seen(ends),
+            *self._seen(self._ends),
             mechanism.lift_value(self._y, acting),
             *held,
             np.abs(values.violation).max(initial=0.0),
@@ -463,6 +486,14 @@ class _Built:
         self.watch = RangeWatch.over(self.mechanism, self.standing, self.base_height)
         self.reduced, self.form = reduced_if_possible(self.mechanism, self.standing)
         self.strip_x = float(self.mechanism.strip_ends(self.standing)[:, 0, 0].mean())
+        self._is_compiled = False
+
+    def compile(self) -> None:
+        """Have the general form in kernels, if there are any."""
+        if not self._is_compiled:
+            self._is_compiled = True
+            compiled = compiled_equations(self.mechanism, self.standing)
+            self.integrator.equations = compiled or self.integrator.equations
 
 
 def _observed(definition: MechanismDefinition) -> tuple[tuple[str, str, str], ...]:

@@ -39,6 +39,8 @@ class RangeWatch:
         See `Excursions`.
     lowest, highest : float
         Heights of the strip above the rails that the range leads to, infinite where there is no end [m].
+    cam_range : (float, float)
+        Places of the lifting element that its cam's table is for, infinite without a cam [rad or m].
     """
 
     def __init__(self, mechanism: Mechanism, standing: FloatArray, base_height: float) -> None:
@@ -51,6 +53,9 @@ class RangeWatch:
             _height_at(mechanism, standing, place, side) for place, side in zip(ends, (-1, 1), strict=True)
         )
         self.lowest, self.highest = (base_height + h for h in heights)
+        cam = mechanism.forces.cam
+        first, last = (-math.inf, math.inf) if cam is None else cam.per_lift.range
+        self.cam_range = first - _OUTSIDE, last + _OUTSIDE
         self._next = -math.inf
         self._has_met = False
 
@@ -74,10 +79,13 @@ class RangeWatch:
         self._next = time + _EVERY
         return True
 
-    def look(self, y: FloatArray, place: Place, force: float, contact_height: float) -> None:
-        """Look at a state, shape (13 n,), with the strip at a place, under a contact force [N] at a height [m]."""
+    def look_at_contact(self, force: float, place: Place) -> None:
+        """Look at a contact force [N] and its place."""
+        self._excursions.check_contact(force, place, self.lowest, self.highest)
+
+    def look(self, y: FloatArray, place: Place, force: float) -> None:
+        """Look at a state, shape (13 n,), with the strip at a place, under a contact force [N]."""
         frames = self._frames(y)
-        self._excursions.check_contact(force, place._replace(z=contact_height), self.lowest, self.highest)
         stops = [*self._angle_stops(frames), *self._bump_stops(y, frames)]
         holds = self._mechanism.definition.holds_force
         self._excursions.touch(stops, place, has_met=self._has_met, is_loaded=force > 0.0, is_neutral=holds)
@@ -114,7 +122,7 @@ class RangeWatch:
             return
         now = where.of(frames) if isinstance(where, BodyAngle) else where.at(self._mechanism.kinematics(y))
         first, last = cam.per_lift.range
-        if first - _OUTSIDE <= now <= last + _OUTSIDE or not self._excursions.is_new("cam", place.time):
+        if self.cam_range[0] <= now <= self.cam_range[1] or not self._excursions.is_new("cam", place.time):
             return
         lifting = self._mechanism.definition.lifting
         assert lifting is not None

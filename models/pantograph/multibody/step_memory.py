@@ -21,7 +21,7 @@ class LastEvaluation(NamedTuple):
 
     def snapshot(self) -> Snapshot:
         """Return all of it."""
-        inputs = np.array(_flat(self.inputs))
+        inputs = np.array(flat_inputs(self.inputs))
         return {"last.acceleration": self.acceleration, "last.response": self.response, "last.inputs": inputs}
 
     @classmethod
@@ -39,15 +39,15 @@ def beyond_response(inputs: Inputs) -> tuple[object, ...]:
     return (*inputs.base[:2], inputs.lift, *inputs[4:])
 
 
-def _flat(inputs: Inputs) -> list[float]:
-    """Return the inputs as numbers, with a 0 before what there is none of and a 1 before what there is."""
+def flat_inputs(inputs: Inputs) -> list[float]:
+    """Return the inputs as 21 numbers, with a 0 before what there is none of and a 1 before what there is."""
     sway = [0.0] * 10 if inputs.sway is None else [1.0, *(value for motion in inputs.sway for value in motion)]
     driven = [0.0, 0.0] if inputs.driven_lift is None else [1.0, inputs.driven_lift]
     return [*inputs.base, *inputs[1:5], inputs.pull, inputs.against, *driven, *sway]
 
 
 def _unflattened(values: list[float]) -> Inputs:
-    """Return the inputs that `_flat` was given."""
+    """Return the inputs that `flat_inputs` was given."""
     z, vz, az, lift, force, lateral, uplift, pull, against, is_driven, driven, sways, *moving = values
     y, roll, yaw = ((moving[k], moving[k + 1], moving[k + 2]) for k in (0, 3, 6))
     sway = Sway(y, roll, yaw) if sways else None

@@ -13,7 +13,9 @@ import pytest
 
 from fmus.__main__ import main
 from fmus.builder.fmu_build import build
-from fmus.builder.recipe import REPOSITORY, BuildError
+from fmus.builder.recipe import REPOSITORY, BuildError, recipe
+from models.library.search_path import LIBRARY
+from tests.effort import rest
 from tests.fmus.support import Instance, toy_recipe, toy_variant
 
 _BUILD_ELSEWHERE = """
@@ -35,7 +37,7 @@ print(json.dumps([float(result["mass[2].z"][-1]), ours]))
 """
 
 
-@pytest.mark.parametrize("seed", ["1", "77"])
+@pytest.mark.parametrize("seed", ["77", *rest("1")])
 def test_same_bytes_from_another_folder_process_and_hash_seed(toy_fmu, tmp_path, seed):
     subprocess.run(
         [sys.executable, "-c", _BUILD_ELSEWHERE, str(REPOSITORY), str(tmp_path / "out")],
@@ -134,3 +136,12 @@ def test_a_reader_that_has_had_enough_is_no_error():
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, cwd=REPOSITORY, text=True, check=False)
     os.close(writer)
     assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_a_pantograph_that_cannot_stand_as_it_says_is_not_built(tmp_path):
+    text = (LIBRARY / "pantographs" / "generic_multibody_cam.toml").read_text(encoding="utf-8")
+    own = tmp_path / "folded.toml"
+    own.write_text(text.replace("\nbase_height", '\nstart_height = [4.4, "m", "test"]\nbase_height'), encoding="utf-8")
+    told = r"folded\.toml: start_height = 4\.4 m is beyond the stop 'arm_stops': .* goes from 4\.456 to 6\.224 m"
+    with pytest.raises(BuildError, match=told):
+        build(recipe(str(own)), tmp_path)

@@ -11,6 +11,7 @@ import pytest
 
 from fmus.builder.recipe import PYTHONFMU, REPOSITORY
 from fmus.loader.pythonfmu_repair import repaired
+from tests.effort import rest
 
 LIBRARY = PYTHONFMU / "resources" / "binaries" / "linux64" / "libpythonfmu-export.so"
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the repair is one of the Linux library")
@@ -54,7 +55,7 @@ def test_an_fmu_carries_the_repaired_library(toy_fmu):
 
 
 @linux
-@pytest.mark.parametrize("ending", ["free", "keep"])
+@pytest.mark.parametrize("ending", ["keep", *rest("free")])
 def test_a_process_ends_cleanly_with_instances_freed_or_kept(toy_fmu, tmp_path, ending):
     environment = {**os.environ, "PYTHONMALLOC": "malloc", "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", _END, str(toy_fmu), str(REPOSITORY), ending]

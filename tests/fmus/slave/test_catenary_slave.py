@@ -156,7 +156,10 @@ def test_fast_modes_can_be_left_out(short, tmp_path):
 FAULTS = "".join(
     f'\n[[fault]]\nkind = "{kind}"\nspan = 3\ndropper = {dropper}\nactive = 0\n{value}'
     for kind, dropper, value in (("dropper_broken", 3, ""), ("dropper_slipped", 5, 'value = [20, "mm", "test"]\n'))
-)
+) + (
+    '\n[[fault]]\nkind = "arm_loose"\nsupport = 2\nactive = 0\n'
+    '\n[[fault]]\nkind = "hard_point"\nposition = [120.3, "m", "test"]\nvalue = [5, "kg", "test"]\nactive = 0\n'
+)  # fmt: skip
 
 
 def test_one_fmu_serves_all_samples_of_errors_and_faults(tmp_path, tmp_path_factory):
@@ -164,12 +167,14 @@ def test_one_fmu_serves_all_samples_of_errors_and_faults(tmp_path, tmp_path_fact
     made_for = short_line_recipe(tmp_path, more=FAULTS)
     fmu = build(made_for, tmp_path_factory.mktemp("fmu"))
     errors = {"irregularity.dropper_length_sigma": 0.01, "irregularity.support_height_sigma": 0.005}
+    errors |= {"irregularity.dropper_position_sigma": 0.05, "irregularity.stagger_sigma": 0.01}
     samples: list[dict[str, float]] = [
         {},
         errors | {"irregularity.seed": 1},
         errors | {"irregularity.seed": 2},
         {"fault[1].active": 1},
         {"fault[2].active": 1, "fault[2].value": 0.03},
+        {"fault[3].active": 1, "fault[4].active": 1, "fault[4].value": 8.0},
     ]
     found = []
     for values in samples:
@@ -180,11 +185,12 @@ def test_one_fmu_serves_all_samples_of_errors_and_faults(tmp_path, tmp_path_fact
             instance.get([f"dropper[{j}].{name}" for j in numbers]) for name in ("length", "lower.z", "force")
         )
         assert lengths == part.geometry.dropper_length.tolist()
+        assert instance.get([f"dropper[{j}].x" for j in numbers]) == part.geometry.dropper_x.tolist()
         assert heights == part.geometry.dropper_lower_z.tolist()
         assert forces == pytest.approx(part.model.static.dropper_force.tolist(), abs=1e-9)
         found.append((lengths, heights, forces))
         instance.free()
-    healthy, one, other, broken, slipped = found
+    healthy, one, other, broken, slipped, loaded = found
     plain = CatenaryPart(load(short_line_recipe(tmp_path).definition))
     assert healthy[1] == plain.geometry.dropper_lower_z.tolist(), "inactive faults change no digit"
     assert one[0] != other[0]
@@ -193,6 +199,8 @@ def test_one_fmu_serves_all_samples_of_errors_and_faults(tmp_path, tmp_path_fact
     assert broken[2][third] == 0.0
     assert broken[1][third] < healthy[1][third] - 0.005
     assert slipped[0][fifth] == pytest.approx(healthy[0][fifth] + 0.03, abs=1e-12)
+    assert loaded[0] == healthy[0], "no fault changes the lengths of the design"
+    assert min(np.array(loaded[1]) - healthy[1]) < -0.01
 
 
 def _strip(n):

@@ -21,12 +21,9 @@ from tests.effort import some
 from tests.fmus.support import Instance, names_of, run
 
 READY = [name for name in known_names() if "Catenary" not in name or find_spec("models.catenary.line_part")]
-#: Those that are run in every run of the suite: one of every kind of line and of pantograph.
+#: Those that are tried in every run of the suite: one of every kind of line and of pantograph.
 STARTED = (
-    "Catenary_AC_curve",
     "Catenary_AC_mixed",
-    "Catenary_LN2",
-    "Catenary_LN2_overlap",
     "Catenary_LN2_ring",
     "Catenary_Re330",
     "Catenary_Shinkansen",
@@ -42,7 +39,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return cache(lambda name: build(recipe(name), folder))
 
 
-@pytest.fixture(scope="module", params=READY)
+@pytest.fixture(scope="module", params=some(READY, *STARTED))
 def fmu(request: pytest.FixtureRequest, built: Callable[[str], Path]) -> Path:
     return built(request.param)
 

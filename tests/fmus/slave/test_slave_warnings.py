@@ -9,6 +9,7 @@ from fmus.builder.recipe import recipe
 from models.catenary.line_advice import slack_warning
 from models.catenary.line_part import CatenaryPart
 from models.library.catalogue import line_names, load_line
+from tests.effort import some
 from tests.fmus.support import Instance, refused, short_line_recipe
 
 SPEEDS = [f"pantograph[1].{end}.vx" for end in "AB"]
@@ -116,7 +117,7 @@ def test_a_wire_at_another_working_height(instantiate, pantographs, name, z, exp
     assert all("at the wire's, 5.30 m, " in text for text in pantograph.warnings)
 
 
-@pytest.mark.parametrize("name", line_names())
+@pytest.mark.parametrize("name", some(line_names(), "EN50318_2002", "LN2_overlap", "Re330", "Shinkansen"))
 def test_no_dropper_of_the_library_is_slack_at_rest(name):
     part = CatenaryPart(load_line(name))
     assert slack_warning(part.droppers, part.model.static.is_slack) == ""

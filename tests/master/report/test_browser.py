@@ -9,6 +9,7 @@ import pytest
 from master.report import html_markup
 from master.report.comparison_page import comparison_page
 from master.report.run_page import page
+from tests.effort import rest
 
 BROWSER = next((b for b in ("chromium", "chromium-browser", "google-chrome") if shutil.which(b)), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH: pages cannot be tried out")
@@ -40,10 +41,15 @@ def page_of_run(made_up, tmp_path):
     return path
 
 
+#: Colour schemes by the number that the browser has for them.
+DARK, LIGHT = 0, 1
+
+
 @needs_browser
 @pytest.mark.slow
-@pytest.mark.parametrize("size", ["1280,900", "420,900"])
-@pytest.mark.parametrize("scheme", [0, 1], ids=["dark", "light"])
+@pytest.mark.parametrize(
+    ("scheme", "size"), [(DARK, "1280,900"), (LIGHT, "420,900"), *rest((DARK, "420,900"), (LIGHT, "1280,900"))]
+)
 def test_every_chart_and_the_moving_picture_are_drawn(page_of_run, tmp_path, size, scheme):
     look = (f"--window-size={size}", f"--blink-settings=preferredColorScheme={scheme}")
     dom, said = look_at(page_of_run, tmp_path / "profile", *look)

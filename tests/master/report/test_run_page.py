@@ -14,6 +14,7 @@ from master.report.charts.interactive_figure import interactive_figure
 from master.report.charts.run_charts import run_charts
 from master.report.result_tables import figure_rows
 from master.report.run_inputs import inputs_of, quality_rows
+from master.report.run_title import run_title
 from master.results.run_results import Results
 from master.system.contacts import Contact
 
@@ -44,6 +45,23 @@ def test_the_page_bears_the_names_of_scenario_line_and_pantograph(made_up):
     assert "<b>Faiveley &lt;CX&gt;</b>" in text
     assert "<th class='n'>Faiveley &lt;CX&gt;</th>" in text
     assert "pantograph-catenary interaction</h1>" in run_page.page(run)
+
+
+def test_a_train_whose_speed_changes_has_no_old_speed_in_its_heading(made_up):
+    run = made_up()
+    fast = run.recordings[0]
+    titled = dataclasses.replace(run, summary={**run.summary, "title": "CX on LN2 at 216 km/h"})
+    assert "<h1>CX on LN2 at 216 km/h</h1>" in run_page.page(titled)
+    values = fast.values.copy()
+    for k, name in enumerate(fast.names):
+        if name.endswith(".x"):
+            values[:, k] += 2.5 * fast.time**2  # 216 km/h, and 5 m/s2 for 2 s: 252 km/h in the end
+    braking = dataclasses.replace(titled, recordings=(dataclasses.replace(fast, values=values), *run.recordings[1:]))
+    assert "<h1>CX on LN2, changing speed, 217 to 251 km/h</h1>" in run_page.page(braking)
+    for inputs, how in (([], "speed profile"), ([{"name": "use_train", "value": 1}], "speed as inputs say")):
+        component = {"name": "pantograph", "fmu": "P.fmu", "inputs": inputs}
+        told = dataclasses.replace(braking, summary={**braking.summary, "components": [component]})
+        assert f"CX on LN2, {how}, 217 to 251 km/h" in run_title(told)
 
 
 def test_text_is_escaped_and_incompleteness_is_said_first(made_up):

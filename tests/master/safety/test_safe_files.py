@@ -25,6 +25,7 @@ from master.results import results_folder, run_results
 from master.safety import safe_files
 from master.safety.safe_files import AppendOnlyFile, write_atomically
 from tests import forked_commands
+from tests.effort import rest
 
 ROOT = Path(__file__).parents[3]
 SERIES = ("timeseries.csv", "timeseries_5ms.csv")
@@ -69,7 +70,7 @@ def finish(toy, folder, *options):
     return go(toy, folder, *options)
 
 
-@pytest.mark.parametrize("every", ["0.002", "0.1"])
+@pytest.mark.parametrize("every", ["0.002", *rest("0.1")])
 def test_a_run_killed_again_and_again_ends_like_one_that_was_not(toy, tmp_path, every):
     """With a checkpoint every other step, most kills come while one is being written."""
     chance = random.Random(every)

@@ -31,7 +31,7 @@ def system(*connected, **values):
         (("train.x", "train.vx"), {"use_train": "1"}),
         (("lift.value",), {"lift_input": "1"}),
         (("reference.vz",), {"follow_height": "1"}),
-        ((), {"follow_height": "1"}),
+        ((), {"follow_height": "1", "speed": "40"}),
         ((), {"lift_input": "1", "lift.value": "1100"}),
     ],
 )
@@ -49,6 +49,12 @@ def test_nothing_is_said_where_both_fit(connected, values):
             ("train.vx",),
             {"use_train": "1"},
             "train.use_train = 1, but nothing is connected to train.x: it stands still",
+        ),
+        (
+            ("train.x", "train.vx"),
+            {"use_train": "1", "speed": "40"},
+            "train.speed is set, but does nothing while use_train is 1: "
+            "the inputs train.x and train.vx say where it is",
         ),
         ((), {"lift_input": "1"}, "train.lift_input = 1, but nothing is connected to lift.value: nothing lifts it"),
     ],

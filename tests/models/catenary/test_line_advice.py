@@ -20,6 +20,7 @@ from models.catenary.line_advice import (
 from models.catenary.line_part import CatenaryPart
 from models.catenary.statics.wire_waves import contact_wire_wave_speed, wave_speed
 from models.commands.physics_main import main
+from tests.models.conftest import make_fault
 
 
 def test_the_speed_is_compared_with_the_waves_of_the_longest_span(ln2):
@@ -136,6 +137,19 @@ def test_waves_that_steps_pass_over_are_warned_of(ln2):
     assert surface_warning(line.with_values({"running_surface.to": 1.4}), 300.0 / 3.6, 1e-3) == ""
     assert surface_warning(line.with_values({"running_surface.sigma": 0.0}), 300.0 / 3.6, 1e-3) == ""
     assert surface_warning(ln2, 300.0 / 3.6, 1e-3) == ""
+
+
+def test_a_bump_that_steps_pass_over_is_told_if_it_acts(ln2):
+    bump = make_fault("hard_point", position=500.0, value=0.0, height=-1e-3, length=0.6)
+    said = [surface_warning(dataclasses.replace(ln2, fault=(f,)), 300.0 / 3.6, 1e-3) for f in (bump, replaced(bump))]
+    assert said[0].startswith(
+        "a hard point has a bump of 0.6 m, and steps of 1 ms at 300 km/h follow none below 0.67 m"
+    )
+    assert said[1] == ""
+
+
+def replaced(fault):
+    return dataclasses.replace(fault, active=0)
 
 
 @pytest.mark.parametrize(("length", "is_short"), [(0.4, True), (1.0, False)])

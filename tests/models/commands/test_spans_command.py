@@ -60,6 +60,11 @@ def test_the_limit_of_a_head_is_kept(said):
     [
         (("spans", "LN2", "--wind", "104.4", "--limit", "0.5"), "--wind 104.4: no wind is stronger than 100 m/s"),
         (("statics", "LN2", "--pressure", "1e6"), "--pressure 1e+06: no wind is stronger than 50000 Pa"),
+        (("spans", "LN2", "--limit", "400"), "limit 400 m: no wire may be as far from the middle of the track"),
+        (("statics", "LN2", "--set", "pantograph.m=3"), "--set pantograph.m=3: there is no pantograph here"),
+        (("spans", "LN2", "--limit", "1", "--set", "pantograph.m=3"), "there is no pantograph here"),
+        (("pantograph", "CX", "--set", "line.m=3"), "--set line.m=3: there is no line here"),
+        (("statics", "LN2", "--speed", "3e5"), "speed 300000 km/h is faster than any train"),
         (("statics", "LN2", "--temperature", "293"), "--temperature 293: is outside -100 ... 200 degC"),
     ],
 )

@@ -4,8 +4,11 @@ import csv
 
 import pytest
 
+from models import statics
 from models.commands.physics_main import main
 from models.commands.physics_options import shown_progress
+from models.commands.statics_command import summary
+from models.interface.line_and_pantograph import Line
 from tests.models.commands.conftest import ROUTE
 
 
@@ -49,6 +52,14 @@ def test_the_summary_can_be_read_whatever_a_bridge_is_called(statics_folder):
     with (statics_folder / "summary.csv").open() as file:
         names = [row["quantity"] for row in csv.DictReader(file)]
     assert "clearance under <b>A-4</b> & 'x' $a_b$, at rest [m]" in names
+
+
+def test_a_span_without_droppers_has_no_figures_of_them(section_maker, sections_maker):
+    section = section_maker(0.0, 4, [0.2, -0.2, 0.2])
+    section["spans"]["listed"] = [{"span": 2, "positions": [[], "m", "test"]}]
+    rows = dict(summary(statics(Line(sections_maker(section)), span=2)))
+    assert "contact wire, highest and lowest [m]" in rows
+    assert not [what for what in rows if what.startswith("dropper ")]
 
 
 def test_progress_is_for_terminals(capsys):

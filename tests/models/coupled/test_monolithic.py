@@ -1,5 +1,7 @@
 """The monolithic coupling against one assembled system, and the co-simulation of the parts against it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -8,10 +10,12 @@ from scipy.sparse.linalg import splu, spsolve
 from models.catenary.line_model import CatenaryModel
 from models.catenary.line_part import CatenaryPart
 from models.commands.physics_main import main
+from models.coupled.held_coupling import HeldCoupling
 from models.coupled.monolithic import CoupledModel
 from models.numerics.newmark import Newmark
 from models.pantograph.lumped.lumped_model import LumpedModel
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
+from tests.effort import rest
 from tests.models.nodal_line import NodalLine
 
 START, STOP = 60.0, 1.2
@@ -89,7 +93,7 @@ def test_coupling_by_local_response_equals_one_assembled_system(line, pantograph
     assert np.abs(record.contact_force[1:, 0] - expected).max() < 1e-5
 
 
-def _cosimulate(line, pantograph, H, scheme, order):
+def _cosimulate(line, pantograph, H, scheme, order, stop=STOP):
     settings = {"extrapolation_order": order, "time_step": H}
     catenary = CatenaryPart(line.with_values(settings))
     lumped = LumpedPantographPart(pantograph.with_values(settings))
@@ -97,7 +101,7 @@ def _cosimulate(line, pantograph, H, scheme, order):
     lumped.initialise(0.0, 0.0, np.zeros(3), base)
     catenary.initialise(0.0, lumped.strip[None])
     forces = []
-    for _ in range(round(STOP / H)):
+    for _ in range(round(stop / H)):
         force, point, strip = catenary.contact_force[0], catenary.contact_point[0].copy(), lumped.strip.copy()
         if scheme == "pantograph first":
             lumped.step(force, point, base, H)
@@ -119,12 +123,30 @@ def _difference(line, pantograph, H, scheme, order):
     return np.abs(force - record.contact_force[1:, 0])[settled].max()
 
 
-@pytest.mark.parametrize("scheme", ["jacobi", "catenary first", "pantograph first"])
+@pytest.mark.parametrize("scheme", ["jacobi", "catenary first", *rest("pantograph first")])
 def test_difference_from_the_monolithic_run_shrinks_with_the_step(line, pantograph, scheme):
     """Held inputs between the tools, continued inside: second order with linear, third with quadratic inputs."""
     for order, expected in ((1, 1.7), (2, 2.5)):
         coarse, fine = (_difference(line, pantograph, H, scheme, order) for H in (2e-3, 1e-3))
         assert np.log2(coarse / fine) > expected
+
+
+def test_stops_and_friction_are_those_of_the_parts(line, pantograph, monkeypatch):
+    """Their laws hold in the step of the whole, too: the same force in the limit of short steps, by the same order."""
+    stages = tuple(replace(s, friction=f) for s, f in zip(pantograph.stage, (10.0, 5.0, 5.0), strict=True))
+    reference = pantograph.reference_height
+    held = replace(pantograph, stage=stages, highest_height=reference + 0.02, lowest_height=reference - 0.03)
+    fixed, fix = [], HeldCoupling.fix
+    monkeypatch.setattr(HeldCoupling, "fix", lambda own: (fixed.append(own), fix(own)))
+    differences = []
+    for step in (2e-3, 1e-3):
+        record = CoupledModel(CatenaryModel(line), [held]).run(0.7, step)
+        force = _cosimulate(line, held, step, "jacobi", 2, 0.7)
+        differences.append(np.abs(force - record.contact_force[1:, 0])[record.time[1:] > 0.4].max())
+    assert not fixed
+    assert record.strip_height.max() > reference + 0.01
+    assert differences[1] < 0.2
+    assert np.log2(differences[0] / differences[1]) > 2.0
 
 
 def test_quadratic_inputs_beat_linear_and_held_ones(line, pantograph):

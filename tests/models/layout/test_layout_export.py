@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from models.catenary.definition.line_reading import read
-from models.catenary.shape.form_finding import find_form
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.commands.physics_main import main
 from models.definition_files.toml_reader import Table
 from models.layout.definition_draft import toml_text
 from models.layout.layout_export import csv_text, export_line
 from models.layout.layout_import import import_layout
+from models.layout.sheet_problems import LayoutError
 from models.layout.xlsx_sheets import workbook_bytes
 from models.library.catalogue import line_names, line_path
+from tests.effort import some
 
 SOURCE = "test"
 
@@ -111,7 +113,7 @@ def returned(folder, exported, *, as_workbook=False):
 
 def difference(exported, line) -> float:
     """Return by how much two lines at rest differ in shape [m]."""
-    state = find_form(line.definition, build_mesh(line.definition))
+    state = kept_form(line.definition, build_mesh(line.definition))
     return float(np.abs(state.positions - exported.state.positions).max())
 
 
@@ -136,8 +138,7 @@ def test_a_line_comes_back_from_its_layout(tmp_path, kind):
     assert (back.track, back.fault) == (design.track, design.fault)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", line_names())
+@pytest.mark.parametrize("name", some(line_names(), "EN50318_2002"))
 def test_every_line_of_the_library_comes_back(tmp_path, name):
     exported = export_line(line_path(name))
     assert difference(exported, returned(tmp_path, exported)) < 1e-7
@@ -149,6 +150,19 @@ def test_a_workbook_is_the_same_layout(tmp_path):
     tables, book = returned(tmp_path, exported), returned(tmp_path, exported, as_workbook=True)
     assert book.definition.sections == tables.definition.sections
     assert book.text.replace("layout.xlsx", "layout") == tables.text
+
+
+@pytest.mark.parametrize("as_workbook", [False, True])
+def test_text_that_looks_like_a_formula_stays_text(tmp_path, as_workbook):
+    if as_workbook:
+        pytest.importorskip("openpyxl")
+    names = ["'=1+1", "-12"]
+    data = short("EN50318_2002", 3, title="=SUM(A1)", supports={"structure": ["a", *names[:2], "b"]})
+    exported = export_line(written(tmp_path, data))
+    assert as_workbook or not [line for line in csv_text(exported.sheets["line"]).splitlines() if ",=" in line]
+    line = returned(tmp_path, exported, as_workbook=as_workbook)
+    assert [s.structure for s in line.definition.sections[0].supports] == ["a", *names[:2], "b"]
+    assert line.definition.title == "=SUM(A1)"
 
 
 def test_values_name_file_sheet_and_row_as_their_source(tmp_path):
@@ -169,7 +183,7 @@ def test_lengths_are_those_of_form_finding_in_mm(tmp_path):
     with (tmp_path / "out" / "droppers.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     line = read(Table.load(path))
-    state = find_form(line, build_mesh(line))
+    state = kept_form(line, build_mesh(line))
     assert [float(row["length [mm]"]) for row in rows] == pytest.approx(1e3 * state.unstrained_length, abs=1e-4)
     assert [(row["span"], row["dropper"]) for row in rows][6:8] == [("1", "7"), ("2", "1")]
 
@@ -180,6 +194,19 @@ def test_what_a_layout_cannot_say_is_told(tmp_path):
     exported = export_line(written(tmp_path, data))
     assert [note.split(": ")[1] for note in exported.notes] == ["[measured] is not in the layout"]
     assert difference(exported, returned(tmp_path, exported)) < 1e-6
+
+
+def test_a_surface_lies_beside_the_definition(tmp_path):
+    (tmp_path / "wear.csv").write_text("position [m],height [mm]\n0,0\n90,-0.1\n180,0\n")
+    exported = export_line(written(tmp_path, short("EN50318_2002", 3, running_surface={"profile": "wear.csv"})))
+    assert [note.split(": ")[1] for note in exported.notes] == ["wear.csv is named in the layout and no part of it"]
+    folder = tmp_path / "layout"
+    folder.mkdir()
+    for name, rows in exported.sheets.items():
+        (folder / f"{name}.csv").write_text(csv_text(rows))
+    assert import_layout(folder, "back", out=tmp_path / "back.toml").definition.running_surface.profile == "wear.csv"
+    with pytest.raises(LayoutError, match=r"line, row \d+, column B \(value\): wear.csv"):
+        import_layout(folder, "back", out=folder / "back.toml")
 
 
 def test_a_design_gives_what_the_layout_does_not(tmp_path):

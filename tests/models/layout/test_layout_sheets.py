@@ -76,6 +76,13 @@ def test_files_are_found_whatever_their_letters_case(tmp_path):
     assert [p.text[:22] for p in problems.found] == ["stands in two files, s"]
 
 
+def test_a_folder_with_a_workbook_in_it_is_told_to_name_that(tmp_path):
+    (tmp_path / "survey.xlsx").write_bytes(b"")
+    (tmp_path / "poles.csv").write_text("a")
+    with pytest.raises(LayoutError, match=r"is no layout: .*; it has 'poles'; if survey\.xlsx is one, name that file"):
+        read_layout(tmp_path, SheetProblems("here"))
+
+
 def test_a_link_to_a_layout_is_one_and_a_broken_link_is_told(tmp_path):
     folder = tmp_path / "layout"
     folder.mkdir()

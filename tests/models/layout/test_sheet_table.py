@@ -57,6 +57,13 @@ def test_tables_as_programs_of_any_country_write_them(tmp_path, text):
     assert table.texts("structure") == ("", "")
 
 
+def test_a_name_with_a_point_says_nothing_of_decimal_commas(tmp_path):
+    table, problems = read(tmp_path, "position [km];height;structure\n1,250;5,08;12.5\n")
+    assert problems == []
+    assert table.numbers("position") == [1250.0]
+    assert table.texts("structure") == ("12.5",)
+
+
 def test_values_know_where_they_stand(tmp_path):
     table, _ = read(tmp_path, "# first\nkind;position;structure;height;angle [°]\n\nAnchor;0;17;5;180\n;1;M 2;5;\n")
     assert table.rows == (4, 5)
@@ -258,6 +265,13 @@ def test_without_openpyxl_a_sentence_says_what_to_do(tmp_path, monkeypatch):
     assert str(problems.found[0]).startswith("book.xlsx: needs openpyxl, which is not installed: pip install")
     with pytest.raises(LayoutError, match="needs openpyxl"):
         workbook_bytes({})
+
+
+def test_a_workbook_that_is_too_large(openpyxl, tmp_path, monkeypatch):
+    monkeypatch.setattr("models.layout.xlsx_sheets._LARGEST", 3000)
+    _, problems = book(openpyxl, tmp_path, [["position", "height"], [1, 5]])
+    assert len(problems) == 1
+    assert "MB are read at most: split it" in problems[0]
 
 
 def test_a_written_workbook_is_read_back(openpyxl, tmp_path):

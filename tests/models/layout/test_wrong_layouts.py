@@ -40,6 +40,7 @@ damping.alpha;1e-4;s;a norm
 damping.beta;0,0125;1/s;a norm
 clamps.dropper_lower;0.165;kg;choice: as LN2
 """
+WIRES = WIRES.replace("contact_wire", "Contact wire")
 BASE = {"supports": SUPPORTS, "droppers": DROPPERS, "wires": WIRES, "line": LINE}
 
 
@@ -230,8 +231,8 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
          ("supports, row 5, column F (stagger)", "is empty: every support needs a value")],
     ),
     "an arm without an angle, an anchor with one": (
-        change("supports", "1.2;-10", "1.2;", "1.4;0;;", "1.4;0;;-10"),
-        [("supports, row 2, column H (arm_angle)", "anchor has no steady arm: empty the cell"),
+        change("supports", "1.2;-10", "1.2;", "1.4;0;;", "1.4;0;1.2;-9"),
+        [("supports, row 2, column H (arm_angle)", "anchor has no steady arm: empty the cell, or write what"),
          ("supports, row 3, column H (arm_angle)", "is empty: every support needs a value")],
     ),
     "an anchor lower than the wire": (
@@ -250,9 +251,9 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
         [("supports, row 4, column A (kind)", "'unregistered' is for supports beside an anchor: this one has arms")],
     ),
     "arms where there are none": (
-        change("supports", "structure", "kind", "M1", "unregistered", "M2", "", "M3", "", "M4", "", "A1", "", "A2", ""),
-        [("supports, row 3, column G (arm_length)", "unregistered has no steady arm: empty the cell"),
-         ("supports, row 3, column H (arm_angle)", "unregistered has no steady arm: empty the cell")],
+        change("supports", "structure", "kind", "M1", "Unregistered", "M2", "", "M3", "", "M4", "", "A1", "", "A2", "",
+               "1.2;-10", "1.3;-10"),
+        [("supports, row 3, column G (arm_length)", "unregistered has no steady arm: empty the cell")],
     ),
     "a stagger beyond the strip": (
         change("supports", "-0.2", "-200", "-0.2", "-2"),
@@ -303,6 +304,11 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
          ("wires, row 2, column C (mass)", "is missing"),
          ("wires, row 3, column C (mass)", "0 kg/m must be greater than 0")],
     ),
+    "a column of wires that lacks": (
+        change("wires", "mass;", "#mass;"),
+        [(f"wires, row {r}, column A (component)", f"'{name}.mass' is missing")
+         for r, name in enumerate(("contact_wire", "messenger_wire", "dropper", "steady_arm"), 2)],
+    ),
     "wires of another unit": (
         change("wires", "[mm2]", "[m2]"),
         [(f"wires, row {r}, column B (area)", "m2 is outside 1e-0") for r in (2, 3, 4, 5)],
@@ -310,7 +316,14 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
     "keys that are none": (
         change("line", "damping.alpha", "damping.alfa", "clamps.dropper_lower", "clamps"),
         [("line, row 2, column B (value)", "unknown key (known here: alpha, auxiliary_wire"),
-         ("line, row 4, column B (value)", "must be a table [clamps]")],
+         ("line, row 4, column A (key)", "'clamps' is a table: name a key in it, as damping.alpha is in damping")],
+    ),
+    "keys that lack": (
+        every(instead("line", "key;value;unit\ndamping.alpha;0;s\ndropper.slack_law;tension;\nmesh.a.b;1;1\n"),
+              change("wires", "dropper;12;0.11;84.7;\n", "")),
+        [("line, row 4, column A (key)", "there is no key 'mesh.a.b': a table in a table is in damping"),
+         ("line", "'damping.beta' is missing"),
+         ("wires", "there is no row 'dropper': add it, or name a line")],
     ),
     "keys that other sheets give": (
         lambda s: s.update(line=s["line"] + "profile.encumbrance;1.4;m;\nspans.start;0;m;\nwires;x;;\n"
@@ -356,7 +369,7 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
          ("droppers, row 3, column A (section)", "there is no section 'B' in the sheet supports"),
          *[(f"droppers, row {r}, column A (section)", "there is no section") for r in range(4, 17)],
          *[("droppers, row 1, column B (span)", f"span {k}") for k in range(2, 5)],
-         *[(f"supports, row 6, column {c}", "") for c in ("G (arm_length)", "H (arm_angle)", "C (span_length)")]],
+         ("supports, row 6, column C (span_length)", "no span begins at the last support: empty the cell")],
     ),
 }  # fmt: skip
 

@@ -8,6 +8,7 @@ import pytest
 from models.catenary.line_part import CatenaryPart
 from models.library.catalogue import load_line
 from models.pantograph.lumped.lumped_part import LumpedPantographPart
+from tests.effort import rest
 
 BASE, NOWHERE = np.zeros(2), np.array([[[[50.0, y, -50.0], [0.0, 0.0, 0.0]] for y in (0.7, -0.7)]])
 WATCHED = {"monitor_energy": 1}
@@ -75,8 +76,14 @@ def with_law(line, law):
     return dataclasses.replace(line, dropper=dataclasses.replace(line.dropper, slack_law=law))
 
 
-@pytest.mark.parametrize("law", ["tension", "elastic_only"])
-@pytest.mark.parametrize("damping", [(0.0272, 0.0), (0.003, 0.4)])
+@pytest.mark.parametrize(
+    ("law", "damping"),
+    [
+        ("tension", (0.0272, 0.0)),
+        ("elastic_only", (0.003, 0.4)),
+        *rest(("tension", (0.003, 0.4)), ("elastic_only", (0.0272, 0.0))),
+    ],
+)
 def test_a_line_under_a_strip_keeps_its_balance(line_maker, cx, kernel, damping, law):
     alpha, beta = damping
     table = {"alpha": [alpha, "s", "test"], "beta": [beta, "1/s", "test"]}
@@ -155,7 +162,7 @@ def test_a_pantograph_keeps_its_balance(cx):
     assert abs(drift) < 1e-10 * work
 
 
-@pytest.mark.parametrize(("order", "expected"), [(0, 0.8), (1, 1.7), (2, 2.6)])
+@pytest.mark.parametrize(("order", "expected"), [(2, 2.6), *rest((0, 0.8), (1, 1.7))])
 def test_what_the_coupling_makes_up_falls_with_the_order_of_the_extrapolation(line_maker, cx, order, expected):
     """Held inputs: first order in the step; the parts themselves are exact all the same."""
     made_up = []

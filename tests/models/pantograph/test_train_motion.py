@@ -153,6 +153,32 @@ def test_a_mechanism_keeps_to_its_profile():
     assert np.array_equal(*both)
 
 
+@pytest.mark.parametrize(("kind", "form"), [("acceleration", "general"), ("lift", "general"), ("lift", "auto")])
+def test_a_jump_within_a_step_costs_no_order(kind, form, monkeypatch):
+    """Internal steps end at the jump; up to it the acceleration (or lift) before counts, then that after it."""
+    monkeypatch.setenv(SWITCH, "numpy")
+
+    macro, jump = 2.0**-7, 2.5 * 2.0**-7  # without rounding: a time is the jump's or is not
+
+    def end(step):
+        given = replace(library("generic_multibody"), formulation=form, time_step=step, tolerance=0.1)
+        if kind == "lift":
+            jumping = replace(given, raise_start=jump, raise_duration=0.0)
+        else:
+            profile = SpeedProfile(time=(0.0, jump, 1.0), speed=(40.0, 40.0, 49.8))  # 10 m/s2
+            jumping = replace(given, speed_profile=profile)
+        part = MultibodyPantographPart(jumping)
+        part.initialise(0.0, 0.0, np.zeros(3), np.zeros(2))
+        for _ in range(5):
+            part.step(0.0, part.strip[:, 0].mean(axis=0), np.zeros(2), macro)
+        return part.state[: 3 * 8]
+
+    reference = end(macro / 16)
+    errors = [np.abs(end(step) - reference).max() for step in (macro, 0.5 * macro)]
+    assert errors[0] > 4.0 * errors[1]
+    assert errors[1] < 1e-7
+
+
 def test_a_train_that_accelerates_tilts_gravity():
     """A pendulum about y under a steady acceleration a swings as one under sqrt(g2 + a2), turned by atan(a / g)."""
     a, g = 2.5, 9.81
@@ -193,6 +219,13 @@ def table(**changes):
         "speed_profile": {"time": [[0.0, 8.0], "s", "t"], "speed": [[72.0, 108.0], "km/h", "t"]},
     }  # fmt: skip
     return Table.from_dict(data | changes)
+
+
+def test_a_speed_beside_inputs_in_its_place_is_refused():
+    given = table(speed=[40.0, "m/s", "t"], use_train=[1, "1", "t"])
+    del given.data["speed_profile"]
+    with pytest.raises(DefinitionError, match=r"speed: does nothing with use_train = 1: .*; leave out one of the two"):
+        read_lumped(given)
 
 
 def test_a_profile_is_read_in_its_units_and_takes_the_place_of_the_speed():

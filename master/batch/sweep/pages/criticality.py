@@ -1,52 +1,73 @@
-"""Which dropper matters: each of them with its fault in turn, against the line without any."""
+"""Which dropper or arm matters: each of them with its fault in turn, against the line without any."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from master.batch.sweep.pages.grid_charts import MOST_CURVES, evenly, grouped
+from master.batch.sweep.pages.span_drawing import span_drawing, with_room
 from master.batch.sweep.pages.sweep_view import Figure, SweepView, SweptColumn, values_of
 from master.batch.sweep.sweep_run import Row
 from master.report.charts.chart import Axis, Bars, Chart
 
 #: Figures that are compared, the first of them by which droppers are ranked.
-_FIGURES: Final = ("maximum", "minimum", "sigma", "uplift")
+_FIGURES: Final = ("maximum", "minimum", "sigma", "uplift", "slack droppers", "share of loss")
+#: Width of bars at supports [m].
+_WIDTH: Final = 5.0
 _ACTIVE: Final = re.compile(r"(?:.*\.)?fault\[(\d+)\]\.active")
-_PLACE: Final = re.compile(r"dropper (\d+) of span (\d+)(?: of section (\d+))? at (-?[\d.]+) m")
+#: What an FMU's description of a parameter says after its meaning, without the source of its value.
+_SAID: Final = re.compile(r"; (.+?)(?: \[.*\])?$", re.DOTALL)
+_DROPPER: Final = re.compile(r"dropper (\d+) of span (\d+)(?: of section (\d+))?")
+_ARM: Final = re.compile(r"(?:steady arm of )?support \d+(?: of section \d+)?")
+_AT: Final = re.compile(r" at (-?[\d.]+) m(?:, supports at (-?[\d.]+) and (-?[\d.]+) m)?$")
 
 
 @dataclass(frozen=True)
-class Dropper:
-    """A dropper with a fault: name, and position along the track [m], NaN if it is not known."""
+class FaultyPart:
+    """What has a fault.
+
+    Attributes
+    ----------
+    name : str
+    position : float
+        Along the track, NaN if it is not known [m].
+    span : (float, float), optional
+        Supports on both sides of a dropper [m].
+    is_support : bool
+        Whether it stands at a support.
+    """
 
     name: str
     position: float
+    span: tuple[float, float] | None = None
+    is_support: bool = False
 
 
 @dataclass(frozen=True)
 class Criticality:
-    """What the fault of each dropper changes.
+    """What the fault of each part changes.
 
     Attributes
     ----------
     circumstances : str
         Values of the other parameters, empty if there are none.
-    droppers : tuple of Dropper
+    parts : tuple of FaultyPart
     figures : tuple of Figure
     healthy : tuple of float
         The figures of the line without a fault.
-    faulty : ndarray, shape (n_droppers, n_figures)
+    faulty : ndarray, shape (n_parts, n_figures)
         The figures with each fault; NaN where a run failed.
     """
 
     circumstances: str
-    droppers: tuple[Dropper, ...]
+    parts: tuple[FaultyPart, ...]
     figures: tuple[Figure, ...]
     healthy: tuple[float, ...]
     faulty: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
@@ -68,11 +89,11 @@ def criticalities(view: SweepView, rows: Sequence[Row], others: Sequence[SweptCo
         single = [p for p in faults if (p.title,) in by_fault]
         if healthy is None or not single:
             continue
-        droppers = {p.title: _dropper(view, p) for p in single}
-        single.sort(key=lambda p: droppers[p.title].position)
+        parts = {p.title: _part(view, p) for p in single}
+        single.sort(key=lambda p: parts[p.title].position)
         faulty = [[values_of([by_fault[(p.title,)]], f.title)[0] for f in figures] for p in single]
         whole = tuple(float(values_of([healthy], f.title)[0]) for f in figures)
-        places = tuple(droppers[p.title] for p in single)
+        places = tuple(parts[p.title] for p in single)
         made.append(Criticality(circumstances, places, figures, whole, np.array(faulty)))
     return made
 
@@ -83,42 +104,73 @@ def acting_faults(row: Row, faults: Sequence[SweptColumn]) -> tuple[str, ...]:
 
 
 def acting_names(view: SweepView, row: Row) -> str:
-    """Return the names of the droppers whose faults act in a row, or a word for none."""
+    """Return the names of what has a fault that acts in a row, or a word for none."""
     faults = {p.title: p for p in fault_parameters(view)}
-    return "; ".join(_dropper(view, faults[t]).name for t in acting_faults(row, list(faults.values()))) or "none"
+    return "; ".join(_part(view, faults[t]).name for t in acting_faults(row, list(faults.values()))) or "none"
 
 
-def _dropper(view: SweepView, parameter: SweptColumn) -> Dropper:
-    match = _PLACE.search(view.places.get(parameter.name, ""))
+def _part(view: SweepView, parameter: SweptColumn) -> FaultyPart:
+    match = _SAID.search(view.places.get(parameter.name, ""))
     if match is None:
-        return Dropper(parameter.name.removesuffix(".active"), math.nan)
-    section = f"section {match[3]}, " if match[3] else ""
-    return Dropper(f"{section}span {match[2]}, dropper {match[1]}", float(match[4]))
+        return FaultyPart(parameter.name.removesuffix(".active"), math.nan)
+    said = match[1]
+    at = _AT.search(said)
+    name = said[: at.start()] if at else said
+    span = (float(at[2]), float(at[3])) if at and at[2] else None
+    if dropper := _DROPPER.fullmatch(name):
+        section = f"section {dropper[3]}, " if dropper[3] else ""
+        name = f"{section}span {dropper[2]}, dropper {dropper[1]}"
+    return FaultyPart(name, float(at[1]) if at else math.nan, span, _ARM.fullmatch(name) is not None)
 
 
 def criticality_charts(found: Sequence[Criticality], key: str) -> list[Chart]:
-    """Return for each figure how much it changes with the fault of each dropper."""
+    """Return for each figure how much it changes with the fault of each part, over a drawing of their spans."""
     drawn = evenly(found, MOST_CURVES)
     made = []
     for k, figure in enumerate(drawn[0].figures if drawn else ()):
         bars = tuple(_bars(c, k, number) for number, c in enumerate(drawn))
-        is_placed = not isinstance(bars[0].x, tuple)
-        axis = Axis("position of the dropper", "m") if is_placed else Axis("dropper")
+        if not any(np.nan_to_num(each.y).any() for each in bars):
+            continue  # what no fault changes is in the table
         change = Axis(f"change of {figure.name}", figure.unit)
-        made.append(Chart(f"{key}_{k}", f"Change of {figure.name}", axis, change, bars, height=300))
+        title = f"Change of {figure.name}"
+        if isinstance(bars[0].x, tuple):
+            made.append(Chart(f"{key}_{k}", title, Axis("fault"), change, bars, height=300))
+        else:
+            made.append(_over_spans(Chart(f"{key}_{k}", title, Axis("position", "m"), change, bars, height=340), drawn))
     return made
+
+
+def _over_spans(chart: Chart, found: Sequence[Criticality]) -> Chart:
+    """Return a chart of bars along the track with a drawing of the spans below them, where these are known."""
+    parts = [part for c in found for part in c.parts]
+    spans = sorted({part.span for part in parts if part.span is not None})
+    spans = spans or list(pairwise(sorted({part.position for part in parts if part.is_support})))
+    values = np.concatenate([np.zeros(1), *(bars.y for bars in chart.parts if isinstance(bars, Bars))])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if not spans or not high > low:
+        return chart
+    hung = np.array(sorted({part.position for part in parts if part.span is not None}))
+    margin = 0.03 * (spans[-1][1] - spans[0][0]) + (0.5 * _WIDTH if any(p.is_support for p in parts) else 0.0)
+    return replace(
+        chart,
+        x=replace(chart.x, limits=(spans[0][0] - margin, spans[-1][1] + margin)),
+        y=with_room(chart.y, low, high),
+        parts=(*chart.parts, span_drawing(hung, spans, low, high)),
+    )
 
 
 def _bars(c: Criticality, k: int, number: int) -> Bars:
     change = c.faulty[:, k] - c.healthy[k]
     words = tuple(
-        f"{d.name}: {v:+.{c.figures[k].decimals}f} {c.figures[k].unit}" for d, v in zip(c.droppers, change, strict=True)
+        f"{d.name}: {v:+.{c.figures[k].decimals}f} {c.figures[k].unit}" for d, v in zip(c.parts, change, strict=True)
     )
     name = c.circumstances or "change"
-    positions = np.array([d.position for d in c.droppers])
+    positions = np.array([d.position for d in c.parts])
     if np.isfinite(positions).all() and len(set(positions.tolist())) == len(positions):
-        return Bars(name, positions, change, number, None, words)
-    return Bars(name, tuple(d.name for d in c.droppers), change, number, None, words)
+        return Bars(
+            name, positions, change, number, _WIDTH if len(positions) == 1 or c.parts[0].is_support else None, words
+        )
+    return Bars(name, tuple(d.name for d in c.parts), change, number, None, words)
 
 
 def ranking_rows(found: Sequence[Criticality]) -> list[list[str]]:
@@ -131,7 +183,7 @@ def ranking_rows(found: Sequence[Criticality]) -> list[list[str]]:
         shown = [f.shown(v) for f, v in zip(c.figures, c.healthy, strict=True)]
         rows.append([*head, "none, the healthy line", "", *shown])
         for i in map(int, order):
-            d = c.droppers[i]
+            d = c.parts[i]
             place = f"{d.position:.2f}" if math.isfinite(d.position) else "-"
             cells = [_with_change(f, v, h) for f, v, h in zip(c.figures, c.faulty[i], c.healthy, strict=True)]
             rows.append([*head, d.name, place, *cells])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -14,13 +15,27 @@ from master.batch.sweep.pages.grid_charts import MOST_CHARTS, evenly
 from master.batch.sweep.pages.sample_statistics import QUANTILES, mean, running_mean, running_share, share
 from master.batch.sweep.pages.sweep_view import Figure, SweepView, failed_limits, is_judged, values_of
 from master.batch.sweep.sweep_run import Row
-from master.report.charts.chart import COLOURS, Axis, Bars, Chart, Curve, Envelope, Level, Part, stroke
+from master.report.charts.chart import (
+    COLOURS,
+    MARK,
+    Axis,
+    Bars,
+    Chart,
+    Curve,
+    Envelope,
+    Level,
+    Part,
+    Stroke,
+    stroke,
+)
 from master.report.charts.force_charts import TRACK
 
 #: Most groups of samples that are drawn, and that a table lists.
 MOST_DRAWN: Final = 4
 MOST_LISTED: Final = 60
 _MOST_BINS: Final = 40
+#: Height of a histogram over that of its highest bar: room for what stands at the quantiles.
+_ABOVE: Final = 1.25
 #: Most points of a running estimate.
 _MOST_STEPS: Final = 500
 #: Limits that every contact is judged by.
@@ -95,14 +110,18 @@ def _histogram(view: SweepView, figure: Figure, groups: Groups, key: str) -> Cha
         counts, _ = np.histogram(each, edges)
         shares = 100.0 * counts / len(each)
         parts.append(Bars(name or figure.name, 0.5 * (edges[1:] + edges[:-1]), shares, k))
+    share = Axis("share of samples", "%")
     if len(values) == 1:
         parts += [Level(float(q), f"{100 * p:.0f} %", is_upright=True) for p, q in _quantiles(whole)]
+        share = replace(
+            share, limits=(0.0, _ABOVE * float(max(bars.y.max() for bars in parts if isinstance(bars, Bars))))
+        )
     abscissa = Axis(figure.name, figure.unit)
     return Chart(
         key,
         figure.heading,
         abscissa,
-        Axis("share of samples", "%"),
+        share,
         tuple(parts),
         _bound_note(view, figure, groups),
         height=280,
@@ -148,20 +167,35 @@ def running_charts(view: SweepView, rows: Sequence[Row], key: str) -> list[Chart
         values = values_of(rows, f.title)
         values = values[np.isfinite(values)]
         if len(values) > 2 and np.ptp(values) > 0.0:
-            value, low, high = running_mean(values)
             spread = float(values.std(ddof=1))
             limits = (float(values.mean()) - 3.0 * spread, float(values.mean()) + 3.0 * spread)
-            title, axis = f"Mean of {f.name}", Axis(f"mean of {f.name}", f.unit, limits)
-            made.append(
-                Chart(f"{key}_{f.name}", title, number, axis, _settling(title.lower(), value, low, high), height=280)
-            )
+            title, axis = f"{f.heading} of the samples", Axis(f.name, f.unit, limits)
+            parts = (*_spread(values), *_settling("mean", *running_mean(values)))
+            made.append(Chart(f"{key}_{f.name}", title, number, axis, parts, height=300))
     return made
 
 
+def _steps(count: int) -> tuple[FloatArray, FloatArray]:
+    """Return after which of so many samples an estimate is drawn: places, and numbers of samples."""
+    kept = np.array(evenly(range(count), _MOST_STEPS))
+    return kept, kept + 1.0
+
+
+def _spread(values: FloatArray) -> tuple[Part, ...]:
+    """Return the 5, 50 and 95 % quantiles of the samples so far."""
+    kept, count = _steps(len(values))
+    low, middle, high = np.array([np.quantile(values[: k + 1], QUANTILES) for k in kept.tolist()]).T
+    return (
+        Envelope("5 to 95 % of the samples", count, low, high, MARK),
+        Curve("median", count, middle, Stroke(MARK, "dot", 1.4)),
+    )
+
+
 def _settling(name: str, value: FloatArray, low: FloatArray, high: FloatArray) -> tuple[Part, ...]:
-    kept = np.array(evenly(range(len(value)), _MOST_STEPS))
-    count, value, low, high = kept + 1.0, value[kept], low[kept], high[kept]
-    return (Envelope("95 % confidence interval", count, low, high, COLOURS[0]), Curve(name, count, value, stroke(0)))
+    kept, count = _steps(len(value))
+    value, low, high = value[kept], low[kept], high[kept]
+    interval = "95 % interval of the mean" if name == "mean" else "95 % confidence interval"
+    return (Envelope(interval, count, low, high, COLOURS[0]), Curve(name, count, value, stroke(0)))
 
 
 def band_chart(view: SweepView, band: ForceBand, title: str, key: str) -> Chart:

@@ -244,8 +244,10 @@ def _parameter_rows(view: SweepView) -> Iterator[tuple[str, str]]:
         yield p.title, f"{p.distribution}: {count}" if p.distribution else text
     names = {"samples": "samples", "seed": "seed", "method": "method of sampling", "static_force": "static force"}
     is_sampled = any(p.distribution for p in view.parameters)
-    if view.request.get("sensitivity"):
-        del names["method"]  # a design has its own
+    if view.request.get("sensitivity") or not any(p.distribution and not p.is_seed for p in view.parameters):
+        del names["method"]  # a design has its own, and seeds are counted
+    if not view.request.get("samples"):
+        del names["seed"]
     for key, name in {
         **names,
         "sensitivity": "sensitivity",

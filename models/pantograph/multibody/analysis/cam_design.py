@@ -7,7 +7,9 @@ and F M_1(theta) for a force F on the strip, M_1 being the strip's rise per thet
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -26,6 +28,13 @@ _STEP: Final = {True: np.radians(1.0), False: 0.005}
 _STAGE: Final = 0.1
 #: Rise of the strip per angle below which the arms are at a dead centre [m/rad]; per length [1].
 _DEAD: Final = 0.05
+#: The same, in units of where the pantograph stands, above which they are near the other dead centre, where the lifting
+#: element stops and turns back while the strip still rises: what it must give grows without limit there.
+_STEEP: Final = 4.0
+#: Force by which a cam may be off half-way between two points [N], or one more is put there and both halves are looked
+#: at, each some sixteen times closer; and how often.
+_CLOSE: Final = 0.1
+_ROUNDS: Final = 6
 #: Force for which M_1 is found if none is set [N].
 _USUAL_FORCE: Final = 100.0
 
@@ -71,9 +80,9 @@ def working_range(mechanism: Mechanism, standing: FloatArray) -> tuple[float, fl
     """
     lowest, highest = _stops(mechanism)
     if lowest is None:
-        lowest, _ = reach(mechanism, standing, -1.0)
+        lowest, _ = reach(mechanism, standing, -1.0, _STEEP)
     if highest is None:
-        highest, _ = reach(mechanism, standing, 1.0)
+        highest, _ = reach(mechanism, standing, 1.0, _STEEP)
     if not lowest < highest:
         raise MechanismError(f"{mechanism.definition.name}: the lifting element has no range to work over")
     return lowest, highest
@@ -101,21 +110,64 @@ def _constant_force(mechanism: Mechanism, standing: FloatArray) -> Cam:
     places = np.linspace(*working_range(mechanism, standing), _POINTS)
     set_force = abs(mechanism.definition.lift) if mechanism.definition.holds_force else 0.0
     force = set_force or _USUAL_FORCE
-    own = _lifts(mechanism, standing, places, 0.0)
-    loaded = _lifts(mechanism, standing, places, force)
+    own = _held_at(mechanism, standing, places, 0.0)
+    loaded = _held_at(mechanism, standing, places, force)
+    points = [_Point(*point) for point in zip(places.tolist(), own, loaded, strict=True)]
+    if None in _stops(mechanism):
+        points = _refined(mechanism, points, force)
+    return _cam_through(points, force)
+
+
+class _Point(NamedTuple):
+    """A place of the lifting element, and what holds the mechanism there without and with a force on the strip."""
+
+    place: float
+    own: Equilibrium
+    loaded: Equilibrium
+
+
+def _cam_through(points: Sequence[_Point], force: float) -> Cam:
+    places = np.array([p.place for p in points])
+    own, loaded = (np.array([found.lift for found in column]) for column in list(zip(*points, strict=True))[1:])
     return Cam(CubicCurve(places, own), CubicCurve(places, (loaded - own) / force))
 
 
-def _lifts(mechanism: Mechanism, standing: FloatArray, places: FloatArray, force: float) -> FloatArray:
-    """Return the lifting values that hold the mechanism at rising places, each found from its neighbour."""
+def _refined(mechanism: Mechanism, points: list[_Point], force: float) -> list[_Point]:
+    """Add points half-way between others until the force held there is right, as far as a few rounds lead.
+
+    Towards a dead centre what the lifting element gives grows without limit, or the lever vanishes by which it does.
+    """
+    missed = {p.place for p in points[:-1]}  # where pieces begin whose middle is not known to be right
+    for _ in range(_ROUNDS):
+        cam, found, wrong = _cam_through(points, force), [], set()
+        for begin, end in pairwise(points):
+            if begin.place not in missed:
+                continue
+            place = 0.5 * (begin.place + end.place)
+            own, loaded = (
+                _held(mechanism, place, e.y, f, e.lift) for e, f in ((begin.own, 0.0), (begin.loaded, force))
+            )
+            found.append(_Point(place, own, loaded))
+            if abs(cam.value(place, force) - loaded.lift) * force > _CLOSE * abs(loaded.lift - own.lift):
+                wrong |= {begin.place, place}
+        points, missed = sorted([*points, *found], key=lambda p: p.place), wrong
+        if not missed:
+            break
+    return points
+
+
+def _held_at(mechanism: Mechanism, standing: FloatArray, places: FloatArray, force: float) -> list[Equilibrium]:
+    """Return what holds the mechanism at rising places, each found from its neighbour."""
     middle = int(np.argmin(np.abs(places - _now(mechanism, standing))))
-    values = np.empty(len(places))
+    sides: list[list[Equilibrium]] = []
     for order in (range(middle, len(places)), range(middle - 1, -1, -1)):
         y, lift = standing, 0.0
+        sides.append([])
         for k in order:
             found = _held(mechanism, float(places[k]), y, force, lift)
-            y, lift, values[k] = found.y, found.lift, found.lift
-    return values
+            y, lift = found.y, found.lift
+            sides[-1].append(found)
+    return [*reversed(sides[1]), *sides[0]]
 
 
 def _held(mechanism: Mechanism, place: float, start: FloatArray, force: float, lift: float) -> Equilibrium:
@@ -140,8 +192,13 @@ def strip_height_where(mechanism: Mechanism, standing: FloatArray, place: float)
     return mechanism.strip_height(y)
 
 
-def reach(mechanism: Mechanism, standing: FloatArray, way: float) -> tuple[float, float]:
+def reach(mechanism: Mechanism, standing: FloatArray, way: float, steep: float = math.inf) -> tuple[float, float]:
     """Return the last place on a way, -1 or 1, in which statics have an answer before a stop or a dead centre.
+
+    Parameters
+    ----------
+    steep : float
+        It ends, too, where the strip's rise per place is so many times as large as at first.
 
     Returns
     -------
@@ -151,7 +208,7 @@ def reach(mechanism: Mechanism, standing: FloatArray, way: float) -> tuple[float
     step = way * _STEP[isinstance(mechanism.definition.lifting, LiftingMoment)]
     smallest = abs(step) / 128.0
     y, place, height = standing, _now(mechanism, standing), mechanism.strip_height(standing)
-    direction, stops = 0.0, _ArmStops(mechanism)
+    first, stops = 0.0, _ArmStops(mechanism)
     left = stops.touched(standing)  # it is to come away from them
     while abs(step) >= smallest:
         try:
@@ -163,8 +220,8 @@ def reach(mechanism: Mechanism, standing: FloatArray, way: float) -> tuple[float
             step *= 0.5
             continue
         slope = (found.strip_height - height) / step
-        direction = direction or float(np.sign(slope))
-        if slope * direction < _DEAD:
+        first = first or slope
+        if not _DEAD <= slope * math.copysign(1.0, first) <= steep * abs(first):
             step *= 0.5
             continue
         y, place, height = found.y, place + step, found.strip_height

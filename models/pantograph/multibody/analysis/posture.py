@@ -8,8 +8,9 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.pantograph.multibody.analysis.cam_design import reach, stand, strip_height_where, working_range
-from models.pantograph.multibody.analysis.mechanism_statics import Equilibrium, equilibrium
+from models.pantograph.multibody.analysis.mechanism_statics import Equilibrium, equilibrium, settle_springs
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
+from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 
 
 class Posture(NamedTuple):
@@ -52,6 +53,26 @@ def take_posture(mechanism: Mechanism) -> Posture:
     if definition.base_height is None and definition.start_height is None:
         base = definition.reference_height - working.strip_height
     return Posture(base, reference, working)
+
+
+def check_heights(definition: MechanismDefinition) -> str:
+    """Return why a pantograph cannot stand where its heights say, which takes no cam; empty if it can, or has none.
+
+    Only heights that the arms have to take by their angle are looked at, so that it takes a fraction of a second.
+    """
+    if definition.base_height is None and definition.start_height is None:
+        return ""
+    mechanism = Mechanism(definition)
+    try:
+        standing = settle_springs(mechanism)
+        base = definition.base_height or definition.reference_height - mechanism.strip_height(standing)
+        if definition.base_height is not None:
+            _raised_to(mechanism, standing, base, "reference_height", definition.reference_height)
+        if definition.start_height is not None:
+            _raised_to(mechanism, standing, base, "start_height", definition.start_height)
+    except (MechanismError, np.linalg.LinAlgError) as error:
+        return str(error).removeprefix(f"{definition.name}: ")
+    return ""
 
 
 def _check_stops(mechanism: Mechanism, standing: FloatArray, base: float, given: str, found: Equilibrium) -> None:

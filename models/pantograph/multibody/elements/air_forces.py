@@ -27,6 +27,10 @@ class AirForces:
         self._points = np.array([f.point for f in forces]).reshape(-1, 3, 1)
         self._per_square = np.array([[f.coefficient * d for d in f.direction] for f in forces]).reshape(-1, 3)
 
+    def table(self) -> FloatArray:
+        """Return body, point and force per square of the speed of every element, 7 numbers."""
+        return np.column_stack([self._bodies, self._points[:, :, 0], self._per_square])
+
     def add_loads(self, loads: FloatArray, frames: FloatArray, against: float) -> None:
         """Add the forces at a speed against the air [m/s] to loads of shape (n, 6); frames have shape (n, 9, 3)."""
         force = self._per_square * (abs(against) * against)

@@ -36,6 +36,10 @@ class BodyAngle:
         self._plane = np.stack([across, side], axis=1)
         self._hand = orientations[self.j].T @ orientations[self.i] @ across
 
+    def numbers(self) -> list[float]:
+        """Return the bodies, the axis, the two directions across it and what body j points with, 14 numbers."""
+        return [self.i, self.j, *self.axis, *self._plane.T.ravel(), *self._hand]
+
     def at(self, kinematics: Kinematics) -> float:
         """Return the angle [rad]."""
         return self.of(kinematics.frames)
@@ -59,6 +63,16 @@ class PointDistance:
         self._i, self._j = numbers[force.body_i], numbers[force.body_j]
         self._point_i, self._point_j = np.array(force.point_i), np.array(force.point_j)
         self._direction = None if force.direction is None else np.array(force.direction)
+
+    def numbers(self) -> list[float]:
+        """Return the bodies, the points and the direction, 0 if there is none, 11 numbers."""
+        direction = np.zeros(3) if self._direction is None else self._direction
+        return [self._i, self._j, *self._point_i, *self._point_j, *direction]
+
+    @property
+    def is_directed(self) -> bool:
+        """Whether it is along a direction."""
+        return self._direction is not None
 
     def at(self, kinematics: Kinematics) -> float:
         """Return the length [m]."""
@@ -113,6 +127,15 @@ class AngleStops:
             about = frames[angle.i, :3] @ (moment * angle.axis)
             loads[angle.j, 3:] -= about
             loads[angle.i, 3:] += about
+
+    def table(self) -> FloatArray:
+        """Return the numbers of the angle, lowest and highest one, stiffness and damping of every stop, 18 numbers."""
+        rows = []
+        for stop, angle in zip(self.stops, self.angles, strict=True):
+            lowest = -math.inf if stop.lowest is None else stop.lowest
+            highest = math.inf if stop.highest is None else stop.highest
+            rows.append([*angle.numbers(), lowest, highest, stop.stiffness, stop.damping])
+        return np.array(rows).reshape(-1, 18)
 
     def energy(self, frames: FloatArray) -> float:
         """Return the energy stored [J]."""

@@ -181,9 +181,31 @@ class ForceElements:
         value = lift if self.cam is None else self.cam.value(place, lift)
         return value if self.per_force is None else value + uplift * self.per_force.at(place)
 
+    def tables(self) -> ElementTables:
+        """Return the elements as tables, bushings untwisted as they are now."""
+        frictions = [e.numbers() for e in self._others if isinstance(e, _Friction)]
+        bushings = [e.numbers() for e in self._others if isinstance(e, _Bushing)]
+        slides = np.column_stack([self._slides.table(), self._friction, self._transition])
+        return ElementTables(
+            self.lines.table(), slides, self._moments.table(), self.stops.table(),
+            np.array(frictions).reshape(-1, 8), np.array(bushings).reshape(-1, 29), self.air.table(),
+        )  # fmt: skip
+
     def energy(self, vectors: MovingVectors) -> float:
         """Return the potential energy of springs and bump stops [J]; that of angle stops is with ``stops``."""
         return self.lines.energy(vectors)
+
+
+class ElementTables(NamedTuple):
+    """Force elements as tables, a row of numbers for each; see the ``table`` of each kind."""
+
+    lines: FloatArray
+    slides: FloatArray
+    moments: FloatArray
+    stops: FloatArray
+    frictions: FloatArray
+    bushings: FloatArray
+    air: FloatArray
 
 
 class Lengths(NamedTuple):
@@ -230,6 +252,7 @@ class _Lines:
         self._gather = np.zeros((bodies, 2 * self.count))
         self._gather[[line.start.body for line in lines], columns] = 1.0
         self._gather[[line.to.body for line in lines], self.count + columns] = -1.0
+        self._bodies = np.array([(line.start.body, line.to.body) for line in lines], dtype=np.float64).reshape(-1, 2)
 
     def _enter(self, lines: Sequence[_Line], pool: VectorPool) -> None:
         self._handles: list[tuple[Handle, Handle]] = []
@@ -246,6 +269,11 @@ class _Lines:
         """Work out where everything comes from."""
         self._x = pool.positions([x for x, _ in self._handles])
         self._d = pool.positions([d for _, d in self._handles])
+
+    def table(self) -> FloatArray:
+        """Return the entries x and d, the bodies of start and end, their cross products, and whether it is directed."""
+        turns = self._turns.reshape(2, -1).T
+        return np.column_stack([self._x, self._d, self._bodies, turns, self._turning])
 
     def lengths(self, vectors: MovingVectors) -> Lengths:
         """Return lengths and rates."""
@@ -289,6 +317,16 @@ class LineElements(_Lines):
         self._push = np.array([f.force if isinstance(f, ActuatorForce) else 0.0 for f in forces])
         self._lift = [k for k, f in enumerate(forces) if isinstance(f, LiftingForce)]
         self._stops = _Stops([f if isinstance(f, BumpStop) else None for f in forces])
+
+    def table(self) -> FloatArray:
+        """Return the numbers of a line, share of the lift, stiffness, damping, free length and push of every element,
+        then stiffness, damping, shortest and longest length of its stop, 16 numbers.
+        """
+        lifts = np.zeros(self.count)
+        lifts[self._lift] = 1.0
+        stops = self._stops
+        own = (lifts, self.stiffness, self.damping, self.free_length, self._push)
+        return np.column_stack([super().table(), *own, stops.k, stops.c, stops.shortest, stops.longest])
 
     def loads(self, vectors: MovingVectors, lift: float) -> FloatArray:
         """Return the loads of all line elements."""
@@ -347,6 +385,7 @@ class _Moments:
         self._handles = [pool.vector(Vector(numbers[f.body_i], f.axis_i)) for f in forces]
         self._values = np.array([f.moment if isinstance(f, ActuatorMoment) else 0.0 for f in forces])
         self._lift = [k for k, f in enumerate(forces) if isinstance(f, LiftingMoment)]
+        self._bodies = [(numbers[f.body_i], numbers[f.body_j]) for f in forces]
         self._gather = np.zeros((len(numbers), self.count))
         for k, f in enumerate(forces):
             self._gather[numbers[f.body_j], k] = 1.0
@@ -355,6 +394,13 @@ class _Moments:
     def compile(self, pool: VectorPool) -> None:
         """Work out where the axes come from."""
         self._axes = pool.positions(self._handles)
+
+    def table(self) -> FloatArray:
+        """Return the entry of the axis, the bodies, whether it lifts, and the moment of every element, 5 numbers."""
+        lifts = np.zeros(self.count)
+        lifts[self._lift] = 1.0
+        bodies = np.array(self._bodies, dtype=np.float64).reshape(-1, 2)
+        return np.column_stack([self._axes, bodies, lifts, self._values])
 
     def moments(self, vectors: MovingVectors, lift: float) -> FloatArray:
         """Return the moments on the bodies, shape (n, 3)."""
@@ -371,6 +417,11 @@ class _Friction:
         self._i, self._j = numbers[joint.body_i], numbers[joint.body_j]
         self._level, self._transition = force.level, force.transition
         self._axis = np.array(joint.axis_i) if isinstance(joint, Revolute) else None
+
+    def numbers(self) -> list[float]:
+        """Return bodies, level, transition, whether there is an axis, and the axis, 8 numbers."""
+        axis = np.zeros(3) if self._axis is None else self._axis
+        return [self._i, self._j, self._level, self._transition, float(self._axis is not None), *axis]
 
     def loads(self, kinematics: Kinematics, w: FloatArray) -> FloatArray:
         frames = kinematics.frames
@@ -404,6 +455,11 @@ class _Bushing:
     def untwist(self, orientations: FloatArray) -> None:
         """Take the relative orientation in which the bushing carries no moment."""
         self._rest = orientations[self._i].T @ orientations[self._j]
+
+    def numbers(self) -> list[float]:
+        """Return bodies, points, orientation at rest by rows, stiffness and damping, those of turning, 29 numbers."""
+        laws = (self._k, self._c, self._kr, self._cr)
+        return [self._i, self._j, *self._s_i, *self._s_j, *self._rest.ravel(), *np.concatenate(laws)]
 
     def loads(self, kinematics: Kinematics, w: FloatArray) -> FloatArray:
         frames, origins = kinematics.frames, kinematics.origins

@@ -213,6 +213,13 @@ class Constraints:
         self._turns = np.array(self._turn_from + self._turn_to, dtype=np.int64)
         self._at_turns = (np.concatenate([column_from, column_to])[:, None] + 3 + three).ravel()
 
+    def table(self) -> FloatArray:
+        """Return 1 of a gap and 0 of axes, the entries X and Y, the two bodies and the two cross products of every row,
+        shape (m, 7).
+        """
+        columns = (self._is_gap, self._x, self._y, self._from, self._to, self._turn_from, self._turn_to)
+        return np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])
+
     def evaluate(self, vectors: MovingVectors) -> ConstraintValues:
         """Return violations, their rates, gamma and the Jacobian."""
         x = vectors.values.take(self._x, axis=0).reshape(-1, 3, 3)

@@ -107,8 +107,18 @@ class VectorPool:
         self._template[count : self._first_gap, :3] = np.eye(3)
         a = self.positions([a for a, _ in self._crosses])
         b = self.positions([b for _, b in self._crosses])
+        self._crossed = np.stack([a, b], axis=1)
         self._a1, self._a2 = self.components(a, (1, 2, 0)), self.components(a, (2, 0, 1))
         self._b1, self._b2 = self.components(b, (1, 2, 0)), self.components(b, (2, 0, 1))
+
+    def tables(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return vectors (body, three components), gaps (numbers of two vectors), levers (number of a gap and of a
+        vector) and cross products (two entries of ``values``) as tables, a row for each.
+        """
+        vectors = np.column_stack([self._bodies, self._locals[:, :, 0]])
+        gaps = np.column_stack([self._gap_start, self._gap_to])
+        levers = np.column_stack([self._lever_gap, self._lever_start])
+        return vectors, gaps.astype(float), levers.astype(float), self._crossed.astype(float)
 
     def positions(self, handles: list[Handle]) -> IntArray:
         """Return the rows of the entries in ``values``."""

@@ -28,6 +28,13 @@ def put(target, values):
         target[i] = values[i]
 
 
+#: What is called from Python, and what by other kernels alone: nothing is made for Python then, which takes long.
+_FOR_PYTHON = ("look_up", "lift_value", "evaluate", "begin", "step", "is_free", "place_strip", "place_bodies")
+_compiled = njit(cache=True, error_model="numpy")
+_part = njit(  # type: ignore[call-overload]
+    error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
+
 for _name, _function in list(globals().items()):
     if isinstance(_function, types.FunctionType) and _function.__module__ == __name__:
-        globals()[_name] = njit(cache=True, error_model="numpy")(_function)
+        globals()[_name] = (_compiled if _name in _FOR_PYTHON else _part)(_function)

@@ -277,6 +277,7 @@ class ReducedMotion:
         self.place_strip((0.0, 0.0, 0.0, 0.0), np.zeros((2, 2, 3)))
         self.bodies((0.0, 0.0, 0.0))
         self.lift_value()
+        self.is_free(0.0, 0.0)
         self.memory = memory
 
     def _inputs(self, given: list[float]) -> Any:
@@ -297,6 +298,10 @@ class ReducedMotion:
             self.refresh()
         done = self._equations.step(self.memory, self._inputs(given), duration, self._numbers, self._settings)
         return _REASONS[done] if done else ""
+
+    def is_free(self, lowest: float, highest: float) -> bool:
+        """Return whether no stop is reached, and the lifting element is between two places [rad or m]."""
+        return bool(self._equations.is_free(self.memory[0], self._numbers, lowest, highest))
 
     def snapshot(self) -> Snapshot:
         """Return the whole state, bit for bit."""

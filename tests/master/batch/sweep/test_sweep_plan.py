@@ -1,8 +1,10 @@
 """Grids, samples and tables, together and apart; everything is checked before anything runs."""
 
+import re
+
 import pytest
 
-from master.batch.sweep.sweep_plan import SweepRequest, check_overridden, make_plan, stored_request
+from master.batch.sweep.sweep_plan import SweepRequest, check_overridden, listed_faults, make_plan, stored_request
 from master.errors import RequestError
 from master.scenario.open_scenario import open_scenario
 from master.scenario.overrides import Overrides
@@ -39,7 +41,10 @@ def test_a_table_names_its_rows_and_has_units_in_heads_or_cells(toy_system, tmp_
     [
         ({}, "nothing is varied"),
         ({"vary": {"speed": "normal(1, 1)"}}, "samples need --samples"),
-        ({"samples": 3}, "samples need --vary"),
+        (
+            {"samples": 3},
+            "--samples without --vary varies seeds, and there is none; or say with --vary what else varies",
+        ),
         ({"faults": (3,)}, "--faults: no component is a line FMU of ours"),
         ({"over": {"speed": "1,2", "pantograph.speed": "1,2"}}, "'pantograph.speed' is varied twice"),
         ({"over": {"speed": "1:1000:1", "catenary.stiffness": "1:1000:1"}}, "more than 100000"),
@@ -121,6 +126,45 @@ def test_droppers_break_one_after_the_other_the_first_run_has_none_broken(faulte
     assert {point.count("1") for point in plan.points[1:]} == {1}
     assert plan.variants[:2] == ("healthy", "catenary.fault[1].active")
     assert len(_plan(faulted, faults=(3,), over={"speed": "70,80"}).points) == 16
+
+
+def test_samples_alone_are_those_of_seeds_that_draw_something(faulted):
+    """More of them add to those that there are; another --seed shares none; each has its place in a grid beside it."""
+    grid = {"catenary.irregularity.stagger_sigma": "0,10mm"}
+    plan = _plan(faulted, over=grid, samples=3)
+    assert [p.name for p in plan.parameters] == [*grid, "catenary.irregularity.seed"]
+    assert [p[1] for p in plan.points] == ["1", "2", "3"] * 2
+    assert [p[1] for p in _plan(faulted, over=grid, samples=2, seed=3).points[:2]] == ["200001", "200002"]
+    with pytest.raises(RequestError, match=r"catenary\.irregularity\.seed: nothing is drawn while all sigmas are 0"):
+        _plan(faulted, samples=3)
+    for seed in (0, 21475):
+        with pytest.raises(RequestError, match=f"--seed {seed}: samples of seeds take one from 1 to 21474"):
+            _plan(faulted, over=grid, samples=3, seed=seed)
+    with pytest.raises(RequestError, match="there is none"):
+        _plan(faulted, over={"catenary.irregularity.seed": "1:4:1"}, samples=3)
+
+
+def test_faults_are_of_droppers_or_arms_of_spans():
+    assert listed_faults((3, 4), ()) == {"faults": (3, 4)}
+    assert listed_faults(3, ()) == {"faults": (3,)}
+    assert listed_faults("each-dropper", 3) == {"faults": (3,), "faults_of": "each-dropper"}
+    assert listed_faults("each-arm", (3, 4)) == {"faults": (3, 4), "faults_of": "each-arm"}
+    name = Overrides(faults=(3, 4), faults_of="each-arm").source("resources/Catenary_LN2_P2.fmu")
+    assert name == "resources/Catenary_LN2_P2_A3A4.fmu"
+
+
+@pytest.mark.parametrize(
+    ("faults", "span", "said"),
+    [
+        ("each-arm", (), "--faults each-arm needs --span K: of which span of the line?"),
+        ((3,), (4,), "--span is of --faults each-dropper and --faults each-arm: give one of them too"),
+        ((), 4, "--span is of --faults each-dropper"),
+        ("each-drooper", 3, "'each-drooper' is none of each-dropper, each-arm; did you mean 'each-dropper'?"),
+    ],
+)
+def test_faults_without_a_span_or_of_nothing_are_refused(faults, span, said):
+    with pytest.raises(RequestError, match=re.escape(said)):
+        listed_faults(faults, span)
 
 
 def test_faults_and_a_table_both_list_runs(faulted, tmp_path):

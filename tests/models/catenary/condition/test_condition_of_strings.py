@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.definition.condition_definition import Fault
-from models.catenary.shape.form_finding import find_form
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import load_line
+from tests.models.conftest import make_fault
 
 G, SPAN, SPANS, DX = 9.81, 49.5, 5, 0.75
 TENSION = {"contact": 20e3, "messenger": 14e3}
@@ -99,8 +99,8 @@ def line():
 
 def condition(line, fault):
     """Return what a fault of a dropper of LN2's fourteenth span does: rise of droppers and of the support before it."""
-    design = find_form(line, build_mesh(line))
-    found = find_condition(find_form(faulty := replace(line, fault=(fault,)), build_mesh(faulty)))
+    design = kept_form(line, build_mesh(line))
+    found = find_condition(kept_form(faulty := replace(line, fault=(fault,)), build_mesh(faulty)))
     lower, supports = design.shape.mesh.droppers[:, 0], design.shape.mesh.support_nodes
     rise = (found.positions - design.positions)[:, 2]
     x = design.positions[:, 0]
@@ -111,8 +111,8 @@ def condition(line, fault):
 
 
 def test_the_design_of_strings_is_that_of_the_line(strings, line):
-    design = find_form(line, build_mesh(line))
-    (*_, first) = condition(line, Fault(kind="dropper_slipped", span=14, dropper=1, value=0.0))
+    design = kept_form(line, build_mesh(line))
+    (*_, first) = condition(line, make_fault(kind="dropper_slipped", span=14, dropper=1, value=0.0))
     assert strings.length[14:21] == pytest.approx(
         design.droppers.length[first : first + 7], abs=0.005
     )  # wires bend at clamps
@@ -120,7 +120,7 @@ def test_the_design_of_strings_is_that_of_the_line(strings, line):
 
 
 def test_a_missing_first_dropper_leaves_the_support_where_strings_do(strings, line):
-    rise, support, force, first = condition(line, Fault(kind="dropper_broken", span=14, dropper=1))
+    rise, support, force, first = condition(line, make_fault(kind="dropper_broken", span=14, dropper=1))
     z, expected = strings.at_rest(missing=14)
     change = z - strings.contact
     assert change[strings.supports[2]] == pytest.approx(support, abs=0.0012)
@@ -130,7 +130,7 @@ def test_a_missing_first_dropper_leaves_the_support_where_strings_do(strings, li
 
 
 def test_a_dropper_that_is_too_long_lowers_the_line_as_it_does_strings(strings, line):
-    rise, _, force, first = condition(line, Fault(kind="dropper_slipped", span=14, dropper=4, value=0.01))
+    rise, _, force, first = condition(line, make_fault(kind="dropper_slipped", span=14, dropper=4, value=0.01))
     z, expected = strings.at_rest(longer=0.01, dropper=17)
     assert (z - strings.contact)[strings.droppers[17]] == pytest.approx(rise[first + 3], abs=0.0001)
     assert expected[16:19] == pytest.approx(force[first + 2 : first + 5], abs=1.5)

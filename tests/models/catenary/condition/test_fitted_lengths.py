@@ -7,17 +7,17 @@ import pytest
 
 from models.catenary.condition.fitted_lengths import droppers_along, find_fitted_lengths, with_errors
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.definition.condition_definition import Fault
-from models.catenary.shape.form_finding import EquilibriumError, find_form
+from models.catenary.shape.form_finding import EquilibriumError
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import load_line
-from tests.models.conftest import make_line
+from tests.models.conftest import make_fault, make_line
 
 
 @pytest.fixture(scope="module")
 def design():
     line = make_line(4)
-    return find_form(line, build_mesh(line))
+    return kept_form(line, build_mesh(line))
 
 
 def heights(state):
@@ -40,12 +40,14 @@ def test_errors_of_a_definition_are_slips_of_its_droppers(design):
     """As faults, which count droppers in their spans, name them."""
     errors = some_errors(28, 0.01)
     faults = [
-        Fault(kind="dropper_slipped", span=k // 7 + 1, dropper=k % 7 + 1, value=error) for k, error in enumerate(errors)
+        make_fault(kind="dropper_slipped", span=k // 7 + 1, dropper=k % 7 + 1, value=error)
+        for k, error in enumerate(errors)
     ]
     line = dataclasses.replace(design.shape.definition, fault=tuple(faults))
     slipped = find_condition(dataclasses.replace(design, shape=dataclasses.replace(design.shape, definition=line)))
     found = with_table(design, errors)
     assert np.abs(found.positions - slipped.positions).max() < 1e-12
+    assert found.is_slack.sum() == 0
     assert np.array_equal(found.unstrained_length, with_errors(design, errors).unstrained_length)
 
 

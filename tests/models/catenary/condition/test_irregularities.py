@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
+from models.catenary.condition.irregularities import (
+    dropper_length_errors,
+    dropper_position_errors,
+    stagger_errors,
+    support_height_errors,
+)
 from models.catenary.definition.condition_definition import Irregularity
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import load_line
@@ -19,7 +24,8 @@ def mesh():
 
 
 def made(**values):
-    return Irregularity(**({"dropper_length_sigma": 0.01, "support_height_sigma": 0.02, "seed": 4} | values))
+    sigmas = {"dropper_length": 0.01, "dropper_position": 0.03, "support_height": 0.02, "stagger": 0.04}
+    return Irregularity(**({f"{kind}_sigma": sigma for kind, sigma in sigmas.items()} | {"seed": 4} | values))
 
 
 @pytest.mark.parametrize("name", ["LN2_overlap", "Shinkansen"])
@@ -28,7 +34,9 @@ def test_numbers_are_drawn_section_by_section_along_the_track(name):
     mesh = build_mesh(load_line(name))
     for errors, nodes, stream, sigma in (
         (dropper_length_errors(made(), mesh), mesh.droppers[:, 0], 1, 0.01),
+        (dropper_position_errors(made(), mesh), mesh.droppers[:, 0], 2, 0.03),
         (support_height_errors(made(), mesh), mesh.support_nodes, 3, 0.02),
+        (stagger_errors(made(), mesh), mesh.support_nodes, 4, 0.04),
     ):
         drawn = np.clip(normal_numbers(4, stream, len(nodes)), -3.0, 3.0)
         places = [(int(mesh.section[node]), float(mesh.points[node, 0])) for node in nodes]
@@ -36,12 +44,14 @@ def test_numbers_are_drawn_section_by_section_along_the_track(name):
         assert errors[row].tolist() == (sigma * drawn).tolist()
 
 
-def test_a_kind_of_error_does_not_depend_on_another_ones_size(mesh):
-    alone = dropper_length_errors(made(support_height_sigma=0.0), mesh)
-    assert alone.tolist() == dropper_length_errors(made(), mesh).tolist()
-    assert support_height_errors(made(dropper_length_sigma=0.3), mesh).tolist() == (
-        support_height_errors(made(), mesh).tolist()
-    )
+@pytest.mark.parametrize("kind", ["dropper_length", "dropper_position", "support_height", "stagger"])
+def test_a_kind_of_error_does_not_depend_on_another_ones_size(mesh, kind):
+    errors = globals()[f"{kind}_errors"]
+    others = {f"{k}_sigma": 0.3 for k in ("dropper_length", "dropper_position", "support_height", "stagger")}
+    del others[f"{kind}_sigma"]
+    alone, small, large = (errors(made(**values), mesh) for values in (dict.fromkeys(others, 0.0), {}, others))
+    assert alone.tolist() == small.tolist() == large.tolist()
+    assert alone.any()
 
 
 def test_a_larger_sigma_scales_the_same_errors(mesh):

@@ -10,15 +10,15 @@ from scipy.sparse.linalg import spsolve
 from models.catenary.condition import line_condition
 from models.catenary.condition.irregularities import dropper_length_errors, support_height_errors
 from models.catenary.condition.line_condition import find_condition
-from models.catenary.definition.condition_definition import Fault
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.form_finding import EquilibriumError, find_form, find_rest, weight
+from models.catenary.shape.form_finding import EquilibriumError, find_rest, weight
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import line_names, load_line
-from tests.effort import count, some
+from tests.effort import count, rest, some
 from tests.models.catenary.shape.test_nonlinear_truss import limp
-from tests.models.conftest import make_line
+from tests.models.conftest import make_fault, make_line
 from tests.models.nonlinear_truss import Truss
 
 #: Span of LN2 with 49.5 m and seven droppers, 4.5 m from the supports and 6.75 m apart.
@@ -26,11 +26,11 @@ SPAN = 12
 
 
 def design_of(line):
-    return find_form(line, build_mesh(line))
+    return kept_form(line, build_mesh(line))
 
 
 def with_faults(line, *faults):
-    return dataclasses.replace(line, fault=tuple(Fault(**fault) for fault in faults))
+    return dataclasses.replace(line, fault=tuple(make_fault(**fault) for fault in faults))
 
 
 def broken(dropper, span=SPAN, **more):
@@ -71,7 +71,7 @@ def short():
     return line, design_of(line)
 
 
-@pytest.mark.parametrize("name", some(line_names(), "LN2", "LN2_ring", "Re330", "Shinkansen"))
+@pytest.mark.parametrize("name", some(line_names(), "LN2_ring", "Re330", "Shinkansen"))
 def test_the_lengths_of_the_design_give_the_design(name):
     design = design_of(load_line(name))
     mesh = dataclasses.replace(design.shape.mesh, given_length=design.unstrained_length)
@@ -102,8 +102,8 @@ def test_errors_and_faults_of_size_zero_leave_the_design(short):
 
 @pytest.mark.parametrize(
     "errors",
-    [{"dropper_length_sigma": 0.01}, {"support_height_sigma": 0.01}],
-    ids=["dropper lengths", "support heights"],
+    [{"support_height_sigma": 0.01}, *rest({"dropper_length_sigma": 0.01})],
+    ids=["support heights", "dropper lengths"],
 )
 def test_a_line_with_errors_hangs_as_a_nonlinear_truss_does(errors):
     """Every error 10 mm at one sigma; the truss has its bars cut, and its supports raised, by the same."""
@@ -197,19 +197,18 @@ def test_a_missing_dropper_has_the_figures_of_the_specification(printed):
 def test_a_dropper_that_has_slipped_by_a_metre_is_as_good_as_broken(short):
     line, design = short
     slack, gone = (changed(design, with_faults(line, f)) for f in (slipped(4, 1.0, span=3), broken(4, span=3)))
-    assert slack.dropper_force == pytest.approx(gone.dropper_force, abs=1e-6 * weight(design.shape.matrices))
-    # One that hangs slack has the mass of the distance that it spans, two grams more.
-    assert np.abs(slack.positions - gone.positions).max() < 2e-5
+    assert slack.dropper_force == pytest.approx(gone.dropper_force, rel=1e-6, abs=1e-6)
+    assert np.abs(slack.positions - gone.positions).max() < 1e-8
     assert np.count_nonzero(slack.is_slack) == 1
     assert not gone.is_slack.any()
 
 
-def without(design, dropper):
-    """Return a mesh and its lengths without a dropper, half of its mass as a clamp on each wire."""
+def without(design, dropper, lost):
+    """Return a mesh and its lengths without a dropper, half of the mass that is lost as a clamp on each wire."""
     mesh = design.shape.mesh
     kept = np.delete(np.arange(len(mesh.droppers)), dropper)
     mass = mesh.clamp_mass.copy()
-    mass[mesh.droppers[dropper]] += 0.5 * design.droppers.mass[dropper]
+    mass[mesh.droppers[dropper]] += 0.5 * lost
     return dataclasses.replace(
         mesh,
         **{name: getattr(mesh, name)[kept] for name in ("droppers", "is_hanger", "target", "broken")},
@@ -224,7 +223,7 @@ def test_a_broken_dropper_is_a_line_without_it_at_rest_and_in_motion(short, monk
     faulty = with_faults(line, broken(4, span=3))
     model = CatenaryModel(faulty)
     fewer = dataclasses.replace(design, dropper_force=np.delete(design.dropper_force, dropper))
-    rest = find_rest(fewer, without(design, dropper), design.shape.points)
+    rest = find_rest(fewer, without(design, dropper, model.static.droppers.mass[dropper]), design.shape.points)
     assert np.abs(rest.positions - model.static.positions).max() < 1e-6
     assert np.delete(model.static.dropper_force, dropper) == pytest.approx(rest.dropper_force, abs=1e-3)
     monkeypatch.setattr("models.catenary.line_model.find_condition", lambda design: rest)
@@ -254,7 +253,7 @@ def test_a_broken_dropper_has_no_damper_and_no_pendulum(short):
     assert condition.shape.matrices.M.sum() == pytest.approx(design.shape.matrices.M.sum(), rel=1e-5)
 
 
-@pytest.mark.parametrize("name", ["LN2", "Re330", "LN2_ring", "EN50318_2018_AC_simple"])
+@pytest.mark.parametrize("name", ["LN2_ring", *rest("LN2", "Re330", "EN50318_2018_AC_simple")])
 def test_supports_and_anchors_carry_the_weight(name):
     """Vertical equilibrium of the whole line: what is held, or sprung, takes its weight and nothing else."""
     values = {f"irregularity.{kind}_sigma": 0.01 for kind in ("dropper_length", "support_height")}
@@ -288,7 +287,7 @@ def sum_of_reactions(condition):
 
 def test_supports_that_are_all_too_high_lift_the_line_as_it_is(monkeypatch):
     """10 mm at every support and arm: far from the anchors, which stay, the line is the same 10 mm higher."""
-    for line in (make_line(16), dataclasses.replace(load_line("EN50318_2018_AC_simple"))):
+    for line in (make_line(16), load_line("EN50318_2018_AC_simple"))[: count(1, 2)]:
         design = design_of(line)
         monkeypatch.setattr(line_condition, "support_height_errors", lambda _, mesh: np.full(len(mesh.sprung), 0.01))
         condition = changed(design, line.with_values({"irregularity.support_height_sigma": 0.01}))
@@ -356,7 +355,7 @@ def test_a_dropper_without_length_is_refused(short):
         changed(design, with_faults(line, slipped(4, -1.2, span=3)))
 
 
-@pytest.mark.parametrize("name", ["LN2", "Re330"])
+@pytest.mark.parametrize("name", ["LN2", *rest("Re330")])
 def test_large_errors_settle_with_many_droppers_slack(name):
     line = load_line(name)
     design = design_of(line)

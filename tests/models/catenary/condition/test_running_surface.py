@@ -1,5 +1,7 @@
 """Running surfaces: the height that was asked for, smooth, from measured points or from a spectrum."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,9 @@ from models.catenary.definition.line_reading import load
 from models.catenary.definition.surface_definition import RunningSurface as Surface
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError
+from models.library.catalogue import load_line
 from models.numerics.random_numbers import uniform_numbers
+from tests.models.conftest import make_fault
 
 GENERATED = {
     "sigma": [0.222486, "mm", "test"],
@@ -218,3 +222,32 @@ def test_a_profile_that_is_not_there_is_told(tmp_path, profiled):
     (tmp_path / "wear.csv").unlink()
     with pytest.raises(DefinitionError, match=rf"wear\.csv: there is no such file in {tmp_path}$"):
         load(tmp_path / "worn.toml")
+
+
+WORN = {"section": 1, "from_": 100.0, "to": 150.0, "value": 0.1, "lost_thickness": 1e-3}
+BUMP = {"position": 120.0, "value": 0.0, "height": -5e-4, "length": 2.0}
+
+
+def test_faults_that_act_add_their_pieces(short_line):
+    """Strips run higher where the wire is worn, and lower where something stands out; level at all ends."""
+    both = make_fault("wear", **WORN), make_fault("hard_point", **BUMP)
+    surface = _surface(dataclasses.replace(short_line, fault=both))
+    places = {99.0: 0.0, 100.0: 0.0, 100.5: 5e-4, 101.0: 1e-3, 120.0: 5e-4, 121.0: 1e-3, 149.0: 1e-3, 150.0: 0.0}
+    assert [surface.height(x) for x in places] == pytest.approx(list(places.values()), abs=1e-12)
+    assert not any(surface.slope(x) for x in (100.0, 101.0, 120.0, 149.0, 150.0))
+    dormant = tuple(dataclasses.replace(fault, active=0) for fault in both)
+    assert running_surfaces(dataclasses.replace(short_line, fault=dormant)) == (None,)
+    plain = make_fault("wear", **(WORN | {"lost_thickness": None})), make_fault("arm_loose", support=1)
+    assert running_surfaces(dataclasses.replace(short_line, fault=plain)) == (None,)
+
+
+def test_a_bump_at_the_seam_of_a_ring_is_whole():
+    line = load_line("LN2_ring")
+    (section,) = line.sections
+    seam = section.spans[0].start
+    surface = _surface(
+        dataclasses.replace(line, fault=(make_fault("hard_point", **(BUMP | {"position": seam + 0.25})),))
+    )
+    assert surface.height(seam + 0.25) == pytest.approx(-5e-4)
+    assert surface.height(seam) == pytest.approx(surface.height(seam + 0.5))
+    assert surface.height(seam + section.period - 0.25) == pytest.approx(-2.5e-4)

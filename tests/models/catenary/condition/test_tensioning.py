@@ -121,6 +121,14 @@ def test_the_tension_of_a_curve_is_lost_towards_the_fixed_point(design, warming,
         assert (np.diff(sign * wire.tension[:16]) <= 1e-9).all()
 
 
+def test_a_wire_moves_no_farther_than_cantilevers_reach(design):
+    """17e-6 x 750 m x 40 K is 0.51 m at the support that is farthest from the fixed point."""
+    near = as_tensioned(design, warming=39.0, cantilever_length=0.5)
+    assert wire_tensions(near)[0].movement > 0.5  # at the anchor, where no cantilever is
+    with pytest.raises(EquilibriumError, match=r"at 50 degC the contact wire moves by 0\.51 m at a support"):
+        wire_tensions(as_tensioned(design, warming=40.0, cantilever_length=0.5))
+
+
 def test_a_wire_that_moves_alone_loses_by_its_droppers_what_the_other_gains(design):
     still = TensioningDevice(expansion=0.0)
     contact, messenger = wire_tensions(as_tensioned(design, warming=30.0, messenger_wire=still))
@@ -260,3 +268,17 @@ def test_mistakes(line_maker, changes, said):
 def test_a_ring_has_no_devices(ring_maker):
     with pytest.raises(DefinitionError, match="tensioning: a line that closes on itself has no ends"):
         ring_maker(tensioning=TABLE)
+
+
+def test_a_messenger_wire_that_a_stitch_wire_leaves_no_tension_is_told(line_maker):
+    """9 kN of 14 kN are taken between the clamps; in the heat a wire with fixed ends has less than these."""
+    stitch = {
+        "area": [35, "mm2", "x"], "mass": [0.31, "kg/m", "x"], "youngs_modulus": [84.7, "GPa", "x"],
+        "tension": [9, "kN", "x"], "length": [14, "m", "x"],
+    }  # fmt: skip
+    hot = TABLE | {"temperature": [90, "degC", "x"], "messenger_wire": {"kind": "fixed"}}
+    line = line_maker(type="stitched", stitch_wire=stitch, tensioning=hot)
+    with pytest.raises(EquilibriumError, match=r"messenger wire under a stitch wire.* of -\d+ N: a wire must pull"):
+        find_condition(find_form(line, build_mesh(line)))
+    with pytest.raises(EquilibriumError, match=r"of -1000 N: .* give the stitch wire less \(stitch_wire\.tension"):
+        find_form(line.with_values({"stitch_wire.tension": 15e3}), build_mesh(line))

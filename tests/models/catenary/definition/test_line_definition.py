@@ -233,15 +233,18 @@ def test_faults_are_read_with_their_parameters():
     assert names == [
         "irregularity.seed",
         "irregularity.dropper_length_sigma",
+        "irregularity.dropper_position_sigma",
         "irregularity.support_height_sigma",
+        "irregularity.stagger_sigma",
         "fault[1].active",
         "fault[2].active",
         "fault[2].value",
     ]
     described = {p.name: p.description for p in line.parameters()}
     for number, f in enumerate(line.fault, 1):
-        x = line.sections[0].spans[f.span - 1].droppers[f.dropper - 1]
-        assert described[f"fault[{number}].active"].endswith(f"; dropper {f.dropper} of span {f.span} at {x:.2f} m")
+        span = line.sections[0].spans[f.span - 1]
+        place = f"at {span.droppers[f.dropper - 1]:.2f} m, supports at {span.start:.2f} and {span.end:.2f} m"
+        assert described[f"fault[{number}].active"].endswith(f"; dropper {f.dropper} of span {f.span} {place}")
     (value,) = (p for p in line.parameters() if p.name == "fault[2].value")
     assert (value.value, value.unit, value.source) == (0.02, "m", SOURCE)
     changed = line.with_values({"fault[2].active": 1, "fault[2].value": 0.03, "irregularity.seed": 2**31 - 1})
@@ -284,6 +287,105 @@ def test_every_mistake_in_a_fault_is_told():
     assert "outside -5 ... 5" in found["fault[12].value"]
     assert found["fault[13].span"] == "is missing"
     assert len(found) == 12
+
+
+#: Faults of LN2 that say all that is needed, one of each other kind.
+WHOLE = {
+    "arm_loose": {"support": 3},
+    "support_sunk": {"support": 4, "value": [20, "mm", SOURCE]},
+    "tension_loss": {"wire": "contact_wire", "value": [0.1, "1", SOURCE]},
+    "wear": {"from": [200, "m", SOURCE], "to": [300, "m", SOURCE], "value": [0.2, "1", SOURCE]},
+    "hard_point": {"position": [500, "m", SOURCE], "value": [5, "kg", SOURCE]},
+}
+
+
+def other(kind, **values):
+    return {"kind": kind} | WHOLE[kind] | values
+
+
+def test_faults_of_arms_supports_wires_are_read_with_their_parameters():
+    line = read(Table.from_dict(definition_of("LN2", fault=[other(kind, active=0) for kind in WHOLE])))
+    found = {p.name: p for p in line.parameters() if p.name.startswith("fault")}
+    assert [(name, p.unit) for name, p in found.items()] == [
+        ("fault[1].active", "1"),
+        ("fault[2].active", "1"),
+        ("fault[2].value", "m"),
+        ("fault[3].active", "1"),
+        ("fault[3].value", "1"),
+        ("fault[4].active", "1"),
+        ("fault[4].value", "1"),
+        ("fault[5].active", "1"),
+        ("fault[5].value", "kg"),
+    ]
+    assert [p.description.partition("; ")[2] for name, p in found.items() if "active" in name] == [
+        f"steady arm of support 3 at {line.sections[0].supports[3].x:.2f} m",
+        f"support 4 at {line.sections[0].supports[4].x:.2f} m",
+        "tension of the contact wire",
+        "contact wire from 200 m to 300 m",
+        "contact wire at 500 m",
+    ]
+    changed = line.with_values({"fault[2].value": 0.05, "fault[5].active": 1})
+    assert (changed.fault[1].amount, changed.fault[4].active) == (0.05, 1)
+    with pytest.raises(ParameterError, match=r"fault\[3\]\.value"):
+        line.with_values({"fault[3].value": 0.6})
+
+
+@pytest.mark.parametrize(
+    ("fault", "key", "said"),
+    [
+        (other("arm_loose", support=40), "support", "there is no support 40: between its anchors the section has 23"),
+        (other("arm_loose", value=[1, "m", SOURCE]), "value", "means nothing for kind 'arm_loose', of dropper_slipped"),
+        (other("arm_loose", dropper=2), "dropper", "of dropper_broken and dropper_slipped: remove it"),
+        (other("support_sunk", value=[2, "m", SOURCE]), "value", "outside -1 ... 1 m"),
+        ({"kind": "support_sunk", "support": 4}, "value", "is missing: how far has the support sunk?"),
+        ({"kind": "support_sunk", "value": [1, "mm", SOURCE]}, "support", "is missing"),
+        ({"kind": "arm_loose"}, "support", "is missing"),
+        (other("tension_loss", wire="stitch_wire"), "wire", "none of contact_wire, messenger_wire, auxiliary_wire"),
+        (other("tension_loss", wire="auxiliary_wire"), "wire", "the line has no auxiliary wire"),
+        (other("tension_loss", value=[0.6, "1", SOURCE]), "value", "outside 0 ... 0.5"),
+        (other("tension_loss", value=[2, "kN", SOURCE]), "value", "unit"),
+        ({"kind": "tension_loss", "wire": "contact_wire"}, "value", "is missing: which share of the tension is lost?"),
+        (other("wear", to=[100, "m", SOURCE]), "to", "100 m: must be 0.1 m or more beyond 'from', 200 m"),
+        (other("wear", to=[5000, "m", SOURCE]), "to", "5000 m lies outside the section, -3.1 ... 1136.9 m"),
+        (other("wear", value=[-0.1, "1", SOURCE]), "value", "outside 0 ... 0.5"),
+        ({k: v for k, v in other("wear").items() if k != "from"}, "from", "is missing"),
+        (
+            other("hard_point", position=[-5, "m", SOURCE]),
+            "position",
+            "-5 m lies outside the section, -3.1 ... 1136.9 m",
+        ),
+        (other("hard_point", value=[300, "kg", SOURCE]), "value", "outside 0 ... 200 kg"),
+        (other("wear", lost_thickness=[30, "mm", SOURCE]), "lost_thickness", "outside 0 ... 0.02 m"),
+        (other("wear", height=[1, "mm", SOURCE]), "height", "means nothing for kind 'wear', of hard_point: remove it"),
+        (other("hard_point", height=[-1, "mm", SOURCE]), "length", "is missing: how long is the bump"),
+        (other("hard_point", length=[1, "m", SOURCE]), "height", "is missing: how high is the bump"),
+        (other("hard_point", section=2), "section", "there is no section 2: the line has 1"),
+    ],
+)
+def test_a_mistake_in_a_fault_of_another_kind_is_told_once(fault, key, said):
+    found = problems(definition_of("LN2", fault=[fault]))
+    assert set(found) == {f"fault[1].{key}"}
+    assert said in found[f"fault[1].{key}"]
+
+
+def test_an_arm_that_is_not_there_cannot_come_off():
+    found = problems(definition_of("LN2", steady_arm=None, fault=[other("arm_loose")]))
+    assert found["fault[1].support"] == "support 3 has no steady arm that could come off"
+
+
+@pytest.mark.parametrize("kind", WHOLE)
+def test_two_faults_of_the_same_are_refused(kind):
+    found = problems(definition_of("LN2", fault=[other(kind), fault(), other(kind)]))
+    (text,) = found.values()
+    assert "has a fault already, fault[1]" in text
+
+
+def test_worn_wire_is_worn_once_and_a_support_sinks_under_a_loose_arm():
+    worn = other("wear", **{"from": [250, "m", SOURCE], "to": [320, "m", SOURCE]})
+    found = problems(definition_of("LN2", fault=[other("wear"), worn]))
+    assert found == {"fault[2].from": "250 m: what is worn there is that of fault[1] already"}
+    both = [other("arm_loose", support=4), other("support_sunk")]
+    assert len(read(Table.from_dict(definition_of("LN2", fault=both))).fault) == 2
 
 
 def test_errors_of_assembly_have_ranges():

@@ -33,6 +33,10 @@ def test_a_radius_is_a_curvature():
         ({"positions": of("m", 9, 9), "cant": of("mm", 0, 100)}, "track.cant: jumps from 0 to 100 mm at 9 m"),
         ({"positions": of("m", 0), "cant": of("mm", 450)}, "track.cant: 0.45 m is outside"),
         ({"positions": of("m", 0), "cant": of("m", 0.29), "base": [0.4, "mi", "x"]}, "track.base: unknown unit"),
+        (
+            {"positions": of("m", 0), "radius": of("m", 600), "base": [1.0, "m", "x"]},
+            "track.base: 1 m says nothing where no cant is measured over it",
+        ),
         ({"positions": of("m", 0), "curvature": of("1/m", float("nan"))}, "track.curvature: "),
         ({"positions": of("m", 0), "bank": of("mm", 0)}, "track.bank: unknown key"),
         ({"positions": of("m", 0, 0.01), "cant": of("mm", 0, 100)}, "track.cant: goes from 0 to 100 mm within 0.01 m"),
@@ -64,7 +68,7 @@ def test_all_mistakes_are_said_at_once(line_maker):
         ({"encumbrance": of("m", 0.01)}, "supports.encumbrance: 0.01 m is outside"),
         ({"contact_wire_height": of("cm", 53)}, "supports.contact_wire_height: 0.53 m is outside"),
         ({"arm_side": of("1", 1, 1, 0.5, 1, 1)}, "supports.arm_side: 0.5: a side is 1"),
-        ({"arm_side": "left"}, "supports.arm_side: 'left' is none of auto"),
+        ({"arm_side": "left"}, "supports.arm_side: 'left': a side is 1, to the left"),
         ({"arm_length": [1.2, "m"]}, "supports.arm_length: "),
         ({"heights": of("m", 5.3)}, "supports.heights: unknown key"),
         ({"structure": ["1", 2]}, "supports.structure: ['1', 2] is not a list of texts"),
@@ -84,17 +88,25 @@ def test_supports_have_the_names_of_their_structures(line_maker, names):
     assert [s.structure for s in supports] == (names if len(names) == 7 else ["", *names, ""])
 
 
+def test_a_wrong_stagger_of_supports_is_one_mistake(line_maker):
+    with pytest.raises(DefinitionError) as caught:
+        line_maker(stagger=None, supports={"stagger": of("m", 0.1, 0.2)})
+    assert str(caught.value).count("\n") == 0
+    assert "gives 2 values for 5 supports" in str(caught.value)
+
+
+def places_with(line_maker, anchor):
+    """Return the places of the contact wire in plan, the anchors' and the others."""
+    supports = line_maker(stagger={"amplitude": [0.2, "m", "x"], "anchor": anchor}).sections[0].supports
+    return supports[0].stagger, supports[-1].stagger, [s.stagger for s in supports[1:-1]]
+
+
 def test_anchors_have_a_place_in_plan_each_or_one_for_both(line_maker):
-    plain, each = line_maker(stagger={"amplitude": [0.2, "m", "x"]}), []
-    for anchor in ([0.1, "m", "x"], of("m", -0.3, 0.1), of("m", 1, 2, 3)):
-        stagger = {"amplitude": [0.2, "m", "x"], "anchor": anchor}
-        if len(each) == 2:
-            with pytest.raises(DefinitionError, match=r"stagger\.anchor: gives 3 values: give one for both"):
-                line_maker(stagger=stagger)
-            return
-        each.append([s.stagger for s in line_maker(stagger=stagger).sections[0].supports])
-    assert each[0] == [0.1, *(s.stagger for s in plain.sections[0].inner_supports), 0.1]
-    assert each[1] == [-0.3, *each[0][1:-1], 0.1]
+    inner = [0.2, -0.2, 0.2, -0.2, 0.2]
+    assert places_with(line_maker, [0.1, "m", "x"]) == (0.1, 0.1, inner)
+    assert places_with(line_maker, of("m", -0.3, 0.1)) == (-0.3, 0.1, inner)
+    with pytest.raises(DefinitionError, match=r"stagger\.anchor: gives 3 values: give one for both"):
+        places_with(line_maker, of("m", 1, 2, 3))
 
 
 def test_values_of_arms_need_arms(line_maker):

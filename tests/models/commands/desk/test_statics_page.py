@@ -1,5 +1,7 @@
 """The page of ``statics``: whole, sealed, with all that was asked for, and nothing taken for markup that is not."""
 
+import csv
+import dataclasses
 import html
 import re
 import xml.etree.ElementTree as ET
@@ -7,6 +9,8 @@ from html.parser import HTMLParser
 
 import pytest
 
+from models.catenary.definition.condition_definition import Irregularity
+from models.commands.desk.statics_page import conditions
 from tests.models.commands.conftest import NASTY
 
 VOID = {"meta", "link", "br"}
@@ -87,10 +91,19 @@ def test_verdicts_come_first_what_is_not_kept_on_top(page):
     assert "head of 1600 mm (norms/lateral.toml)" in page
 
 
-def test_the_dropper_sheet_has_every_dropper_in_millimetres(page):
+def test_the_dropper_sheet_has_every_dropper_in_millimetres(page, statics_folder):
+    with (statics_folder / "droppers.csv").open() as file:
+        listed = [[float(value) for value in row] for row in [*csv.reader(file)][1:]]
     sheet = page[page.index("<section id='droppers'") :]
     rows = re.findall(r"<tr[^>]*>(<td.*?)</tr>", sheet)
-    assert len(rows) == 20
+    assert len(rows) == len(listed) == 20
     cells = re.findall(r">([^<]+)</td>", rows[7])
-    assert cells == ["2", "3", "75.00", "25.00", "1017", "108.5"]
+    x, length, tension, _ = listed[7]
+    assert cells == ["2", "3", f"{x:.2f}", f"{x - 50.0:.2f}", f"{1e3 * length:.0f}", f"{tension:.1f}"]
     assert "<thead>" in sheet
+
+
+def test_every_kind_of_error_of_assembly_is_a_condition(line_maker):
+    errors = Irregularity(seed=3, dropper_position_sigma=0.05, stagger_sigma=0.01)
+    found = dict(conditions(dataclasses.replace(line_maker(), irregularity=errors), 0))
+    assert found["errors of assembly, sigma"] == "dropper places 50 mm, stagger 10 mm; seed 3"

@@ -267,8 +267,9 @@ def test_steps_end_on_the_communication_point_and_kinks(generic):
     mechanism, y = generic
     times = []
 
-    def inputs(t):
+    def inputs(t, inside):
         times.append(t)
+        assert (t - 0.7e-3) * (inside - 0.7e-3) >= -1e-12
         return Inputs(lift=1313.7)
 
     done = Integrator(mechanism, 1e-8, 1e-3).advance(y.copy(), inputs, 2.5e-3, 1e-3, kinks=(0.7e-3, 9.0))

@@ -15,7 +15,7 @@ def run(m, y, duration, *, inputs=lambda t: Inputs(), tolerance=1e-10, step=1e-3
     """Advance in macro steps; return the final state."""
     integrator, h, first, history = Integrator(m, tolerance, largest), largest, None, None
     for n in range(round(duration / step)):
-        done = integrator.advance(y, lambda tau, t=n * step: inputs(t + tau), step, h, (), first, history)
+        done = integrator.advance(y, lambda tau, _, t=n * step: inputs(t + tau), step, h, (), first, history)
         y, h, first, history = done.y, done.step, done.evaluation.rates, done.history
         if watch is not None:
             watch((n + 1) * step, done)

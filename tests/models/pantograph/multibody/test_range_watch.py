@@ -1,11 +1,15 @@
 """Stops and ranges of a mechanism in a run: what holds, and what is told of it once."""
 
+import re
+
 import numpy as np
 import pytest
 
 from models.library.catalogue import load_pantograph
+from models.pantograph.multibody.analysis.posture import check_heights
 from models.pantograph.multibody.mechanism_reading import read_mechanism
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
+from tests.effort import rest
 from tests.models.pantograph.multibody.mechanisms import LIBRARY
 
 NOTHING = np.zeros(2)
@@ -84,7 +88,7 @@ def load_table(name):
     return Table.load(LIBRARY / f"{name}.toml")
 
 
-@pytest.mark.parametrize("height", [6.3, 4.4])
+@pytest.mark.parametrize("height", [6.3, *rest(4.4)])
 def test_a_start_beyond_the_stops_is_refused_with_the_range_between_them(height):
     table = load_table("generic_multibody_cam")
     table.data["start_height"] = [height, "m", "test"]
@@ -92,3 +96,4 @@ def test_a_start_beyond_the_stops_is_refused_with_the_range_between_them(height)
     told = rf"start_height = {height} m is beyond the stop 'arm_stops': .* goes from 4\.456 to 6\.224 m"
     with pytest.raises(ValueError, match=told):
         part.initialise(0.0, 0.0, np.zeros(3), NOTHING)
+    assert re.match(told, check_heights(part.definition))

@@ -11,7 +11,7 @@ from tests.master.batch.sweep.pages.conftest import failure, row, view
 
 FAULTS = [f"line.fault[{k}].active" for k in (1, 2, 3)]
 PLACES = {
-    f: f"whether the fault acts: 1 yes, 0 no; dropper {d} of span 14 at {x} m"
+    f: f"whether it acts; dropper {d} of span 14 at {x} m, supports at 601.00 and 650.50 m [choice: default [2]]"
     for f, d, x in zip(FAULTS, (3, 1, 2), (618.70, 605.20, 611.95), strict=True)
 }
 
@@ -37,8 +37,8 @@ def faults(rows, places=PLACES):
 
 def test_each_fault_alone_is_compared_with_the_healthy_line():
     (found,) = faults(ROWS)
-    assert [d.position for d in found.droppers] == [605.20, 611.95, 618.70]
-    assert found.droppers[0].name == "span 14, dropper 1"
+    assert [d.position for d in found.parts] == [605.20, 611.95, 618.70]
+    assert found.parts[0].name == "span 14, dropper 1"
     assert [f.name for f in found.figures] == ["maximum", "sigma", "uplift"]
     assert found.healthy[:2] == (200.0, 40.0)
     assert found.faulty[:, 0].tolist() == [230.0, 190.0, 210.0]
@@ -46,9 +46,38 @@ def test_each_fault_alone_is_compared_with_the_healthy_line():
 
 def test_bars_stand_at_the_droppers():
     chart = criticality_charts(faults(ROWS), "f")[0]
-    (bars,) = chart.parts
+    bars, span = chart.parts
     assert bars.x.tolist() == [605.20, 611.95, 618.70]
     assert bars.y.tolist() == [30.0, -10.0, 10.0]
+    assert (np.nanmin(span.x), np.nanmax(span.x)) == (601.0, 650.5)
+    upright = np.flatnonzero(np.diff(span.x) == 0.0)
+    assert sorted(set(span.x[upright])) == [601.0, *bars.x.tolist(), 650.5], "supports and droppers"
+    assert np.nanmax(span.y) < -10.0, "below all bars"
+    assert chart.y.limits[0] < np.nanmin(span.y)
+    assert min(chart.y.ticks) == -10.0
+
+
+def test_what_no_fault_changes_has_no_chart():
+    assert [c.title for c in criticality_charts(faults(ROWS), "f")] == ["Change of maximum", "Change of sigma"]
+
+
+def test_arms_stand_at_their_supports_other_faults_have_their_words():
+    words = (
+        "steady arm of support 13 at 601.00 m",
+        "steady arm of support 14 at 650.50 m",
+        "contact wire from 5 m to 9 m",
+    )
+    places = {f: f"whether the fault acts: 1 yes, 0 no; {w}" for f, w in zip(FAULTS, words, strict=True)}
+    (found,) = faults([ROWS[0], *ROWS[2:4]], {**places, FAULTS[2]: places[FAULTS[0]], FAULTS[0]: ""})
+    assert [(p.name, p.position) for p in found.parts] == [
+        ("steady arm of support 13", 601.0),
+        ("steady arm of support 14", 650.5),
+    ]
+    bars, span = criticality_charts([found], "f")[0].parts
+    assert bars.width == 5.0
+    assert (np.nanmin(span.x), np.nanmax(span.x)) == (601.0, 650.5)
+    (found,) = faults(ROWS[:4], places)
+    assert criticality_charts([found], "f")[0].parts[0].x == (*(w.split(" at")[0] for w in words[:2]), words[2])
 
 
 def test_the_ranking_begins_with_the_greatest_maximum():
@@ -60,7 +89,7 @@ def test_the_ranking_begins_with_the_greatest_maximum():
 
 def test_without_places_droppers_have_the_names_of_their_faults():
     (found,) = faults(ROWS, {})
-    assert math.isnan(found.droppers[0].position)
+    assert math.isnan(found.parts[0].position)
     (bars,) = criticality_charts([found], "f")[0].parts
     assert bars.x == ("line.fault[1]", "line.fault[2]", "line.fault[3]")
 
@@ -68,7 +97,7 @@ def test_without_places_droppers_have_the_names_of_their_faults():
 def test_a_fault_whose_run_failed_is_not_drawn_as_harmless():
     rows = [*ROWS[:3], failure(4, acting(3), "no")]
     (found,) = faults(rows)
-    assert [d.name for d in found.droppers] == ["span 14, dropper 1", "span 14, dropper 3"]
+    assert [d.name for d in found.parts] == ["span 14, dropper 1", "span 14, dropper 3"]
     missing = [*ROWS[:3], row(4, acting(3), maximum=None, sigma=None, mean=None)]
     (found,) = faults(missing)
     assert np.isnan(found.faulty[1, 0])
@@ -88,7 +117,7 @@ def test_the_page_shows_what_acts_and_mixes_no_faults_into_its_other_charts():
     ]
     whole = view(rows, {**dict.fromkeys(FAULTS, ""), "speed [km/h]": ""}, over=("speed",), setting={"places": PLACES})
     faults, curves = chapters(whole)
-    assert [b.name for b in faults.charts[0].parts] == ["speed 200 km/h", "speed 300 km/h"]
+    assert [b.name for b in faults.charts[0].parts[:2]] == ["speed 200 km/h", "speed 300 km/h"]
     maximum = next(c for c in curves.charts if c.title == "Maximum")
     assert [p.y.tolist() for p in maximum.parts] == [[400.0, 500.0]]
     html = page(whole)

@@ -64,3 +64,16 @@ def test_the_running_share_ends_at_the_share():
     exact = share(4, 40)
     assert (curve.y[-1], band.low[-1], band.high[-1]) == pytest.approx((10.0, 100 * exact.low, 100 * exact.high))
     assert np.array_equal(curve.x, np.arange(1.0, 41.0))
+
+
+def test_a_figure_settles_within_the_quantiles_of_the_samples():
+    rows = sample_rows(200)
+    chart = next(c for c in running_charts(view(rows, SAMPLED), rows, "r") if c.title == "Sigma of the samples")
+    spread, median, interval, mean = chart.parts
+    values = np.array([r["sigma [N]"] for r in rows])
+    for k in (9, 199):
+        assert (spread.low[k], median.y[k], spread.high[k]) == pytest.approx(
+            np.quantile(values[: k + 1], (0.05, 0.5, 0.95))
+        )
+        assert mean.y[k] == pytest.approx(values[: k + 1].mean())
+    assert (interval.high - interval.low)[-1] < 0.2 * (spread.high - spread.low)[-1]

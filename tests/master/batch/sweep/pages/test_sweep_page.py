@@ -50,6 +50,14 @@ def test_a_design_for_sensitivity_has_no_method_of_sampling():
     assert "method of sampling" not in page(view(sample_rows(30), SAMPLED, request={**request, "sensitivity": "sobol"}))
 
 
+def test_samples_of_seeds_have_a_seed_and_no_method():
+    rows = [row(k, {"line.seed": str(k)}, sigma=40.0 + k % 7) for k in range(1, 31)]
+    html = page(view(rows, {"line.seed": ""}, request={"samples": 30, "seed": 1, "method": "lhs"}))
+    assert "method of sampling" not in html
+    assert "<td>seed</td>" in html
+    assert "<td>seed</td>" not in page(view(rows, {"line.seed": ""}, over=("line.seed",)))
+
+
 def test_seeds_of_a_grid_are_samples():
     rows = [row(k, {"line.seed": str(k)}, sigma=40.0 + k % 7) for k in range(1, 31)]
     whole = view(rows, {"line.seed": ""}, over=("line.seed",))

@@ -11,26 +11,16 @@ import pytest
 from models.library.catalogue import load_pantograph
 from models.numerics.cubic_curve import CubicCurve
 from models.pantograph.multibody.analysis.posture import take_posture
+from models.pantograph.multibody.elements.angle_elements import PointDistance
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble, project
-from models.pantograph.multibody.mechanism_definition import (
-    ActuatorForce,
-    ActuatorMoment,
-    AngleStop,
-    BumpStop,
-    Fixed,
-    Prismatic,
-    Revolute,
-    SlideAndTurnFriction,
-    SlidingFriction,
-    SpringDamper,
-    TurningFriction,
-)
+from models.pantograph.multibody.mechanism_definition import BumpStop
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from models.pantograph.multibody.reduced import reduced_equations
 from models.pantograph.multibody.reduced.reduced_motion import ReducedModel, ReducedMotion
 from models.pantograph.operation import Drive
 from tests.effort import count
+from tests.models.pantograph.multibody.pantographs import pitching_head, rubbing_head, with_everything
 
 #: The motion is plain here, but where kernels are compared with it.
 KERNEL = "OPENPANTO_KERNEL"
@@ -40,80 +30,6 @@ LIBRARY = ("CX_multibody", "generic_multibody", "generic_multibody_cam")
 @pytest.fixture(autouse=True)
 def plain(monkeypatch):
     monkeypatch.setenv(KERNEL, "numpy")
-
-
-def unit(*vector):
-    """A direction as the reader makes it."""
-    return tuple((np.array(vector) / np.linalg.norm(vector)).tolist())
-
-
-def with_everything():
-    """The generic pantograph with every element that the reduced form knows, each where it acts."""
-    d = load_pantograph("generic_multibody")
-    head = {"body_i": "stabilisation_arm", "body_j": "pan_head"}
-    arm = {"body_i": "base", "body_j": "lower_arm"}
-    y = (0.0, 1.0, 0.0)
-    roll = Revolute(
-        name="joint_8", body_i="frame", body_j="pan_head", point_i=(0.01, 0.0, 0.02), point_j=(0.0, 0.0, 0.02),
-        axis_i=unit(1.0, 0.2, 0.1), axis_j=unit(1.0, 0.2, 0.1),
-    )  # fmt: skip
-    slide = Prismatic(
-        name="slide", body_i="stabilisation_arm", body_j="frame", point_i=(0.0, 0.0, 0.0), point_j=(0.0, 0.0, 0.0),
-        axis_i=unit(0.1, 0.0, 1.0),
-    )  # fmt: skip
-    frame = replace(next(b for b in d.bodies if b.name == "pan_head"), name="frame", mass=3.0, inertia=(0.1, 0.2, 0.15))
-    horn = replace(frame, name="horn", mass=0.7, position=(0.6, 0.3, 1.6))
-    held = Fixed(name="held", body_i="pan_head", body_j="horn", point_i=(0.0, 0.3, 0.1), point_j=(-0.047, 0.0, -0.002))
-    sprung = {"point_i": (0.1, 0.3, 0.0), "point_j": (0.0, 0.3, 0.02), "stiffness": 900.0, "damping": 30.0}
-    forces = (
-        *(f for f in d.forces if not f.name.startswith("suspension")),
-        TurningFriction(name="f1", joint="joint_1", moment=30.0, transition=0.2),
-        TurningFriction(name="f2", joint="joint_4", moment=5.0, transition=0.3),
-        TurningFriction(name="f3", joint="joint_8", moment=4.0, transition=0.3),
-        SlidingFriction(name="f4", joint="slide", force=6.0, transition=0.1),
-        ActuatorMoment(name="m1", body_i="lower_arm", body_j="upper_arm", axis_i=y, moment=12.0),
-        ActuatorMoment(name="m2", body_i="frame", body_j="pan_head", axis_i=unit(0.5, 0.0, 0.3), moment=3.0),
-        AngleStop(name="a1", **arm, axis_i=y, lowest=-0.05, highest=0.05, stiffness=900.0, damping=40.0),
-        BumpStop(
-            name="b1", **arm, point_i=(-0.2, 0.0, 0.0), point_j=(0.8, 0.0, -0.1), shortest=0.5, longest=0.6,
-            stiffness=800.0, damping=20.0,
-        ),
-        ActuatorForce(name="p1", **arm, point_i=(-0.2, 0.0, 0.1), point_j=(0.5, 0.0, -0.1), force=40.0),
-        SpringDamper(name="s1", **head, **sprung, free_length=0.1),
-        SpringDamper(name="s2", **head, **sprung, free_length=0.1, direction=unit(0.0, 0.1, 1.0)),
-        BumpStop(
-            name="b2", body_i="frame", body_j="horn", point_i=(0.1, 0.2, 0.0), point_j=(0.0, 0.0, 0.0), shortest=0.16,
-            longest=0.17, stiffness=2e3, damping=20.0,
-        ),
-        ActuatorForce(name="p2", **head, point_i=(0.1, 0.3, 0.0), point_j=(0.0, 0.3, 0.02), force=15.0),
-    )  # fmt: skip
-    joints = (*(j for j in d.joints if j.name != "joint_8"), slide, roll, held)
-    assembly = replace(d.assembly, largest_gap=0.2)
-    return replace(d, bodies=(*d.bodies, frame, horn), joints=joints, forces=forces, assembly=assembly)
-
-
-def pitching_head():
-    """A head that pitches about y on a slide of its own, with a stop about its hinge."""
-    d = with_everything()
-    y = (0.0, 1.0, 0.0)
-    hinge = Revolute(
-        name="joint_8", body_i="pan_head", body_j="frame", point_i=(0.01, 0.0, 0.02), point_j=(0.0, 0.0, 0.02),
-        axis_i=y, axis_j=y,
-    )  # fmt: skip
-    stop = AngleStop(
-        name="a2", body_i="frame", body_j="pan_head", axis_i=y, lowest=-0.04, highest=0.06, stiffness=700.0, damping=9.0
-    )
-    joints = tuple(hinge if j.name == "joint_8" else j for j in d.joints)
-    return replace(d, joints=joints, forces=(*d.forces, stop))
-
-
-def rubbing_head():
-    """The generic head, whose joint slides and turns, with friction of both."""
-    d = load_pantograph("generic_multibody")
-    friction = SlideAndTurnFriction(
-        name="f", joint="joint_8", force=9.0, slide_transition=0.1, moment=4.0, transition=0.3
-    )  # fmt: skip
-    return replace(d, forces=(*d.forces, friction))
 
 
 def reduced(definition):
@@ -202,9 +118,30 @@ def test_kernels_give_the_plain_numbers(case, monkeypatch):
         assert np.abs(strips[0] - strips[1]).max() < 1e-12
     assert np.abs(plain.bodies((0.0, 0.0, 0.0)) - compiled.bodies((0.0, 0.0, 0.0))).max() < 1e-9
     assert compiled.lift_value() == pytest.approx(plain.lift_value(), rel=1e-12)
+    assert compiled.is_free(-np.inf, np.inf) == plain.is_free(-np.inf, np.inf)
     # What one leaves the other continues.
     compiled.restore(plain.snapshot())
     assert compiled.snapshot()["reduced"].tobytes() == plain.snapshot()["reduced"].tobytes()
+
+
+def test_it_is_free_where_no_stop_of_the_bodies_is_reached(case):
+    definition, model, _ = case
+    motion, mechanism, seen = ReducedMotion(model), model.mechanism, []
+    bumps = [(f, PointDistance(f, mechanism.numbers)) for f in definition.forces if isinstance(f, BumpStop)]
+    for y in random_states(model, np.random.default_rng(8), 12):
+        y[2 : model.size] *= 0.5
+        motion.memory[0][:] = y.tolist()
+        kinematics = mechanism.kinematics(model.cartesian(y, np.zeros(2)))
+        lengths = [(f.shortest, distance.at(kinematics), f.longest) for f, distance in bumps]
+        inside = [(low is None or length >= low) and (high is None or length <= high) for low, length, high in lengths]
+        free = not mechanism.forces.stops.touched(kinematics.frames) and all(inside)
+        assert motion.is_free(-np.inf, np.inf) == free
+        seen.append(free)
+        if mechanism.forces.lift_place is not None and free:
+            place = mechanism.forces.lift_place.at(kinematics)
+            assert motion.is_free(place - 1e-6, place + 1e-6)
+            assert not motion.is_free(place + 1e-6, np.inf)
+    assert any(seen) or any(f.name == "b1" for f, _ in bumps)  # with everything, some stop or other always is
 
 
 def test_the_strip_is_where_its_body_is(case):

@@ -93,6 +93,7 @@ def tension(states: Sequence[LineAtTemperature]) -> Figure:
         axes.axvline(wire.fixed_point, color="#9aa0a6", linewidth=0.6)
         axes.set_ylabel(f"{wire.component.replace('_', ' ')} [kN]")
         axes.margins(y=0.2)
+        axes.ticklabel_format(axis="y", useOffset=False)  # losses are small beside the tension, which is to be read
     panels[0].legend(fontsize=8, ncols=6, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     panels[-1].set_xlabel("position along the track [m]; grey: fixed point")
     return figure

@@ -203,6 +203,7 @@ def _section(design: StaticState, section: Section, index: int) -> list[WireTens
     half = max(ends[-1] - fixed_point, fixed_point - ends[0])
     devices = {name: _device(design, name, section, index, half) for name in WIRES if getattr(definition, name)}
     distance = np.abs(ends[1:-1] - fixed_point)
+    _check_swing(definition, {name: abs(strain) * distance.max(initial=0.0) for name, (_, strain) in devices.items()})
     lost = _losses(design, index, ends, {name: strain * distance for name, (_, strain) in devices.items()})
     return [
         WireTension(
@@ -217,6 +218,18 @@ def _section(design: StaticState, section: Section, index: int) -> list[WireTens
         )
         for name, (tension, strain) in devices.items()
     ]
+
+
+def _check_swing(definition: CatenaryDefinition, moved: dict[str, float]) -> None:
+    """Refuse wires that move farther than cantilevers reach, by the largest movement at a support [m]."""
+    tensioning = _tensioning(definition)
+    for name, movement in moved.items():
+        if movement >= tensioning.cantilever_length:
+            raise EquilibriumError(
+                f"line '{definition.name}': at {tensioning.temperature - 273.15:g} degC the {name.replace('_', ' ')} "
+                f"moves by {movement:.2f} m at a support, and cantilevers are {tensioning.cantilever_length:g} m long; "
+                "check cantilever_length, expansion and the length of the section"
+            )
 
 
 def _tensioning(definition: CatenaryDefinition) -> Tensioning:

@@ -13,7 +13,7 @@ from models.catenary.condition.line_condition import find_condition
 from models.catenary.condition.tensioning import WireTension, ruling_span, swing, wire_tensions
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.section_definition import Section, Span
-from models.catenary.shape.form_finding import StaticState
+from models.catenary.shape.form_finding import EquilibriumError, StaticState
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics.overbridge_room import highest_wires
@@ -122,8 +122,12 @@ def _at(design: StaticState, temperature: float, index: int, speed: float) -> Li
     tensioning, section = definition.tensioning, definition.sections[index]
     assert tensioning is not None
     designed = replace(design, shape=replace(design.shape, definition=definition))
-    state = find_condition(designed)
-    wires = [wire for wire in wire_tensions(designed) if wire.section == index]
+    try:
+        state = find_condition(designed)
+        wires = [wire for wire in wire_tensions(designed) if wire.section == index]
+    except EquilibriumError as error:
+        where = f"at {temperature - 273.15:g} degC"
+        raise EquilibriumError(str(error) if where in str(error) else f"{where}: {error}") from error
     contact, upper = wires[0], wires[2] if len(wires) > 2 else wires[1]
     x = contact.ends[1:-1]
     moved = np.abs(contact.strain * (x - contact.fixed_point)).max(initial=0.0)
@@ -134,7 +138,7 @@ def _at(design: StaticState, temperature: float, index: int, speed: float) -> Li
         wires=tuple(
             WireAtTemperature(wire, _weight_movement(definition, wire), _sag(state, wire, span)) for wire in wires
         ),
-        cantilever_angle=math.asin(min(1.0, moved / tensioning.cantilever_length)),
+        cantilever_angle=math.asin(moved / tensioning.cantilever_length),
         stagger_change=float(swing(np.array(moved), tensioning.cantilever_length)),
         dropper_slant=float(slant / _mean_length(design, index)),
         waves=_slowest(definition, contact, upper, speed),

@@ -125,9 +125,8 @@ def _track(definition: CatenaryDefinition, section: int) -> str:
     along = track_at(track, np.linspace(spans[0].start, spans[-1].end, 2001))
     tightest = float(np.abs(along.curvature).max())
     cant = float(np.abs(np.sin(along.cant)).max() * track.base)
-    return f"smallest radius {1.0 / tightest:.0f} m, largest cant {1e3 * cant:.0f} mm" if tightest else (
-        f"straight, largest cant {1e3 * cant:.0f} mm"
-    )  # fmt: skip
+    course = f"smallest radius {1.0 / tightest:.0f} m" if tightest else "straight"
+    return f"{course}, largest cant {1e3 * cant:.0f} mm" if cant else f"{course}, without cant"
 
 
 def _figures(result: LineStatics) -> Part:

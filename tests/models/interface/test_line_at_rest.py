@@ -8,6 +8,8 @@ import pytest
 from models import in_wind, over_temperature, span_table, statics
 from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.tensioning_definition import Tensioning, TensioningDevice
+from models.catenary.shape.form_finding import EquilibriumError
+from models.catenary.statics import temperature_table
 from models.definition_files.parameter import ParameterError
 from models.interface.line_and_pantograph import Line
 
@@ -76,6 +78,15 @@ def test_a_verdict_in_the_wind_counts_the_spans_beyond(rest):
     assert np.isnan(in_wind(rest, pressure=300.0).limit).all()
 
 
+def test_what_a_line_does_not_stand_is_told_with_its_temperature(line, monkeypatch):
+    def refuse(design):
+        raise EquilibriumError("line 'short': the arm at 50.00 m pushes")
+
+    monkeypatch.setattr(temperature_table, "find_condition", refuse)
+    with pytest.raises(EquilibriumError, match=r"^at -20 degC: line 'short': the arm at 50\.00 m pushes$"):
+        over_temperature(line, ["-20 degC", "40 degC"])
+
+
 def test_spans_have_the_tension_that_the_devices_leave(line):
     tensioning = Tensioning(
         temperature=288.15,
@@ -123,6 +134,7 @@ def test_a_line_of_one_span_has_no_supports_between_its_anchors(only_span):
         (lambda line: in_wind(line, limit=400), "limit 400 m: no wire may be as far from the middle of the track"),
         (lambda line: in_wind(line, section="1"), "section: '1' is not a whole number"),
         (lambda line: statics(line, span=1.5), "span: 1.5 is not a whole number"),
+        (lambda line: statics(line, force="20 kN"), "force 20000 N is more than any pantograph pushes with"),
         (lambda line: over_temperature(line, ["15 degC"], section=1.5), "section: 1.5 is not a whole number"),
         (lambda line: over_temperature(line, "15 degC"), "temperatures: '15 degC' is not a list"),
         (lambda line: over_temperature(line, [None]), "temperature: None is neither a number nor a text"),

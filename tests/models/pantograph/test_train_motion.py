@@ -153,15 +153,15 @@ def test_a_mechanism_keeps_to_its_profile():
     assert np.array_equal(*both)
 
 
-@pytest.mark.parametrize("kind", ["acceleration", "lift"])
-def test_a_jump_within_a_step_costs_no_order(kind, monkeypatch):
+@pytest.mark.parametrize(("kind", "form"), [("acceleration", "general"), ("lift", "general"), ("lift", "auto")])
+def test_a_jump_within_a_step_costs_no_order(kind, form, monkeypatch):
     """Internal steps end at the jump; up to it the acceleration (or lift) before counts, then that after it."""
     monkeypatch.setenv(SWITCH, "numpy")
 
     macro, jump = 2.0**-7, 2.5 * 2.0**-7  # without rounding: a time is the jump's or is not
 
     def end(step):
-        given = replace(library("generic_multibody"), formulation="general", time_step=step, tolerance=0.1)
+        given = replace(library("generic_multibody"), formulation=form, time_step=step, tolerance=0.1)
         if kind == "lift":
             jumping = replace(given, raise_start=jump, raise_duration=0.0)
         else:

@@ -433,16 +433,19 @@ def solved(inverse: Any, by_t: Any, by_p: Any, m_ss: Any, f_t: Any, f_p: Any, f_
     return result
 
 
-def inputs_at(given: Any, tau: Any) -> Any:
+def inputs_at(given: Any, tau: Any, inside: Any) -> Any:
     """Return (force, lateral, base acceleration, lift, uplift) ``tau`` after the beginning of a step.
 
-    ``given`` holds 23 numbers: see `reduced_motion.ReducedMotion.step`.
+    ``given`` holds 23 numbers: see `reduced_motion.ReducedMotion.step`. Where the lift jumps, it is that of the piece
+    of the step in which the time ``inside`` lies.
     """
     time = given[0] + tau
     elapsed = time - given[1]
     share = 0.0
-    if elapsed >= given[19]:
-        share = 1.0 if given[20] == 0.0 else min(1.0, (elapsed - given[19]) / given[20])
+    if given[20] == 0.0:
+        share = 1.0 if given[0] + inside - given[1] >= given[19] else 0.0
+    elif elapsed >= given[19]:
+        share = min(1.0, (elapsed - given[19]) / given[20])
     lift, uplift = given[17] + share * (given[18] - given[17]), given[21]
     if given[22] > 0.0:
         lift, uplift = lift + uplift, 0.0
@@ -468,7 +471,7 @@ def force_at(given: Any, time: Any) -> Any:
 def begin(memory: Any, given: Any, model: Any, settings: Any) -> None:
     """Begin at the coordinates and rates in a memory: fill the rest of it."""
     state, rates, kept, _, _, single = memory
-    inputs = inputs_at(given, 0.0)
+    inputs = inputs_at(given, 0.0, 0.0)
     acceleration, response = evaluate(list(state), inputs, model, len(rates) > 0)
     put(rates, acceleration)
     put(kept, response)
@@ -499,7 +502,9 @@ def step(memory: Any, given: Any, duration: Any, model: Any, settings: Any) -> A
     state, rates, kept, kept_middle, kept_begun, single = memory
     n = len(rates)
     y, middle, begun = list(state), list(kept_middle), list(kept_begun)
-    acting = inputs_at(given, 0.0)
+    rise, latest = given[19] - (given[0] - given[1]), duration - _SMALLEST_STEP
+    raised, inside = rise + given[20], 0.5 * (rise if _SMALLEST_STEP < rise < latest else duration)
+    acting = inputs_at(given, 0.0, inside)
     force, lateral, base, lift, uplift = acting
     before, first = single[BEFORE], y[n:]
     if lift == single[LIFT] and uplift == single[UPLIFT]:
@@ -513,24 +518,28 @@ def step(memory: Any, given: Any, duration: Any, model: Any, settings: Any) -> A
         acceleration, _ = evaluate(y, acting, model, n < 0)
         first, before = first + acceleration, 0.0
     response = first[:0]
-    rise = given[19] - (given[0] - given[1])
-    raised = rise + given[20]
     if abs(rise) <= _SMALLEST_STEP or abs(raised) <= _SMALLEST_STEP:
         before = 0.0
-    now, trial, latest = 0.0, single[NEXT], duration - _SMALLEST_STEP
+    now, trial = 0.0, single[NEXT]
     for end in (rise, raised, duration):  # inputs have kinks there: internal steps end there
         if end != duration and not _SMALLEST_STEP < end < latest:
             continue
+        inside = 0.5 * (now + end)
+        if given[20] == 0.0 and 0.0 < now < end:  # the lift has jumped
+            acceleration, _ = evaluate(y, inputs_at(given, now, inside), model, n < 0)
+            first = y[n:] + acceleration
         while now < end:
             longest = min(trial, settings[1], duration)
             pieces = max(1, int(ceil((end - now) / longest - 1e-6)))  # noqa: RUF046 - compiled, ceil is no integer
             h = (end - now) / pieces
             if before > 0.0 and abs(before - h) <= 1e-9 * h:
                 new, new_rates, response, between, acting, error = continued(
-                    y, first, middle, begun, given, now, h, model, settings
+                    y, first, middle, begun, given, now, inside, h, model, settings
                 )
             else:
-                new, new_rates, response, between, acting, error = started(y, first, given, now, h, model, settings)
+                new, new_rates, response, between, acting, error = started(
+                    y, first, given, now, inside, h, model, settings
+                )
             if not error <= 1.0:
                 trial, before = h * factor(error), 0.0
                 if trial < _SMALLEST_STEP:
@@ -551,13 +560,13 @@ def step(memory: Any, given: Any, duration: Any, model: Any, settings: Any) -> A
     put(kept, response)
     put(kept_middle, middle)
     put(kept_begun, begun)
-    keep_inputs(single, inputs_at(given, duration) if before != duration else acting)
+    keep_inputs(single, inputs_at(given, duration, inside) if before != duration else acting)
     single[BEFORE], single[NEXT] = before, trial
     return DONE
 
 
 def continued(
-    y: Any, first: Any, before: Any, begun: Any, given: Any, now: Any, h: Any, model: Any, settings: Any
+    y: Any, first: Any, before: Any, begun: Any, given: Any, now: Any, inside: Any, h: Any, model: Any, settings: Any
 ) -> Any:
     """Predict by the parabola through the last three rates, correct by Simpson's rule; see `Integrator`."""
     n = len(y) // 2
@@ -569,13 +578,13 @@ def continued(
         speed = u + a * (23.0 * dq - 16.0 * dr + 5.0 * ds)
         speeds.append(speed)
         places.append(x + b * (s - 5.0 * r + 19.0 * q + 9.0 * speed))
-    acceleration, _ = evaluate(places + speeds, inputs_at(given, now + 0.5 * h), model, n < 0)
+    acceleration, _ = evaluate(places + speeds, inputs_at(given, now + 0.5 * h, inside), model, n < 0)
     guess, places = [], []
     for x, u, q, dq, dr, r, dm in zip(y, v, first, f, m, speeds, acceleration):  # noqa: B905
         speed = u + c * (dr - 2.0 * dq + 7.0 * dm)
         guess.append(speed)
         places.append(x + c * (q + 4.0 * r + speed))
-    acting = inputs_at(given, now + h)
+    acting = inputs_at(given, now + h, inside)
     latest, response = evaluate(places + guess, acting, model, n > 0)
     places, ends, largest = [], [], 0.0
     terms = zip(y, v, first, f, acceleration, latest, guess, settings[2][n:])  # noqa: B905
@@ -590,10 +599,10 @@ def continued(
     return places + ends, guess + latest, response, speeds + acceleration, acting, largest / settings[0]
 
 
-def started(y: Any, first: Any, given: Any, now: Any, h: Any, model: Any, settings: Any) -> Any:
+def started(y: Any, first: Any, given: Any, now: Any, inside: Any, h: Any, model: Any, settings: Any) -> Any:
     """Take a Runge-Kutta step; see `Integrator`."""
     n = len(y) // 2
-    at_middle, at_end = inputs_at(given, now + 0.5 * h), inputs_at(given, now + h)
+    at_middle, at_end = inputs_at(given, now + 0.5 * h, inside), inputs_at(given, now + h, inside)
     a, c = 0.5 * h, h / 6.0
     second = [y[i] + a * first[i] for i in range(2 * n)]
     acceleration, _ = evaluate(second, at_middle, model, n < 0)

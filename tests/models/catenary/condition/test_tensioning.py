@@ -121,6 +121,14 @@ def test_the_tension_of_a_curve_is_lost_towards_the_fixed_point(design, warming,
         assert (np.diff(sign * wire.tension[:16]) <= 1e-9).all()
 
 
+def test_a_wire_moves_no_farther_than_cantilevers_reach(design):
+    """17e-6 x 750 m x 40 K is 0.51 m at the support that is farthest from the fixed point."""
+    near = as_tensioned(design, warming=39.0, cantilever_length=0.5)
+    assert wire_tensions(near)[0].movement > 0.5  # at the anchor, where no cantilever is
+    with pytest.raises(EquilibriumError, match=r"at 50 degC the contact wire moves by 0\.51 m at a support"):
+        wire_tensions(as_tensioned(design, warming=40.0, cantilever_length=0.5))
+
+
 def test_a_wire_that_moves_alone_loses_by_its_droppers_what_the_other_gains(design):
     still = TensioningDevice(expansion=0.0)
     contact, messenger = wire_tensions(as_tensioned(design, warming=30.0, messenger_wire=still))

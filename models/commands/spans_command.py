@@ -30,6 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
         [tuple(pair) for pair in arguments.stagger],
         ("--wind", "--pressure"),
     )
+    warn(spans_report.warnings(definition))
     text = spans_report.heading(found)
     rows = spans_report.rows(found.lengths, found.smallest_radius, 0)
     print_table(f"Smallest radius [m]: {text}", ("span [m]", *found.names), rows)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from models.arrays import FloatArray
+from models.catenary.definition.line_definition import CatenaryDefinition
 from models.interface.line_spans import SpanTable
 
 if TYPE_CHECKING:
@@ -16,6 +17,15 @@ if TYPE_CHECKING:
 
 #: Radii that stand at the figure's axis, as far as it reaches [m].
 _TICKS: Final = (100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 7000, 10000, 20000, 50000)
+
+
+def warnings(definition: CatenaryDefinition) -> Iterator[str]:
+    """Yield what the tables of a line leave out."""
+    if definition.auxiliary_wire is not None:
+        yield (
+            "the contact wire of a compound line goes with its auxiliary wire, which the string of these tables knows "
+            "nothing of: they may be too favourable; see what 'statics --wind' finds with the mesh"
+        )
 
 
 def figure(found: SpanTable) -> Figure:

@@ -24,6 +24,8 @@ _OWN_KEYS: Final[dict[str, tuple[str, ...]]] = {
     "length": ("hard_point",),
     "value": tuple(kind for kind, cls in FAULT_KINDS.items() if cls.asks),
 }
+#: Keys that say what a fault is of.
+_PLACES: Final = ("section", "span", "dropper", "support", "wire", "from", "to", "position")
 
 
 def read_faults(tables: Sequence[Table]) -> tuple[Fault, ...]:
@@ -38,6 +40,8 @@ def check_faults(tables: Sequence[Table], definition: CatenaryDefinition) -> Non
     seen: dict[tuple[int, str], int] = {}
     for number, table, fault in zip(numbers, known, definition.fault, strict=True):
         key, name = fault.of()
+        if table.mistaken(_PLACES):
+            continue  # what it is of is not known
         if problem := _missing(definition, fault):
             table.problem(*problem)
         elif (other := seen.setdefault((fault.section, name), number)) != number:

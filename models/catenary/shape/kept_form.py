@@ -21,6 +21,7 @@ import scipy
 
 from models.arrays import FloatArray, Snapshot
 from models.catenary.definition import line_definition, section_definition, track_definition
+from models.catenary.definition.condition_definition import Irregularity
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_set import dropper_set
@@ -94,7 +95,8 @@ def _key(definition: CatenaryDefinition, mesh: CatenaryMesh) -> str:
     except OSError:
         return ""
     whole.update("\0".join((sys.version, np.__version__, scipy.__version__, *_processor())).encode())
-    whole.update(repr(definition).encode())
+    # Errors and faults come after the form: all samples of them share one.
+    whole.update(repr(replace(definition, irregularity=Irregularity(), fault=())).encode())
     for field in fields(mesh):
         value = getattr(mesh, field.name)
         for array in (value,) if isinstance(value, np.ndarray) else (chain.nodes for chain in value):

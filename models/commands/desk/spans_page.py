@@ -17,6 +17,7 @@ def page(definition: CatenaryDefinition, found: SpanTable, file: str, asked: Seq
     head = [
         f"<h1>{markup.text(definition.title or definition.name)}</h1>",
         markup.note(f"spans and radii of the line {definition.name} in the wind, for its designer"),
+        *map(markup.warning, spans_report.warnings(definition)),
         markup.pairs([
             ("file", file),
             ("contact wire", f"{found.tension:g} N, diameter {1e3 * definition.contact_wire.width:.2f} mm"),

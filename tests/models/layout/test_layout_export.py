@@ -19,6 +19,7 @@ from models.layout.layout_import import import_layout
 from models.layout.sheet_problems import LayoutError
 from models.layout.xlsx_sheets import workbook_bytes
 from models.library.catalogue import line_names, line_path
+from tests.effort import some
 
 SOURCE = "test"
 
@@ -137,8 +138,7 @@ def test_a_line_comes_back_from_its_layout(tmp_path, kind):
     assert (back.track, back.fault) == (design.track, design.fault)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", line_names())
+@pytest.mark.parametrize("name", some(line_names(), "EN50318_2002"))
 def test_every_line_of_the_library_comes_back(tmp_path, name):
     exported = export_line(line_path(name))
     assert difference(exported, returned(tmp_path, exported)) < 1e-7

@@ -339,6 +339,7 @@ def test_faults_of_arms_supports_wires_are_read_with_their_parameters():
         (other("support_sunk", value=[2, "m", SOURCE]), "value", "outside -1 ... 1 m"),
         ({"kind": "support_sunk", "support": 4}, "value", "is missing: how far has the support sunk?"),
         ({"kind": "support_sunk", "value": [1, "mm", SOURCE]}, "support", "is missing"),
+        ({"kind": "arm_loose"}, "support", "is missing"),
         (other("tension_loss", wire="stitch_wire"), "wire", "none of contact_wire, messenger_wire, auxiliary_wire"),
         (other("tension_loss", wire="auxiliary_wire"), "wire", "the line has no auxiliary wire"),
         (other("tension_loss", value=[0.6, "1", SOURCE]), "value", "outside 0 ... 0.5"),

@@ -15,6 +15,7 @@ from models.catenary.shape.form_finding import EquilibriumError, find_form
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.numerics import user_cache
+from tests.models.conftest import make_fault
 
 
 @pytest.fixture
@@ -52,6 +53,17 @@ def test_a_kept_form_is_the_found_one_to_the_bit(folder, found, short_line):
     assert first is not second
     assert same(first, second)
     assert not same(first, replace(second, arm_force=second.arm_force + 1e-13))  # it would see a difference
+
+
+def test_samples_of_errors_and_faults_share_a_form(folder, found, short_line):
+    samples = [
+        short_line.with_values({"irregularity.stagger_sigma": 0.01, "irregularity.seed": seed}) for seed in (1, 2)
+    ]
+    samples.append(replace(short_line, fault=(make_fault("arm_loose", support=2),)))
+    states = [kept_form(line, build_mesh(line)) for line in samples]
+    assert len(found) == 1
+    assert [state.shape.definition for state in states] == samples
+    assert len({state.positions.tobytes() for state in states}) == 1
 
 
 def test_what_changes_a_form_is_found_anew(folder, found, short_line, monkeypatch):

@@ -19,3 +19,5 @@ def test_the_tables_of_ca160_with_what_was_asked_for():
     assert ET.fromstring(re.search(r"<svg.*?</svg>", text, re.DOTALL)[0]) is not None
     assert "<CA160>" not in text
     assert "line.a = &lt;1&gt;" in text
+    assert "auxiliary wire" not in text
+    assert "goes with its auxiliary wire" in page(open_line("Shinkansen").definition, found, "", ())

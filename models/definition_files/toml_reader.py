@@ -139,8 +139,8 @@ class Table:
         except RecursionError as error:
             raise _too_deep(name) from error
         except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
-            comma = _comma_advice(path, str(error))
-            raise DefinitionError([Problem(name, "", f"is not TOML: {error}{comma}")]) from error
+            advice = _toml_advice(path, str(error))
+            raise DefinitionError([Problem(name, "", f"is not TOML: {error}{advice}")]) from error
         if _is_deep(data):
             raise _too_deep(name)
         return cls(data, _Log(name))
@@ -435,10 +435,13 @@ def _two_numbers_advice(entry: Any) -> str:
     return f"; has it a decimal comma? write {entry[0]}.{entry[1]}" if commas else ""
 
 
-def _comma_advice(path: Path, error: str) -> str:
-    """Return advice if the line that cannot be read has what looks like a decimal comma."""
+def _toml_advice(path: Path, error: str) -> str:
+    """Return advice if the file has a byte order mark, or the line with the mistake what looks like a decimal comma."""
+    text = path.read_text(encoding="utf-8")
+    if text.startswith("\ufeff"):
+        return "; the file begins with a byte order mark: save it as UTF-8 without one"
     number = re.search(r"at line (\d+)", error)
-    line = path.read_text(encoding="utf-8").splitlines()[int(number[1]) - 1] if number else ""
+    line = text.splitlines()[int(number[1]) - 1] if number else ""
     return f"; does '{line.strip()}' have a decimal comma? write a point" if re.search(r"\d,\d", line) else ""
 
 

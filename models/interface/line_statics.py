@@ -178,6 +178,8 @@ def statics(
 
 #: Highest speed of a train that is meant in m/s: above it km/h were [m/s].
 FASTEST = 200.0
+#: Greatest force of an elasticity that is meant [N].
+_STRONGEST = 10e3
 
 
 def given(name: str, value: float | str, unit: str, fastest: float = FASTEST) -> float:
@@ -229,8 +231,12 @@ def at_rest(definition: CatenaryDefinition, span: int | None, section: int, spee
     Raises
     ------
     ParameterError
-        If the line has no such section or span.
+        If the line has no such section or span, or speed or force are none of a train.
     """
+    if speed > FASTEST:
+        raise ParameterError(f"speed {3.6 * speed:g} km/h is faster than any train; check the unit")
+    if force > _STRONGEST:
+        raise ParameterError(f"force {force:g} N is more than any pantograph pushes with; check the unit")
     if not 1 <= section <= len(definition.sections):
         raise ParameterError(f"section {section}: the line has sections 1 to {len(definition.sections)}")
     index = section - 1

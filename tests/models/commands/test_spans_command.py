@@ -64,6 +64,7 @@ def test_the_limit_of_a_head_is_kept(said):
         (("statics", "LN2", "--set", "pantograph.m=3"), "--set pantograph.m=3: there is no pantograph here"),
         (("spans", "LN2", "--limit", "1", "--set", "pantograph.m=3"), "there is no pantograph here"),
         (("pantograph", "CX", "--set", "line.m=3"), "--set line.m=3: there is no line here"),
+        (("statics", "LN2", "--speed", "3e5"), "speed 300000 km/h is faster than any train"),
         (("statics", "LN2", "--temperature", "293"), "--temperature 293: is outside -100 ... 200 degC"),
     ],
 )

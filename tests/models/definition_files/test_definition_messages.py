@@ -57,3 +57,8 @@ def test_a_mistake_of_a_rule_is_reported_once_for_all_spans(tmp_path):
     (problem,) = mistakes(tmp_path, ("first = [4.5", "first = [60"))
     assert problem.key == "spans.droppers.first"
     assert problem.text.endswith("more like this)")
+
+
+def test_a_byte_order_mark_is_named(tmp_path):
+    (marked,) = mistakes(tmp_path, ("# LN2", "\ufeff# LN2"))
+    assert marked.text.endswith("; the file begins with a byte order mark: save it as UTF-8 without one")

@@ -134,6 +134,7 @@ def test_a_line_of_one_span_has_no_supports_between_its_anchors(only_span):
         (lambda line: in_wind(line, limit=400), "limit 400 m: no wire may be as far from the middle of the track"),
         (lambda line: in_wind(line, section="1"), "section: '1' is not a whole number"),
         (lambda line: statics(line, span=1.5), "span: 1.5 is not a whole number"),
+        (lambda line: statics(line, force="20 kN"), "force 20000 N is more than any pantograph pushes with"),
         (lambda line: over_temperature(line, ["15 degC"], section=1.5), "section: 1.5 is not a whole number"),
         (lambda line: over_temperature(line, "15 degC"), "temperatures: '15 degC' is not a list"),
         (lambda line: over_temperature(line, [None]), "temperature: None is neither a number nor a text"),

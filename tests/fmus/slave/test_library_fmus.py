@@ -23,9 +23,7 @@ from tests.fmus.support import Instance, names_of, run
 READY = [name for name in known_names() if "Catenary" not in name or find_spec("models.catenary.line_part")]
 #: Those that are tried in every run of the suite: one of every kind of line and of pantograph.
 STARTED = (
-    "Catenary_AC_curve",
     "Catenary_AC_mixed",
-    "Catenary_LN2",
     "Catenary_LN2_ring",
     "Catenary_Re330",
     "Catenary_Shinkansen",

@@ -9,6 +9,7 @@ from models.library.catalogue import load_pantograph
 from models.pantograph.multibody.analysis.posture import check_heights
 from models.pantograph.multibody.mechanism_reading import read_mechanism
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
+from tests.effort import rest
 from tests.models.pantograph.multibody.mechanisms import LIBRARY
 
 NOTHING = np.zeros(2)
@@ -87,7 +88,7 @@ def load_table(name):
     return Table.load(LIBRARY / f"{name}.toml")
 
 
-@pytest.mark.parametrize("height", [6.3, 4.4])
+@pytest.mark.parametrize("height", [6.3, *rest(4.4)])
 def test_a_start_beyond_the_stops_is_refused_with_the_range_between_them(height):
     table = load_table("generic_multibody_cam")
     table.data["start_height"] = [height, "m", "test"]

@@ -16,6 +16,7 @@ from models.commands.desk.as_built_page import page
 from models.commands.physics_files import write_csv, write_figure, write_text
 from models.commands.physics_options import check_folder, new_folder, print_table, warn
 from models.definition_files.parameter import ParameterError
+from models.layout.as_built.alignment import LARGEST_SCALE
 from models.layout.as_built.as_built_definition import as_built_text
 from models.layout.as_built.as_built_line import Tell, silent
 from models.layout.as_built.as_built_outcome import AGREEMENT, AsBuiltOutcome, judge_as_built
@@ -108,6 +109,17 @@ def _doubts(found: AsBuiltOutcome) -> Iterator[str]:
         yield (
             f"{built.run.source} has neither staggers nor structures that the design names: its positions are taken "
             "as the design's, and an error of a metre moves heights by millimetres"
+        )
+    named = [s.structure for section in built.definition.sections for s in section.supports if s.structure]
+    if named and (strange := sorted({name for name in built.run.structure if name} - set(named))):
+        yield (
+            f"{built.run.source}: {len(strange)} structures, '{strange[0]}' the first, are none of the design's and "
+            "say nothing here"
+        )
+    if abs(built.alignment.scale) > LARGEST_SCALE:
+        yield (
+            f"the way of {built.run.source} differs by {100.0 * built.alignment.scale:+.2f} % from the design's, and "
+            f"{100.0 * LARGEST_SCALE:g} % is what a vehicle's may: check positions, and lengths of spans"
         )
     if built.difference > AGREEMENT:
         yield (

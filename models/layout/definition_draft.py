@@ -65,12 +65,14 @@ class DefinitionDraft:
         return True
 
     def place(self, key: str) -> Place | None:
-        """Return where the value of a key stands, or of the table that it is in; None if that is in no sheet."""
+        """Return where the value of a key stands, or the table that it is in, or its first key; None: in no sheet."""
+        whole = key
         while key:
             if key in self.places:
                 return self.places[key]
             key = key.rpartition(".")[0]
-        return None
+        inside = (p for k, p in self.places.items() if k.startswith(f"{whole}.") and p.sheet == "line")
+        return next(inside, None)
 
 
 def _inside(table: dict[str, Any], step: str, path: str) -> dict[str, Any]:
@@ -79,6 +81,8 @@ def _inside(table: dict[str, Any], step: str, path: str) -> dict[str, Any]:
     if match is None:
         raise KeyFormError(f"'{path}' names no table")
     name, number = match[1], int(match[2] or 0)
+    if match[2] and not number:
+        raise KeyFormError(f"there is no '{path}': they are counted from 1")
     inner = table.setdefault(name, [] if number else {})
     if not number:
         if not isinstance(inner, dict):

@@ -21,7 +21,7 @@ from models.layout.definition_draft import DefinitionDraft, KeyFormError, toml_t
 from models.layout.layout_sections import read_sections, spanned
 from models.layout.layout_sheets import Layout, read_layout
 from models.layout.layout_supports import put_sections
-from models.layout.sheet_problems import Place, SheetProblems
+from models.layout.sheet_problems import Place, ProblemsOfOthers, SheetProblems
 from models.layout.sheet_table import SheetTable
 
 _WIRE: Final = ("area", "mass", "youngs_modulus", "tension", "bending_stiffness", "diameter")
@@ -48,6 +48,8 @@ _TABLES: Final = {
 }
 _NESTED: Final = ("damping", "tensioning", "wind")
 _TRACK: Final = {"curvature": "1/m", "radius": "m", "cant": "m", "vertical_curvature": "1/m"}
+#: How the reader of definitions begins to tell of a key that there is not.
+_UNKNOWN: Final = "unknown key"
 #: Tables of a definition in which something lacks where a sheet is wrong.
 _CONSEQUENT: Final = (*SECTION_TABLES, "section", "profile", "track", *WIRE_COLUMNS)
 #: What a layout without a design and without damping gets.
@@ -119,6 +121,7 @@ class _Maker:
         self.layout, self.design, self.problems = layout, design, problems
         self.draft = DefinitionDraft({} if design is None else design.behind())
         self.notes: list[str] = []
+        self.keys: dict[str, Place] = {}
 
     def fill(self, name: str) -> None:
         """Put all sheets into the draft, telling what is wrong."""
@@ -158,6 +161,10 @@ class _Maker:
         if problem.key in self.draft.told:
             return
         place = self.draft.place(problem.key)
+        if problem.key in self.keys and problem.text.startswith(_UNKNOWN):
+            text = problem.text.replace(_UNKNOWN, f"there is no key '{problem.key}'", 1)
+            self.problems.add(self.keys[problem.key], text)
+            return
         if place is not None and place.sheet:
             is_its_own = problem.key in self.draft.places
             self.problems.add(place, problem.text if is_its_own else f"'{problem.key}' {problem.text}")
@@ -201,6 +208,7 @@ class _Maker:
 
     def _put_key(self, sheet: SheetTable, k: int, key: str, text: str) -> None:
         unit, source = sheet.texts("unit")[k], sheet.texts("source")[k]
+        self.keys[key] = sheet.place(k, "key")
         try:
             self.draft.put(key, _entry(text, unit, self._source(sheet, k, source)), sheet.place(k, "value"))
         except KeyFormError as error:
@@ -259,7 +267,7 @@ class _Maker:
 
     def _put_supports(self, supports: SheetTable) -> None:
         droppers = self.layout.sheets.get("droppers", SheetTable("droppers", 0, (), {}))
-        told = self.problems if "droppers" in self.layout.sheets else _WithoutDroppers(self.problems)
+        told = self.problems if "droppers" in self.layout.sheets else ProblemsOfOthers(self.problems, "droppers")
         sections = read_sections(supports, droppers, told)
         definition = None if self.design is None else self.design.definition
         self._check_arms(supports)
@@ -311,7 +319,7 @@ class _Maker:
         """Put the track at its knots, in the order of their places."""
         named = [name for name in _TRACK if sheet.has(name)]
         if "curvature" in named and "radius" in named:
-            self.problems.add(sheet.heading("radius"), "says what the curvature says: remove one of the columns")
+            self.problems.add(sheet.heading("radius"), "says what curvature says: give one of them")
         if not named:
             self.problems.add(sheet.heading(), "has none of the columns curvature, radius, cant, vertical_curvature")
             return
@@ -321,6 +329,11 @@ class _Maker:
         for name in ("positions", *_TRACK):
             table.pop(name, None)  # of the design
         source = f"{self.layout.name}, {spanned(sheet, rows)}" if rows else ""
+        x = sheet.numbers("position")[rows]
+        for k in np.flatnonzero(np.diff(x) < 0.0) + 1:
+            text = f"{x[k]:g} m comes after {x[k - 1]:g} m: positions rise along the track"
+            self.problems.add(sheet.place(rows[k], "position"), text)
+            self.draft.told.add("track.positions")
         for name, unit in (("position", "m"), *((name, _TRACK[name]) for name in named)):
             values = sheet.numbers(name)[rows]
             for k in np.flatnonzero(np.isnan(values) & ~sheet.told(name)[rows]):
@@ -336,20 +349,6 @@ class _Maker:
         """Return the source of a value: its row, and what the row says of where it is from."""
         row = f"{self.layout.name}, {spanned(sheet, [k])}"
         return f"{given} ({row})" if given else row
-
-
-class _WithoutDroppers(SheetProblems):
-    """Problems of supports alone, where the sheet of droppers is missing, which has been told."""
-
-    def __init__(self, inner: SheetProblems) -> None:
-        super().__init__(inner.file)
-        self.inner = inner
-
-    def add(self, place: Place, text: str) -> None:
-        """Record a problem of another sheet than droppers."""
-        if place.sheet != "droppers":
-            super().add(place, text)
-            self.inner.add(place, text)
 
 
 def _without_repeats(sheet: SheetTable, order: list[int], names: list[str], problems: SheetProblems) -> list[int]:

@@ -101,6 +101,10 @@ def _check_names(supports: SheetTable, droppers: SheetTable, names: Sequence[str
         for k, name in enumerate(supports.texts("section")):
             if not name:
                 problems.add(supports.place(k, "section"), "is empty, and other rows name their section")
+    if len(droppers) and not droppers.has("section") and "" not in names:
+        text = f"the column 'section' is missing: which of the sections {', '.join(names)} is each dropper of?"
+        problems.add(droppers.heading(), text)
+        return
     for k, name in enumerate(droppers.texts("section")):
         if name not in names:
             what = f"there is no section {shown_value(name)} in the sheet supports" if name else "is empty"

@@ -71,6 +71,20 @@ class SheetProblems:
         self._places: dict[Problem, Place] = {}
 
 
+class ProblemsOfOthers(SheetProblems):
+    """Problems of other sheets than one that is missing, which has been told."""
+
+    def __init__(self, inner: SheetProblems, missing: str) -> None:
+        super().__init__(inner.file)
+        self.inner, self.missing = inner, missing
+
+    def add(self, place: Place, text: str) -> None:
+        """Record a problem of another sheet."""
+        if place.sheet != self.missing:
+            super().add(place, text)
+            self.inner.add(place, text)
+
+
 def _order(place: Place) -> tuple[int, int, str]:
     letters = place.column.partition(" ")[0]
     return place.row, len(letters), letters

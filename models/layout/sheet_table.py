@@ -154,6 +154,9 @@ def read_table(grid: SheetGrid, declared: Sequence[SheetColumn], problems: Sheet
     found = _headings(grid, declared, problems)
     if found is None:
         return None
+    if body and _are_units(body[0][1], found):
+        text = "holds units: write them behind the names in brackets, as 'height [mm]', and delete this row"
+        problems.add(Place(grid.name, body.pop(0)[0]), text)
     columns = {}
     decimal_point = _has_decimal_point(body, [place for place, (column, _) in found.items() if column.unit])
     for place, (column, unit) in found.items():
@@ -243,6 +246,13 @@ def _name_and_unit(cell: Cell) -> tuple[str, str]:
 def _plain_name(text: str) -> str:
     """Return a name in lower case, its words joined as declared ones are."""
     return re.sub(r"[\s_-]+", "_", text.casefold())
+
+
+def _are_units(cells: Sequence[Cell], found: Mapping[int, tuple[SheetColumn, str]]) -> bool:
+    """Return whether a row has units where numbers should be, as below the names in the tables of many."""
+    there = [cells[k] for k, (column, _) in found.items() if column.unit and k < len(cells) and cells[k]]
+    words = [c.strip("[]() ").translate(_SIGNS) if isinstance(c, str) else "" for c in there]
+    return any(word != "1" for word in words) and all(word in SI for word in words)
 
 
 def _tell_nameless(

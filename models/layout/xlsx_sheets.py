@@ -50,10 +50,16 @@ def read_xlsx(path: Path, problems: SheetProblems) -> dict[str, SheetGrid]:
         problems.add(Place(""), text)
         return {}
     sheets = {}
+    titles: dict[str, str] = {}
     for sheet in stored.worksheets:
+        name = sheet.title.strip().casefold()
+        if (other := titles.setdefault(name, sheet.title)) != sheet.title:
+            text = f"stands in two sheets, '{other}' and '{sheet.title}': remove one, or give it another name"
+            problems.add(Place(name), text)
+            continue
         grid = _grid(sheet, written[sheet.title], problems)
         if grid is not None:
-            sheets[sheet.title.strip().casefold()] = grid
+            sheets[name] = grid
     return sheets
 
 
@@ -129,8 +135,10 @@ def _grid(stored: Any, written: Any, problems: SheetProblems) -> SheetGrid | Non
 
 
 def _merged(sheet: Any) -> Iterator[tuple[str, Unusable]]:
-    """Yield the cells that merging has emptied, all but the first of each range."""
+    """Yield the cells that merging has emptied, all but the first of each range that holds something."""
     for found in sheet.merged_cells.ranges:
+        if sheet.cell(found.min_row, found.min_col).value is None:
+            continue
         text = f"belongs to the merged cells {found.coord}: unmerge them, and write into each what holds there"
         yield from ((sheet.cell(*place).coordinate, Unusable(text)) for place in list(found.cells)[1:])
 

@@ -37,6 +37,10 @@ _LEAST_WAY: Final = 100.0
 _GAP: Final = 5.0
 #: A second fit is alike if it leaves less than twice as much unexplained, and this.
 _ALIKE: Final = 0.005
+#: What to say of staggers that fit better if left were negative.
+_OPPOSITE: Final = (
+    "with the opposite sign they would fit better: left of the track's middle is positive, as seen in rising position"
+)
 
 
 @dataclass(frozen=True)
@@ -117,8 +121,11 @@ def align(run: MeasuredRun, definition: CatenaryDefinition, courses: tuple[WireC
 def _by_structures(run: MeasuredRun, known: dict[str, float]) -> Alignment:
     seen: dict[str, float] = {}
     for x, name in zip(run.position.tolist(), run.structure, strict=True):
-        if name in known:
-            seen.setdefault(name, x)
+        if name in known and x - seen.setdefault(name, x) > _APART:
+            raise AsBuiltError(
+                f"{run.source}: structure '{name}' stands at {seen[name]:.2f} m and at {x:.2f} m: it is in one place; "
+                "correct the names"
+            )
     if not seen:
         first = next(filter(None, run.structure))
         raise AsBuiltError(
@@ -162,10 +169,11 @@ def _by_staggers(run: MeasuredRun, courses: tuple[WireCourse, ...]) -> Alignment
         raise AsBuiltError(_nowhere(run, fits, correlation))
     other, where = fits.second(shift)
     if 1.0 - other < 2.0 * (1.0 - fits.value) + _ALIKE:
+        signs = f"; {_OPPOSITE} ({-fits.opposite:.3f})" if 1.0 + fits.opposite < 0.5 * (1.0 - fits.value) else ""
         raise AsBuiltError(
             f"{run.source}: the staggers fit the design in two places alike, shifted by {shift:.1f} m (correlation "
             f"{fits.value:.3f}) and by {where:.1f} m ({other:.3f}): name the structures in a column 'structure', or "
-            "give a longer run"
+            f"give a longer run{signs}"
         )
     return Alignment("staggers", found.measured, found.design, correlation)
 
@@ -181,7 +189,7 @@ def _nowhere(run: MeasuredRun, fits: _Fits, correlation: float) -> str:
         f"{LEAST_CORRELATION:g} is the least"
     )
     if -fits.opposite >= LEAST_CORRELATION:
-        return f"{text}; with the opposite sign they would: left of the track's middle is positive, in rising position"
+        return f"{text}; {_OPPOSITE}"
     return f"{text}; check that this is the line, and the units of positions and staggers"
 
 

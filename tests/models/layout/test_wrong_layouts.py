@@ -315,7 +315,7 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
     ),
     "keys that are none": (
         change("line", "damping.alpha", "damping.alfa", "clamps.dropper_lower", "clamps"),
-        [("line, row 2, column B (value)", "unknown key (known here: alpha, auxiliary_wire"),
+        [("line, row 2, column A (key)", "there is no key 'damping.alfa' (known here: alpha, auxiliary_wire"),
          ("line, row 4, column A (key)", "'clamps' is a table: name a key in it, as damping.alpha is in damping")],
     ),
     "keys that lack": (
@@ -333,7 +333,12 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
          ("line, row 10, column A (key)", "'name' cannot stand here: its name is that of its file"),
          ("line, row 8, column B (value)", "'contact_wire.tension' is what row 2 of the sheet wires gives"),
          ("line, row 5, column B (value)", "'profile.encumbrance' is what the sheet supports gives: remove this row"),
-         ("line, row 7, column B (value)", "unknown key")],
+         ("line, row 7, column A (key)", "there is no key 'wires' (known here: ")],
+    ),
+    "faults that are not counted": (
+        lambda s: s.update(line=s["line"] + "fault.kind;arm_loose;;\nfault[0].kind;arm_loose;;\n"),
+        [("line, row 5, column B (value)", "'fault' must be an array of tables [[fault]]"),
+         ("line, row 6, column A (key)", "there is no 'fault[0]': they are counted from 1")],
     ),
     "a key with a wrong value": (
         change("line", "1e-4", "soon", "0.165;kg", "0.165;N"),
@@ -348,17 +353,22 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
     "curvature and radius": (
         instead("supports", "position;height;encumbrance;stagger;arm_length;arm_angle;radius;curvature\n"
                 "0;5;1.4;0;;;0;0\n50;5;1.4;0.1;1.2;-0.1;5;0\n100;5;1.4;0.1;1.2;-0.1;;0\n150;5;1.4;0;;;0;\n"),
-        [("supports, row 1, column G (radius)", "says what the curvature says: remove one of the columns"),
+        [("supports, row 1, column G (radius)", "says what curvature says: give one of them"),
          ("supports, row 4, column G (radius)", "is empty: every row needs a value, 0 for none"),
          ("supports, row 5, column H (curvature)", "is empty: every row needs a value, 0 for none"),
          *[(f"droppers, row {r}, column A (span)", "there is no span") for r in range(11, 17)]],
+    ),
+    "a track that goes back": (
+        lambda s: s.update(track="position;curvature\n0;0\n100;0.001\n50;0\n80;0\n70;0\n"),
+        [("track, row 4, column A (position)", "50 m comes after 100 m: positions rise along the track"),
+         ("track, row 6, column A (position)", "70 m comes after 80 m: positions rise along the track")],
     ),
     "a track in two sheets": (
         every(change("supports", "structure", "cant [mm]", "A1", "0", "M1", "0", "M2", "50", "M3", "50", "M4", "0",
                      "A2", "0"),
               lambda s: s.update(track="position;cant [mm]\n0;0\n100;100\n90;0\n")),
         [("supports, row 1, column A (cant)", "the sheet 'track' gives the track: remove it, or this column"),
-         ("track, row 1, column A (position)", "are not in rising order: 90 m comes after 100 m")],
+         ("track, row 4, column A (position)", "90 m comes after 100 m: positions rise along the track")],
     ),
     # sections
     "sections that are none": (
@@ -370,6 +380,15 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
          *[(f"droppers, row {r}, column A (section)", "there is no section") for r in range(4, 17)],
          *[("droppers, row 1, column B (span)", f"span {k}") for k in range(2, 5)],
          ("supports, row 6, column C (span_length)", "no span begins at the last support: empty the cell")],
+    ),
+    "sections of the supports alone": (
+        change("supports", "structure", "section", "A1", "A", "M1", "A", "M2", "A", "M3", "A", "M4", "A", "A2", "A"),
+        [("droppers, row 1", "the column 'section' is missing: which of the sections A is each dropper of?")],
+    ),
+    "units in a row of their own": (
+        change("supports", "[m]", "", "[deg]", "", "A1;", ";m;[m];m;m;m;m;°\nA1;", "-10", "-0.2", "-10", "-0.2",
+               "-10", "-0.2", "-10", "-0.2"),
+        [("supports, row 2", "holds units: write them behind the names in brackets, as 'height [mm]'")],
     ),
 }  # fmt: skip
 
@@ -441,6 +460,25 @@ def test_every_problem_of_a_wrong_workbook_is_told(tmp_path):
     ]
     assert [place for place, _ in told] == [place for place, _ in expected]
     assert all(text.startswith(part) for (_, text), (_, part) in zip(told, expected, strict=True))
+
+
+def test_sheets_of_one_name_and_merged_cells_without_anything(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.title = "droppers "
+    for name in ("Droppers", "supports"):
+        sheet = book.create_sheet(name)
+        for line in BASE[name.lower()].splitlines():
+            sheet.append([cell or None for cell in line.split(";")])
+    book["supports"].merge_cells("J20:K21")
+    book["supports"].merge_cells("G2:H2")  # an anchor has no arm
+    path = tmp_path / "survey.xlsx"
+    book.save(path)
+    with pytest.raises(LayoutError) as error:
+        import_layout(path, "wrong")
+    told = [str(problem).removeprefix(f"{path}: ") for problem in error.value.problems]
+    assert told[0].startswith("droppers: stands in two sheets, 'droppers ' and 'Droppers': remove one")
+    assert not [text for text in told if text.startswith("supports")]
 
 
 def test_a_wrong_layout_writes_nothing(tmp_path, capsys):

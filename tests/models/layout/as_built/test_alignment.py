@@ -95,8 +95,12 @@ def test_staggers_that_say_nothing_are_refused(line):
 def test_the_other_sign_is_recognised(line):
     x = np.arange(0.0, 550.0, 0.5)
     supports, stagger = SUPPORTS[[0, 2, 3, 5, 8, 9, 12]], 0.2 * np.array([1.0, -1.0, 0.3, 0.9, 0.2, -0.8, 1.0])
-    with pytest.raises(AsBuiltError, match="with the opposite sign they would: left"):
+    with pytest.raises(AsBuiltError, match="with the opposite sign they would fit better: left"):
         align(run_of(x, -np.interp(x, supports, stagger)), line, wire(supports, stagger))
+
+    x = np.arange(1.0, 551.0, 0.5)  # with that sign, at a span's distance, too
+    with pytest.raises(AsBuiltError, match=r"in two places alike.* longer run; with the opposite sign .*\(1\.000\)$"):
+        align(run_of(x, -np.interp(x, SUPPORTS, STAGGER)), line, wire(SUPPORTS, STAGGER))
 
 
 def test_without_staggers_and_structures_positions_stay(line):
@@ -146,6 +150,7 @@ def test_one_structure_shifts(named):
     [
         (((70, "A"), (120, "B")), "structure 'A' and all others are none of the design's, which has M1, M2, M3"),
         (((70, "M2"), (120, "M1")), "structure 'M1' comes after 'M2', and before it in the design"),
+        (((70, "M1"), (90, "M2"), (120, "M1")), "structure 'M1' stands at 70.00 m and at 120.00 m: it is in one place"),
         (((70, "M1"), (123, "M2")), "from structure 'M1' to 'M2' it is 53.00 m, and 50.00 m in the design"),
     ],
 )

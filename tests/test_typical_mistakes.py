@@ -32,6 +32,19 @@ LINE_ENGINEER = {
     "a line by another name": Mistake("statics LN22", 1, "C270, CA160"),
     "a file for a name": Mistake("statics LN2.toml", 1, "called by its name, without .toml"),
     "a span that the line has not": Mistake("statics LN2 --span 40", 1, "the line has spans 1 to 24"),
+    "a height of a run in millimetres": Mistake(
+        "asbuilt LN2 m.csv --out built",
+        1,
+        "row 2, column B (height): 5080 is outside 2 ... 10 m",
+        ("", "position,height\n0,5080\n1,5.081\n2,5.08\n"),
+    ),
+    "a run that was never laid on the line": Mistake(
+        "asbuilt LN2 m.csv --out built",
+        1,
+        "no row lies on the line, which reaches from -3.1 to 1136.9 m",
+        ("", "position [km],height [mm]\n84.1,5080\n84.2,5081\n84.3,5080\n"),
+    ),
+    "a step in metres": Mistake("asbuilt LN2 m.csv --out built --step 0.005", 1, "outside 0.1 ... 500 mm"),
     "no part before the parameter": Mistake(
         "statics LN2 --set contact_wire.tension=26kN", 2, "write line.PARAMETER=VALUE or pantograph.PARAMETER=VALUE"
     ),

@@ -14,7 +14,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.catenary.condition.fitted_lengths import with_errors
-from models.catenary.shape.form_finding import StaticState, find_form
+from models.catenary.shape.form_finding import StaticState
+from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics.wire_course import wire_courses
 from models.library.catalogue import load_line
@@ -26,7 +27,7 @@ ORIGIN, SHORT = 84_300.0, 0.0008
 def line_and_errors() -> tuple[StaticState, FloatArray]:
     """Return LN2 as designed, and what its droppers are too long [m]; beyond 250 ... 1000 m they are right."""
     line = load_line("LN2")
-    design = find_form(line, build_mesh(line))
+    design = kept_form(line, build_mesh(line))
     x = design.positions[design.shape.mesh.droppers[:, 0], 0]
     drawn = np.clip(np.random.default_rng(7).standard_normal(len(x)), -3.0, 3.0)
     return design, np.where((x > 250.0) & (x < 1000.0), 0.010 * drawn, 0.0)

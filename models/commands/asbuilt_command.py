@@ -51,7 +51,10 @@ def run(arguments: argparse.Namespace) -> int:
     warn(doubtful)
     folder = new_folder(arguments.out)
     write(folder, found, design_path, measured.source)
-    write_text(folder / PAGE, page(found, str(design_path), doubtful))
+    drawn = {"errors": as_built_plots.errors(found), "heights": as_built_plots.heights(found)}
+    for name, figure in drawn.items():
+        write_figure(folder / f"{name}.png", figure, 150)
+    write_text(folder / PAGE, page(found, str(design_path), doubtful, drawn))
     _print(arguments.line, found)
     print(f"page: {folder / PAGE}, with definitions, tables and figures beside it")
     return 0
@@ -67,7 +70,7 @@ def _print(line: str, found: AsBuiltOutcome) -> None:
 
 
 def write(folder: Path, found: AsBuiltOutcome, design_path: Path, source: str) -> None:
-    """Write the definitions as built and as corrected, the running surface, the table and the figures."""
+    """Write the definitions as built and as corrected, the running surface and the table."""
     text, built = design_path.read_text(encoding="utf-8"), found.built
     surface = "" if found.surface.is_even else SURFACE
     designed = built.design.unstrained_length
@@ -84,8 +87,6 @@ def write(folder: Path, found: AsBuiltOutcome, design_path: Path, source: str) -
         write_text(folder / name, as_built_text(text, stem, built.design, error, where, remark, surface))
     write_csv(folder / SURFACE, ("position [m]", "height [mm]"), (found.surface.x, 1e3 * found.surface.r), 8)
     write_text(folder / DROPPERS, as_built_tables.droppers_csv(found))
-    for name, drawn in zip(FIGURES, (as_built_plots.errors(found), as_built_plots.heights(found)), strict=True):
-        write_figure(folder / name, drawn, 150)
 
 
 def _check_millimetres(name: str, value: float) -> None:

@@ -24,13 +24,15 @@ if TYPE_CHECKING:  # they are compiled from copies, see `kernel_cache`
     from models.coupled import lanes_linear_kernels as _l  # noqa: F401
     from models.coupled import lanes_train_kernels as _t  # noqa: F401
 
+_STEP: Final = Path(__file__).parents[1] / "catenary" / "step"
 #: Their files by name, each after those that it imports.
 _KERNEL_FILES: Final = {
-    "linear": (
-        Path(__file__).parents[1] / "catenary" / "step" / "vector_kernels.py",
-        Path(__file__).with_name("lanes_linear_kernels.py"),
+    "linear": (_STEP / "vector_kernels.py", Path(__file__).with_name("lanes_linear_kernels.py")),
+    "contact": (
+        _STEP / "vector_kernels.py",
+        _STEP / "law_kernels.py",
+        Path(__file__).with_name("lanes_contact_kernels.py"),
     ),
-    "contact": (Path(__file__).with_name("lanes_contact_kernels.py"),),
     "train": (Path(__file__).with_name("lanes_train_kernels.py"),),
 }
 #: Texts for what the kernels return for a lane.

@@ -2,15 +2,16 @@
 
 The arithmetic is that of `models.catenary.contact_and_slack` and `models.catenary.line_model`; a lane is one run.
 
-This module imports nothing of the project and is not divided, so it is longer than a file should be: it is compiled
-from a copy in the user's cache (`models.numerics.kernel_cache`), which cannot see other files.
+This module is not divided, so it is longer than a file should be: it is compiled from a copy in the user's cache
+(`models.numerics.kernel_cache`), to which the files that it imports are joined.
 """
 
 from collections import namedtuple
-from typing import Any
 
 import numpy as np
-from numba import njit
+
+from models.catenary.step.law_kernels import SLOWEST_IMPACT, eliminate, law_of
+from models.catenary.step.vector_kernels import compiled, part
 
 #: How the local problem of a lane ended.
 SOLVED, UNSETTLED, SINGULAR = 0, 1, 2
@@ -19,7 +20,7 @@ OWN = 3
 #: Most iterations of a local problem, and the relative change of its forces at which it counts as solved.
 _MOST, _TOLERANCE = 60, 1e-10
 #: Of `models.contact_law` and `models.catenary.contact_and_slack`.
-_SLOWEST_IMPACT, _STRIP_EDGE, _WIRE_EDGE, _FAR, _NEAR = 1e-6, 0.05, 1.0, 1.0, 5.0
+_STRIP_EDGE, _WIRE_EDGE, _FAR, _NEAR = 0.05, 1.0, 1.0, 5.0
 #: Contact wires: where elements begin and where each wire's begin among them, its period, interval of each element;
 #: records of intervals and of droppers, with the numbers that say what is where in them.
 Wires = namedtuple(
@@ -55,21 +56,16 @@ Work = namedtuple(
 (
     FOUND, ELEMENT, XI, SHARE, ENGAGED, HEIGHT, RISE, RATE, GIVES, DEPTH, SPEED, IMPACT, PRESSES, FORCE, CLOSED, MET,
 ) = range(16)  # fmt: skip
-#: Sums may be reordered, not more: infinities and NaN stay what they are.
-_OPTIONS: Any = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
-#: Functions that are called from outside, and those that are not: what leads into these from Python is not compiled.
-_compiled = njit(cache=True, **_OPTIONS)
-_inner = njit(**(_OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}))
 
 
-@_inner
+@part
 def of_lane(lane, memory):
     """Return the places of a lane's pantographs and wires."""
     count = memory.interval.size // memory.active.size
     return range(lane * count, (lane + 1) * count)
 
 
-@_inner
+@part
 def interval_of(wires, index):
     """Return the numbers of an interval; in its record whole numbers are held as what they are."""
     numbers = wires.numbers[index]
@@ -90,7 +86,7 @@ def interval_of(wires, index):
     )  # fmt: skip
 
 
-@_inner
+@part
 def local_motion(interval, index, lane, records, memory, motion, local):
     """Put local coordinates of an interval and their rates at the end of the step into ``local``, shape (2, m)."""
     a1, n, e = motion.a1[0], interval.modes, interval.ends
@@ -118,7 +114,7 @@ def local_motion(interval, index, lane, records, memory, motion, local):
         local[1, n + j] = a1 * change - motion.attached[place, 1, lane]
 
 
-@_inner
+@part
 def standing(interval, lane, records, motion, local):
     """Put local coordinates of an interval as they are into ``local``."""
     for i in range(interval.modes):
@@ -127,7 +123,7 @@ def standing(interval, lane, records, motion, local):
         local[0, interval.modes + j] = motion.attached[np.int64(records[interval.places + j]), 0, lane]
 
 
-@_inner
+@part
 def start_element(wires, wire, guess, x):
     """Return where to begin walking; see `ContactWire.start`."""
     first, last = wires.first[wire], wires.first[wire + 1] - 1
@@ -137,7 +133,7 @@ def start_element(wires, wire, guess, x):
     return min(max(np.searchsorted(wires.starts[first : last + 1], x) - 1, 0), count - 1)
 
 
-@_inner
+@part
 def meet(wires, wire, lane, q, strip, guess, memory, motion, work):
     """Find where a strip (x, y of its ends, z, vz) crosses a wire at the end of the step; see `ContactWire.find`."""
     met, local = work.met[q], work.local
@@ -195,7 +191,7 @@ def meet(wires, wire, lane, q, strip, guess, memory, motion, work):
     met[RISE], met[RATE] = rise, rate
 
 
-@_inner
+@part
 def place_nodes(interval, own, records, local, place):
     """Put the positions in plan of both ends of an element into ``place``."""
     count = interval.modes + interval.ends
@@ -207,7 +203,7 @@ def place_nodes(interval, own, records, local, place):
         place[k] = value
 
 
-@_inner
+@part
 def lift_and_give(interval, own, xi, records, modes, row, load):
     """Put what a unit force on a point does to the local coordinates into ``row`` and to the attachments into ``load``.
 
@@ -238,29 +234,14 @@ def lift_and_give(interval, own, xi, records, modes, row, load):
     return height, gives
 
 
-@_inner
-def normal_force(law, engaged, impact_before, penetration, velocity):
-    """Return the force of a contact and its slopes; see `models.contact_law.continuous_contact`."""
-    if penetration <= 0.0:
-        return 0.0, 0.0, 0.0
-    impact = impact_before if impact_before else max(velocity, 0.0)
-    elastic = law.stiffness * penetration**law.exponent
-    hysteresis = 0.75 * (1.0 - law.restitution**2) / max(impact, _SLOWEST_IMPACT)
-    factor = 1.0 + hysteresis * velocity
-    if factor <= 0.0:
-        return 0.0, 0.0, 0.0
-    slope = law.exponent * elastic / penetration * factor
-    return engaged * (elastic * factor), engaged * slope, engaged * (elastic * hysteresis)
-
-
-@_inner
+@part
 def single_contact(met, compliance, law, a1):
     """Return force, velocity and penetration of one contact alone, and whether they were found."""
     force = 0.0
     for _ in range(_MOST):
         penetration = met[DEPTH] - compliance * force
         velocity = met[SPEED] - a1 * compliance * force
-        value, by_penetration, by_velocity = normal_force(law, met[ENGAGED], met[IMPACT], penetration, velocity)
+        value, by_penetration, by_velocity = law_of(penetration, velocity, met[IMPACT], met[ENGAGED], law)
         slope = compliance * (by_penetration + a1 * by_velocity)
         before, force = force, (value + slope * force) / (1.0 + slope)
         if abs(force - before) <= _TOLERANCE * (1.0 + force):
@@ -268,7 +249,7 @@ def single_contact(met, compliance, law, a1):
     return force, 0.0, 0.0, False
 
 
-@_inner
+@part
 def column_at(values, at, reached, begin, rows, place):
     """Return a response, which reaches some rows of all from ``begin`` on, at a row."""
     offset = place - begin
@@ -277,7 +258,7 @@ def column_at(values, at, reached, begin, rows, place):
     return values[at + offset] if offset < reached else 0.0
 
 
-@_inner
+@part
 def add_columns(records, at, rows, count, load, result):
     """Put the sum of the rows of a matrix, each times its load, into ``result``; they have ``count`` entries."""
     result[:count] = 0.0
@@ -289,34 +270,7 @@ def add_columns(records, at, rows, count, load, result):
                 result[k] += row[k] * share
 
 
-@_inner
-def solve_dense(system, right, n):
-    """Solve a small system in place by elimination with pivots; return whether it could be."""
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(system[i, k]) > abs(system[pivot, k]):
-                pivot = i
-        if system[pivot, k] == 0.0:
-            return False
-        if pivot != k:
-            for j in range(k, n):
-                system[k, j], system[pivot, j] = system[pivot, j], system[k, j]
-            right[k], right[pivot] = right[pivot], right[k]
-        for i in range(k + 1, n):
-            factor = system[i, k] / system[k, k]
-            if factor != 0.0:
-                for j in range(k + 1, n):
-                    system[i, j] -= factor * system[k, j]
-                right[i] -= factor * right[k]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            right[i] -= system[i, j] * right[j]
-        right[i] /= system[i, i]
-    return True
-
-
-@_inner
+@part
 def find_contacts(lane, wires, strips, law, memory, motion, work):
     """Find which strips of a lane cross wires, and put those that may press into ``work.contacts``; return how many."""
     n, sections = 0, wires.period.size
@@ -337,7 +291,7 @@ def find_contacts(lane, wires, strips, law, memory, motion, work):
     return n
 
 
-@_inner
+@part
 def couple(contacts, wires, motion, work):
     """Find what the contacts' forces do to droppers and to one another."""
     rows, records = motion.change.shape[0], wires.records
@@ -370,13 +324,13 @@ def couple(contacts, wires, motion, work):
             work.compliance[a, b] = total
 
 
-@_inner
+@part
 def pressed_interval(q, wires, work):
     """Return the interval on which a candidate is."""
     return wires.interval[wires.first[q % wires.period.size] + np.int64(work.met[q, ELEMENT])]
 
 
-@_inner
+@part
 def couple_slack(k, j, contacts, wires, motion, work):
     """Find what a force of dropper ``j``, the ``k``-th slack one, does to droppers and contacts."""
     numbers = wires.slack_numbers[j]
@@ -395,7 +349,7 @@ def couple_slack(k, j, contacts, wires, motion, work):
         work.on_contacts[a, k] = total
 
 
-@_inner
+@part
 def penetrate(contacts, slack, a1, work):
     """Find penetrations and their velocities under the present forces."""
     for a in range(contacts):
@@ -408,7 +362,7 @@ def penetrate(contacts, slack, a1, work):
         work.velocity[a] = work.met[work.contacts[a], SPEED] + a1 * change
 
 
-@_inner
+@part
 def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
     """Solve for contact forces and slack droppers of a lane; see `LocalProblem.solve`.
 
@@ -437,7 +391,7 @@ def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
                 return 0
     for a in range(contacts):
         met = work.met[work.contacts[a]]
-        value, slope, _ = normal_force(law, met[ENGAGED], met[IMPACT], met[DEPTH], met[SPEED])
+        value, slope, _ = law_of(met[DEPTH], met[SPEED], met[IMPACT], met[ENGAGED], law)
         work.force[a] = value / (1.0 + slope * met[GIVES])
     for k in range(slack):
         work.slack[k], work.lacking[k] = memory.slack[lane, k], 0.0
@@ -471,7 +425,7 @@ def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
     return -UNSETTLED
 
 
-@_inner
+@part
 def find_slack(contacts, slack, work):
     """Put the droppers that would push under the present forces into ``work.found``; return how many."""
     now = 0
@@ -487,7 +441,7 @@ def find_slack(contacts, slack, work):
     return now
 
 
-@_inner
+@part
 def take_over(now, before, contacts, wires, motion, work):
     """Take the droppers of ``work.found`` for the slack ones, with the forces of those that were so before."""
     for i in range(before):
@@ -503,7 +457,7 @@ def take_over(now, before, contacts, wires, motion, work):
     return now
 
 
-@_inner
+@part
 def newton_step(contacts, slack, law, unilateral, a1, work):
     """Solve the local problem linearised at the present forces into ``work.change``; return whether it could be.
 
@@ -513,7 +467,7 @@ def newton_step(contacts, slack, law, unilateral, a1, work):
     for a in range(contacts):
         met = work.met[work.contacts[a]]
         depth, speed = work.penetration[a], work.velocity[a]
-        value, by_penetration, by_velocity = normal_force(law, met[ENGAGED], met[IMPACT], depth, speed)
+        value, by_penetration, by_velocity = law_of(depth, speed, met[IMPACT], met[ENGAGED], law)
         slope = by_penetration + a1 * by_velocity
         moved = 0.0
         for b in range(contacts):
@@ -530,10 +484,10 @@ def newton_step(contacts, slack, law, unilateral, a1, work):
         for i in range(slack):
             system[contacts + k, contacts + i] = (1.0 if i == k else 0.0) - unilateral[j] * work.by_slack[i, j]
         right[contacts + k] = -unilateral[j] * work.pull[j]
-    return solve_dense(system, right, contacts + slack)
+    return eliminate(system, right, contacts + slack)
 
 
-@_inner
+@part
 def add_along(change, lane, begin, factor, values, at, count):
     """Add a multiple of some values to the rows from ``begin`` on, round the end of a line that closes on itself."""
     before = min(change.shape[0] - begin, count)
@@ -544,7 +498,7 @@ def add_along(change, lane, begin, factor, values, at, count):
         change[k - before, lane] += factor * shown[k]
 
 
-@_inner
+@part
 def react(lane, contacts, slack, wires, motion, work):
     """Add what the forces found in the step change to the attachments."""
     for a in range(contacts):
@@ -559,7 +513,7 @@ def react(lane, contacts, slack, wires, motion, work):
         add_along(motion.change, lane, numbers[1], -lacking, wires.slack_records, numbers[3], numbers[0])
 
 
-@_inner
+@part
 def keep(lane, contacts, slack, memory, work):
     """Note what was found for a lane in the step, until it has moved."""
     memory.slack_count[lane] = slack
@@ -572,10 +526,10 @@ def keep(lane, contacts, slack, memory, work):
         met[PRESSES], met[FORCE] = 1.0, work.force[a]
         met[CLOSED] = 0.0
         if work.penetration[a] > 0.0:
-            met[CLOSED] = met[IMPACT] if met[IMPACT] else max(work.velocity[a], _SLOWEST_IMPACT)
+            met[CLOSED] = met[IMPACT] if met[IMPACT] else max(work.velocity[a], SLOWEST_IMPACT)
 
 
-@_inner
+@part
 def remember(lane, wires, memory, work):
     """Take the forces at the end of the step for those with which the next one begins."""
     for q in of_lane(lane, memory):
@@ -590,7 +544,7 @@ def remember(lane, wires, memory, work):
                 memory.load[q, e] = work.load[q, e]
 
 
-@_inner
+@part
 def press(lane, wires, memory, motion):
     """Add what the remembered forces do to the modes of their intervals in a step, and so to the ends of these."""
     a1, modes = motion.a1[0], motion.modes
@@ -614,7 +568,7 @@ def press(lane, wires, memory, motion):
                     motion.pull[end + j, lane] += modes[slot, OWN + j] * value
 
 
-@_inner
+@part
 def know(lane, droppers, wires, memory, motion):
     """Add what is known of the forces on the attachments in the next step to ``motion.known``."""
     rows, columns, stretch, _ = droppers
@@ -630,7 +584,7 @@ def know(lane, droppers, wires, memory, motion):
             motion.known[columns[at], lane] -= memory.lacking[lane, k] * stretch[at]
 
 
-@_inner
+@part
 def publish(lane, p, strip, wires, memory, motion, work, output):
     """Put the resultant on a strip and its point of application into ``output``, then the force on every wire."""
     sections = wires.period.size
@@ -660,7 +614,7 @@ def publish(lane, p, strip, wires, memory, motion, work, output):
             output[k] /= total
 
 
-@_inner
+@part
 def crossed_at(q, wire, along, wires, motion, work):
     """Return where a wire is crossed as it stands, in the lap of a strip at ``along``; ``work.local`` is replaced."""
     met, place = work.met[q], work.place
@@ -675,7 +629,7 @@ def crossed_at(q, wire, along, wires, motion, work):
     return x, y, z
 
 
-@_compiled
+@compiled
 def meet_all(strips, law, unilateral, wires, memory, motion, work):
     """Find contacts and slack droppers of every lane at the end of a step, and add what they change in it.
 
@@ -696,7 +650,7 @@ def meet_all(strips, law, unilateral, wires, memory, motion, work):
         keep(lane, contacts, slack, memory, work)
 
 
-@_compiled
+@compiled
 def conclude(strips, droppers, wires, memory, motion, work, outputs):
     """Add what forces on the wires did to modes in the step that was made, and prepare the next one.
 
@@ -719,7 +673,7 @@ def conclude(strips, droppers, wires, memory, motion, work, outputs):
             publish(lane, p, strips[lane, p], wires, memory, motion, work, outputs[lane, p])
 
 
-@_compiled
+@compiled
 def stand(lane, strips, law, droppers, wires, memory, motion, work, outputs):
     """Find the contacts of a lane as it stands, see `CatenaryModel.contact_at_rest`; nothing is advanced."""
     for q in of_lane(lane, memory):
@@ -732,7 +686,7 @@ def stand(lane, strips, law, droppers, wires, memory, motion, work, outputs):
             if met[FOUND]:
                 memory.element[q] = np.int64(met[ELEMENT])
                 depth, speed = strips[p, 3] - (met[HEIGHT] + met[RISE] - law.radii), strips[p, 4] - met[RATE]
-                memory.force[q] = normal_force(law, met[ENGAGED], 0.0, depth, speed)[0]
+                memory.force[q] = law_of(depth, speed, 0.0, met[ENGAGED], law)[0]
     for p in range(strips.shape[0]):
         publish(lane, p, strips[p], wires, memory, motion, work, outputs[p])
     for q in of_lane(lane, memory):

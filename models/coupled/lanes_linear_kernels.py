@@ -9,17 +9,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.vector_kernels import (
-    compiled,
-    get,
-    minus_product,
-    nothing,
-    part,
-    plus_product,
-    product,
-    put,
-    spread,
-)
+from models.catenary.step.vector_kernels import compiled, get, inlined, nothing, part, put
 
 #: Lanes of a block, two vectors; ends that most modes move with.
 BLOCK, ENDS = 16, 6
@@ -39,29 +29,31 @@ _U = np.uint64
 _0, _1, _2, _3, _4, _5, _6, _7, _8 = (_U(i) for i in range(9))
 #: Lanes of a half and of a block; rows of a block.
 _H, _K, _K2, _K3, _K4, _K5 = _8, *(_U(i * BLOCK) for i in range(1, 6))
+#: A block less: whole numbers from 0 begin again after the last.
+_BACK = _U(2**64 - BLOCK)
 
 
 @compiled
 def load(linear, motion):
     """Find the forces on the attachments that their change balances, before what is found inside the step."""
     own, back, known, attached, pull = linear.own, linear.back, motion.known, motion.attached, motion.pull
-    right, one = middle(linear, motion.change), spread(1.0)
+    right = middle(linear, motion.change)
     for row in range(_U(own[0].size - 1)):
         at = row * _K
         force, other = get(known, at), get(known, at + _H)
         heavy, heavy_other = nothing(), nothing()
         for k in range(own[0][row], own[0][row + _1]):
-            of, stiffness, mass = own[1][k] * _K2, spread(own[2][k, _0]), spread(own[2][k, _1])
-            force = plus_product(force, stiffness, get(attached, of))
-            other = plus_product(other, stiffness, get(attached, of + _H))
-            heavy = plus_product(heavy, mass, get(attached, of + _K))
-            heavy_other = plus_product(heavy_other, mass, get(attached, of + _K + _H))
+            of, stiffness, mass = own[1][k] * _K2, own[2][k, _0], own[2][k, _1]
+            force += get(attached, of) * stiffness
+            other += get(attached, of + _H) * stiffness
+            heavy += get(attached, of + _K) * mass
+            heavy_other += get(attached, of + _K + _H) * mass
         for k in range(back[0][row], back[0][row + _1]):
-            of, value = back[1][k] * _K, spread(back[2][k])
-            heavy = plus_product(heavy, value, get(pull, of))
-            heavy_other = plus_product(heavy_other, value, get(pull, of + _H))
-        put(right, at, plus_product(force, one, heavy))
-        put(right, at + _H, plus_product(other, one, heavy_other))
+            of, value = back[1][k] * _K, back[2][k]
+            heavy += get(pull, of) * value
+            heavy_other += get(pull, of + _H) * value
+        put(right, at, force + heavy)
+        put(right, at + _H, other + heavy_other)
 
 
 @part
@@ -84,21 +76,16 @@ def pull_droppers(linear, droppers, motion):
     rows, columns, values, rest = droppers
     change, attached, pulls = middle(linear, motion.change), motion.attached, motion.droppers
     for j in range(_U(rest.size)):
-        pull, other = spread(rest[j]), spread(rest[j])
+        pull = other = nothing() + rest[j]
         for k in range(rows[j], rows[j + _1]):
             of = columns[k] * _K
-            at, displaced, moving, changed = (
-                of + of,
-                spread(values[k, _0]),
-                spread(values[k, _1]),
-                spread(values[k, _2]),
-            )
-            pull = plus_product(pull, displaced, get(attached, at))
-            other = plus_product(other, displaced, get(attached, at + _H))
-            pull = plus_product(pull, moving, get(attached, at + _K))
-            other = plus_product(other, moving, get(attached, at + _K + _H))
-            pull = plus_product(pull, changed, get(change, of))
-            other = plus_product(other, changed, get(change, of + _H))
+            at, displaced, moving, changed = of + of, values[k, _0], values[k, _1], values[k, _2]
+            pull += get(attached, at) * displaced
+            other += get(attached, at + _H) * displaced
+            pull += get(attached, at + _K) * moving
+            other += get(attached, at + _K + _H) * moving
+            pull += get(change, of) * changed
+            other += get(change, of + _H) * changed
         put(pulls, j * _K, pull)
         put(pulls, j * _K + _H, other)
 
@@ -124,9 +111,9 @@ def multiply(matrix, vector, result):
     for row in range(_U(rows.size - 1)):
         value, other = nothing(), nothing()
         for k in range(rows[row], rows[row + _1]):
-            of, entry = columns[k] * _K, spread(values[k])
-            value = plus_product(value, entry, get(vector, of))
-            other = plus_product(other, entry, get(vector, of + _H))
+            of = columns[k] * _K
+            value += get(vector, of) * values[k]
+            other += get(vector, of + _H) * values[k]
         put(result, row * _K, value)
         put(result, row * _K + _H, other)
 
@@ -141,33 +128,26 @@ def solve(lower, upper, x):
     n, width = _U(lower.shape[0]), _U(lower.shape[1] - 1)
     last, last_other = nothing(), nothing()
     for row in range(n):
-        at = (row + width) * _K
-        scale = spread(lower[row, _0])
-        value, other = product(get(x, at), scale), product(get(x, at + _H), scale)
-        for back in range(width - _1):
-            k = width - back
-            of, entry = at - k * _K, spread(lower[row, k])
-            value = minus_product(value, entry, get(x, of))
-            other = minus_product(other, entry, get(x, of + _H))
-        entry = spread(lower[row, _1])
-        last, last_other = minus_product(value, entry, last), minus_product(other, entry, last_other)
-        put(x, at, last)
-        put(x, at + _H, last_other)
+        last, last_other = eliminate(lower, row, (row + width) * _K, _BACK, x, last, last_other)
     last, last_other = nothing(), nothing()
     for step in range(n):
         row = n - _1 - step
-        at = (row + width) * _K
-        scale = spread(upper[row, _0])
-        value, other = product(get(x, at), scale), product(get(x, at + _H), scale)
-        for back in range(width - _1):
-            k = width - back
-            of, entry = at + k * _K, spread(upper[row, k])
-            value = minus_product(value, entry, get(x, of))
-            other = minus_product(other, entry, get(x, of + _H))
-        entry = spread(upper[row, _1])
-        last, last_other = minus_product(value, entry, last), minus_product(other, entry, last_other)
-        put(x, at, last)
-        put(x, at + _H, last_other)
+        last, last_other = eliminate(upper, row, (row + width) * _K, _K, x, last, last_other)
+
+
+@inlined
+def eliminate(matrix, row, at, on, x, last, last_other):
+    """Solve a row of a band, given the solutions of the one before it; ``on`` leads from there to those before that."""
+    value, other = get(x, at) * matrix[row, _0], get(x, at + _H) * matrix[row, _0]
+    width = _U(matrix.shape[1] - 1)
+    for back in range(width - _1):
+        k = width - back
+        value -= get(x, at + k * on) * matrix[row, k]
+        other -= get(x, at + k * on + _H) * matrix[row, k]
+    value, other = value - last * matrix[row, _1], other - last_other * matrix[row, _1]
+    put(x, at, value)
+    put(x, at + _H, other)
+    return value, other
 
 
 @part
@@ -178,7 +158,7 @@ def follow(linear, motion):
     follow one another: motion of these ends and forces on them stay in registers meanwhile.
     """
     first, end, rates, modes = linear.first, linear.end, linear.rates, linear.modes
-    table, ends, pull, a1 = motion.table, motion.ends, motion.pull, spread(linear.a1)
+    table, ends, pull, a1 = motion.table, motion.ends, motion.pull, linear.a1
     pull[:] = 0.0
     for u in range(_U(end.size)):
         for half in range(_0, _K, _H):
@@ -188,14 +168,13 @@ def follow(linear, motion):
             f0, f1, f2 = get(pull, e), get(pull, e + _K), get(pull, e + _K2)
             f3, f4, f5 = get(pull, e + _K3), get(pull, e + _K4), get(pull, e + _K5)
             for m in range(first[u], first[u + _1]):
-                g0, g1, g2 = spread(modes[m, _3]), spread(modes[m, _4]), spread(modes[m, _5])
-                g3, g4, g5 = spread(modes[m, _6]), spread(modes[m, _7]), spread(modes[m, _8])
-                moved = plus_product(plus_product(product(g0, x0), g1, x1), g2, x2)
-                moved = plus_product(plus_product(plus_product(moved, g3, x3), g4, x4), g5, x5)
+                g0, g1, g2 = modes[m, _3], modes[m, _4], modes[m, _5]
+                g3, g4, g5 = modes[m, _6], modes[m, _7], modes[m, _8]
+                moved = x0 * g0 + x1 * g1 + x2 * g2 + x3 * g3 + x4 * g4 + x5 * g5
                 at = m * _K3 + half
                 value = advance(rates, modes, m, moved, a1, table, at)
-                f0, f1, f2 = plus_product(f0, g0, value), plus_product(f1, g1, value), plus_product(f2, g2, value)
-                f3, f4, f5 = plus_product(f3, g3, value), plus_product(f4, g4, value), plus_product(f5, g5, value)
+                f0, f1, f2 = f0 + value * g0, f1 + value * g1, f2 + value * g2
+                f3, f4, f5 = f3 + value * g3, f4 + value * g4, f5 + value * g5
             put(pull, e, f0)
             put(pull, e + _K, f1)
             put(pull, e + _K2, f2)
@@ -208,31 +187,28 @@ def follow(linear, motion):
 @part
 def advance(rates, modes, m, moved, a1, table, at):
     """Let a mode make the step in which its ends have moved; return what it does to these in the next one."""
-    stiff, from_momentum = spread(modes[m, _1]), spread(modes[m, _2])
+    stiff, from_momentum = modes[m, _1], modes[m, _2]
     amplitude, momentum = get(table, at), get(table, at + _K2)
-    change = plus_product(product(stiff, amplitude), from_momentum, momentum)
-    change = minus_product(change, spread(modes[m, _0]), moved)
-    amplitude = plus_product(amplitude, spread(1.0), change)
-    rate = minus_product(product(a1, change), spread(1.0), get(table, at + _K))
-    momentum = minus_product(plus_product(product(a1, change), spread(rates[m, _0]), moved), spread(1.0), momentum)
+    change = amplitude * stiff + momentum * from_momentum - moved * modes[m, _0]
+    amplitude += change
+    rate, momentum = change * a1 - get(table, at + _K), change * a1 + moved * rates[m, _0] - momentum
     put(table, at, amplitude)
     put(table, at + _K, rate)
     put(table, at + _K2, momentum)
-    value = minus_product(product(spread(rates[m, _1]), rate), stiff, amplitude)
-    return minus_product(value, from_momentum, momentum)
+    return rate * rates[m, _1] - amplitude * stiff - momentum * from_momentum
 
 
 @part
 def follow_wide(linear, begin, table, ends, pull):
     """Do as `follow` does for modes that move with more ends, one by one."""
-    rates, modes, slot_end, a1 = linear.rates, linear.modes, linear.slot_end, spread(linear.a1)
+    rates, modes, slot_end, a1 = linear.rates, linear.modes, linear.slot_end, linear.a1
     for m in range(begin, _U(modes.shape[0])):
         for half in range(_0, _K, _H):
             e = slot_end[m] * _K + half
             moved = nothing()
             for j in range(_U(modes.shape[1] - OWN)):
-                moved = plus_product(moved, spread(modes[m, _3 + j]), get(ends, e + j * _K))
+                moved += get(ends, e + j * _K) * modes[m, _3 + j]
             value = advance(rates, modes, m, moved, a1, table, m * _K3 + half)
             for j in range(_U(modes.shape[1] - OWN)):
                 at = e + j * _K
-                put(pull, at, plus_product(get(pull, at), spread(modes[m, _3 + j]), value))
+                put(pull, at, get(pull, at) + value * modes[m, _3 + j])

@@ -111,6 +111,8 @@ def find_fitted_lengths(design: StaticState, height: FloatArray) -> FittedLength
         with np.errstate(invalid="ignore"):
             pushes = measured & ~slack & (state.dropper_force < 0.0)
             needed = slack & (state.positions[lower, 2] < height - _TOLERANCE)
+        if not (pushes.any() or needed.any() or slack.any()):
+            return FittedLengths(state, state.unstrained_length, slack)
         if not (pushes.any() or needed.any()):
             length = np.where(slack, state.droppers.length - _BARELY, state.unstrained_length)
             return FittedLengths(with_errors(design, length - design.unstrained_length), length, slack)

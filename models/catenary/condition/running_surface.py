@@ -119,6 +119,14 @@ class RunningSurface:
             height, slope = height + own[0], slope + own[1]
         return height, slope
 
+    def whole(self) -> SurfacePiece:
+        """Return the sum as one piece, over the knots of all: between these a sum of cubics is a cubic, too."""
+        if len(self.pieces) == 1:
+            return self.pieces[0]
+        knots = np.unique(np.concatenate([piece.position for piece in self.pieces]))
+        sums = np.array([np.sum([piece.at(x) for piece in self.pieces], axis=0) for x in knots.tolist()])
+        return SurfacePiece(knots, sums[:, 0], sums[:, 1])
+
     def height(self, x: float) -> float:
         """Return r(x) [m]."""
         return self.at(x)[0]

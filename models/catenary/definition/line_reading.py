@@ -14,7 +14,8 @@ from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefin
 from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.section_definition import Section
 from models.catenary.definition.section_reading import SECTION_TABLES, read_section
-from models.catenary.definition.surface_reading import with_surface
+from models.catenary.definition.surface_definition import RunningSurface
+from models.catenary.definition.surface_reading import place_problem, with_surface
 from models.definition_files import field_schema
 from models.definition_files.toml_reader import Table
 
@@ -51,12 +52,21 @@ def read(table: Table, *, carried: bool = False) -> CatenaryDefinition:
     if line.running_surface is not None:
         surface = with_surface(table, line.running_surface, carried=carried)
         definition = dataclasses.replace(definition, running_surface=surface)
+        _check_profile(table, surface, sections)
     for check in (_check_type, _check_stitch, _check_auxiliary, _check_periodic, _check_track, _check_tensioning):
         check(table, definition)
     check_faults(faults, definition)
     _check_overbridges(overbridges, definition)
     table.finish()
     return definition
+
+
+def _check_profile(table: Table, surface: RunningSurface, sections: Sequence[Section]) -> None:
+    """Check that a measured running surface is one of a wire of the line."""
+    if surface.points:
+        found = [place_problem(surface.points, section) for section in sections]
+        if all(found):
+            table.problem("running_surface.profile", f"{surface.profile}: {found[0]}")
 
 
 def _check_places(table: Table) -> None:

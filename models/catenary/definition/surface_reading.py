@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
+from models.catenary.definition.section_definition import Section
 from models.catenary.definition.surface_definition import LARGEST_HEIGHT, RunningSurface
 from models.definition_files.message_text import said
 from models.definition_files.si_units import shown, to_si
@@ -22,6 +23,8 @@ CARRIED: Final = "running_surface.csv"
 #: Columns of the table, both lengths.
 _COLUMNS: Final = ("position", "height")
 _HEAD: Final = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
+#: Largest step of the height where a line closes on itself [m].
+_SEAM: Final = 1e-6
 #: Most mistakes of a file that are listed.
 _MOST: Final = 20
 
@@ -59,6 +62,22 @@ def with_surface(table: Table, surface: RunningSurface, *, carried: bool) -> Run
     if len(mistakes) > _MOST:
         table.problem("running_surface.profile", f"{path.name}: ... and {len(mistakes) - _MOST} more mistakes")
     return replace(surface, points=tuple(points))
+
+
+def place_problem(points: Sequence[_Point], section: Section) -> str:
+    """Return why a profile cannot be that of a section's wire, empty if it can."""
+    first, last = points[0], points[-1]
+    start, end = section.spans[0].start, section.spans[-1].end
+    if first[0] >= end or last[0] <= start:
+        return f"lies at {first[0]:g} ... {last[0]:g} m, beside the line, which is at {start:g} ... {end:g} m"
+    if section.periodic and not start <= first[0] < last[0] <= end:
+        return (
+            f"lies at {first[0]:g} ... {last[0]:g} m: a line that closes on itself has one lap, {start:g} ... {end:g} m"
+        )
+    if section.periodic and abs(last[1] - first[1]) > _SEAM:
+        text = "a line that closes on itself begins as high as it ends: the last height must be the first"
+        return f"{text}, {1e3 * first[1]:g} mm, not {1e3 * last[1]:g} mm"
+    return ""
 
 
 def _read(path: Path) -> tuple[list[_Point], list[str]]:

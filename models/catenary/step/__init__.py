@@ -7,6 +7,7 @@ on the same `StepMatrices`, and `engine_choice` chooses once for every step size
     attachment_kernels  forces on the attachments and their solution, in eight segments: `attachment_lanes`
     mode_kernels        the modes follow, and prepare the next step: `mode_units`
     contact_kernels     strips that cross wires: `step_records` keeps what is read of intervals and droppers
+    law_kernels         the law of a contact, small dense systems; of lanes, too
     local_kernels       contacts and slack droppers
     vector_kernels      eight numbers at once
 

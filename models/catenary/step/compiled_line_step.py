@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
+from models.catenary.condition.running_surface import SurfacePiece
 from models.catenary.contact_and_slack.contact_wire import ContactWire
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError, not_settled
 from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
@@ -30,8 +31,6 @@ _NO_STRIPS = np.zeros((0, 2, 2, 3)), np.zeros(0)
 #: No droppers.
 _NONE, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
 
-#: What is known of the knots of a running surface.
-_KNOTS = ("position", "height", "slope")
 #: Displacements of attachments from which on a solution about a load takes less time than a whole one.
 _LONG = 12000
 
@@ -181,11 +180,10 @@ class CompiledLineStep:
 
 def _surfaces(wires: Sequence[ContactWire]) -> tuple[Any, ...]:
     """Return the running surfaces of contact wires: `Surfaces` of the kernels."""
-    of_wires = [wire.surface.pieces if wire.surface is not None else () for wire in wires]
-    pieces = [piece for own in of_wires for piece in own]
-    numbers = [np.concatenate([getattr(p, name) for p in pieces] or [np.zeros(0)]) for name in _KNOTS]
-    counts = [len(own) for own in of_wires], [len(piece.position) for piece in pieces]
-    return *(np.cumsum([0, *count]) for count in counts), *numbers
+    nothing = SurfacePiece(np.zeros(0), np.zeros(0), np.zeros(0))
+    wholes = [wire.surface.whole() if wire.surface is not None else nothing for wire in wires]
+    knots = (np.concatenate([getattr(whole, name) for whole in wholes]) for name in ("position", "height", "slope"))
+    return np.cumsum([0, *(len(whole.position) for whole in wholes)]), *knots
 
 
 def _by_rows(matrix: sp.spmatrix) -> tuple[Any, Any, FloatArray]:

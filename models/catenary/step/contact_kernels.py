@@ -19,10 +19,10 @@ NOWHERE = -1
 #: of its wire that each interval ``begins`` with.
 Wires = namedtuple("Wires", "first starts period interval begins")
 wires_of = reader(Wires, "iffii")
-#: Running surfaces, piece after piece: ``first`` piece of each wire, and one more; first ``knot`` of each piece, and
-#: one more; ``position``, ``height`` and ``slope`` of the knots; see `models.catenary.condition.running_surface`.
-Surfaces = namedtuple("Surfaces", "first knot position height slope")
-surfaces_of = reader(Surfaces, "iifff")
+#: Running surfaces, wire after wire: ``first`` knot of each, and one more; ``position``, ``height`` and ``slope`` of
+#: the knots; see `models.catenary.condition.running_surface`.
+Surfaces = namedtuple("Surfaces", "first position height slope")
+surfaces_of = reader(Surfaces, "ifff")
 #: What is known of intervals and droppers: ``data``, record after record; ``whole``, the same memory as whole numbers;
 #: where in it the record of each of the ``intervals`` and ``droppers`` begins, below 0 if it is not there.
 Records = namedtuple("Records", "data whole intervals droppers")
@@ -167,10 +167,15 @@ def _first_element(starts, guess, x):
     last = starts.size - 2
     if 0 <= guess <= last and abs(starts[guess] - x) < _FAR_OFF:
         return guess
-    low, high = 0, last
-    while low < high:  # the last that begins before x
+    return last_before(starts, 0, last, x)
+
+
+@part
+def last_before(values, low, high, x):
+    """Return which of rising values, between two of them, is the last below ``x``; the first of them if none is."""
+    while low < high:
         middle = (low + high + 1) // 2
-        if starts[middle] < x:
+        if values[middle] < x:
             low = middle
         else:
             high = middle - 1
@@ -200,30 +205,19 @@ def _crossing(strip, shift, records, record, element, local):
 
 @part
 def surface_at(surfaces, wires, section, x):
-    """Return height and slope of a wire's running surface at a place along the track; see `RunningSurface.at`."""
+    """Return height and slope of a wire's running surface at a place along the track; see `SurfacePiece.at`."""
     period = wires.period[section]
     if period > 0.0:
         x -= math.floor((x - wires.starts[wires.first[section] + section]) / period) * period
-    height = slope = 0.0
-    for piece in range(surfaces.first[section], surfaces.first[section + 1]):
-        low, high = surfaces.knot[piece], surfaces.knot[piece + 1] - 1
-        if x < surfaces.position[low]:
-            height += surfaces.height[low]
-        elif x >= surfaces.position[high]:
-            height += surfaces.height[high]
-        else:
-            while high - low > 1:
-                middle = (low + high) // 2
-                if surfaces.position[middle] <= x:
-                    low = middle
-                else:
-                    high = middle
-            h, d = surfaces.position[high] - surfaces.position[low], surfaces.height[high] - surfaces.height[low]
-            t = (x - surfaces.position[low]) / h
-            a, b = h * surfaces.slope[low] - d, d - h * surfaces.slope[high]
-            height += surfaces.height[low] + t * (d + (1.0 - t) * (a * (1.0 - t) + b * t))
-            slope += (d + (1.0 - 2.0 * t) * (a * (1.0 - t) + b * t) + t * (1.0 - t) * (b - a)) / h
-    return height, slope
+    low, last = surfaces.first[section], surfaces.first[section + 1] - 1
+    x = min(max(x, surfaces.position[low]), surfaces.position[last])
+    i = last_before(surfaces.position, low, last - 1, x)
+    h, d = surfaces.position[i + 1] - surfaces.position[i], surfaces.height[i + 1] - surfaces.height[i]
+    t = (x - surfaces.position[i]) / h
+    a, b = h * surfaces.slope[i] - d, d - h * surfaces.slope[i + 1]
+    between = a * (1.0 - t) + b * t
+    slope = (d + (1.0 - 2.0 * t) * between + t * (1.0 - t) * (b - a)) / h
+    return surfaces.height[i] + t * (d + (1.0 - t) * between), slope
 
 
 @part

@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # an FMU carries what is imported, and this and what it impor
 #: The kernels, each after those that it calls.
 KERNEL_FILES = tuple(
     Path(__file__).with_name(f"{part}_kernels.py")
-    for part in ("vector", "attachment", "mode", "contact", "local", "step")
+    for part in ("vector", "attachment", "mode", "contact", "law", "local", "step")
 )
 #: Read now: an FMU's folder may be gone when a second instance asks for the kernels.
 _SOURCE = joined(KERNEL_FILES)

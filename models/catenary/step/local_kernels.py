@@ -9,6 +9,7 @@ from collections import namedtuple
 import numpy as np
 
 from models.catenary.step.contact_kernels import dropper_at, interval_at, moved_by, own, reached
+from models.catenary.step.law_kernels import eliminate, law_of
 from models.catenary.step.vector_kernels import part
 
 #: Answers of `solve_local`; a number of LACKING or more less LACKING is the dropper whose record is lacking.
@@ -19,28 +20,6 @@ SOLVED, SINGULAR, UNSETTLED, LACKING = 0, 1, 2, 3
 Effects = namedtuple("Effects", "moved pulled listed count")
 _MAX_ITERATIONS = 60
 _TOLERANCE = 1e-10
-_SLOWEST_IMPACT = 1e-6
-
-
-@part
-def law_of(penetration, velocity, impact, engagement, contact):
-    """Return the force of a contact and its slopes over penetration and velocity; see `models.contact_law`.
-
-    Parameters
-    ----------
-    contact : ndarray, shape (4,)
-        Stiffness, exponent, restitution; what wire and strip add to the height.
-    """
-    if penetration <= 0.0:
-        return 0.0, 0.0, 0.0
-    if impact == 0.0:  # the first closed instant is its impact
-        impact = max(velocity, 0.0)
-    elastic = engagement * contact[0] * penetration ** contact[1]
-    hysteresis = 0.75 * (1.0 - contact[2] ** 2) / max(impact, _SLOWEST_IMPACT)
-    factor = 1.0 + hysteresis * velocity
-    if factor <= 0.0:
-        return 0.0, 0.0, 0.0
-    return elastic * factor, contact[1] * elastic / penetration * factor, elastic * hysteresis
 
 
 @part
@@ -214,33 +193,5 @@ def _newton_step(records, points, contacts, effects, droppers, free, numbers, mo
                 dropper = records.whole[effects.listed[k] + j]
                 if row[dropper] >= 0:
                     system[row[dropper], k] += droppers.unilateral[dropper] * effects.pulled[k, j]
-    is_regular = eliminate(system, right)
+    is_regular = eliminate(system, right, size)
     return right, is_regular
-
-
-@part
-def eliminate(system, right):
-    """Solve a small dense system by elimination with row pivots, in place; return whether it is regular."""
-    n = right.size
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(system[i, k]) > abs(system[best, k]):
-                best = i
-        if system[best, k] == 0.0:
-            return False
-        if best != k:
-            right[k], right[best] = right[best], right[k]
-            for j in range(k, n):
-                system[k, j], system[best, j] = system[best, j], system[k, j]
-        for i in range(k + 1, n):
-            share = system[i, k] / system[k, k]
-            if share != 0.0:  # droppers far from each other
-                right[i] -= share * right[k]
-                for j in range(k + 1, n):
-                    system[i, j] -= share * system[k, j]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            right[k] -= system[k, j] * right[j]
-        right[k] /= system[k, k]
-    return True

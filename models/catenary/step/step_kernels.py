@@ -82,8 +82,8 @@ def step(book, moving, state, strips, given, out):
         modes_of(book, 17),
         droppers_of(book, 25),
     )
-    wires, surfaces, work = wires_of(book, 33), surfaces_of(book, 38), work_of(book, 43)
-    points, records = points_of(book, 55), records_of(book, 73)
+    wires, surfaces, work = wires_of(book, 33), surfaces_of(book, 38), work_of(book, 42)
+    points, records = points_of(book, 54), records_of(book, 72)
     (attached, table, pull), report, a1 = moving, work.report, work.numbers[0]
     motion = a1, table, work.change, attached
     if report[STAGE] < _BEGUN:

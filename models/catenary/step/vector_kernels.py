@@ -24,6 +24,9 @@ part = njit(  # type: ignore[call-overload]
     fastmath=set(SUMS), error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
 
+#: What is written into its callers: a call in the innermost loop keeps numbers from staying in registers.
+inlined = njit(inline="always", fastmath=set(SUMS), error_model="numpy")
+
 
 class Vector(types.Type):
     """Numba's type of eight numbers."""
@@ -103,34 +106,6 @@ def _eight(builder, number):
     first = builder.insert_element(ir.Constant(_EIGHT, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
     places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
     return builder.shuffle_vector(first, ir.Constant(_EIGHT, ir.Undefined), places)
-
-
-@part
-def plus_product(start, one, other):
-    """Return ``start + one * other``."""
-    return start + one * other
-
-
-@part
-def minus_product(start, one, other):
-    """Return ``start - one * other``."""
-    return start - one * other
-
-
-@part
-def product(one, other):
-    """Return ``one * other``."""
-    return one * other
-
-
-@intrinsic
-def spread(typing, number):
-    """Return a number eight times."""
-
-    def generate(context, builder, signature, arguments):
-        return _eight(builder, arguments[0])
-
-    return vector(types.float64), generate
 
 
 @intrinsic

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.commands import as_built_plots, as_built_tables
+from models.commands import as_built_tables
 from models.commands.desk import page_markup as markup
 from models.commands.desk.inline_figure import inline_figure
 from models.commands.desk.page_markup import Part
 from models.layout.as_built.as_built_outcome import AsBuiltOutcome
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def page(found: AsBuiltOutcome, file: str, doubts: tuple[str, ...]) -> str:
-    """Return the page of a line as built."""
+
+def page(found: AsBuiltOutcome, file: str, doubts: tuple[str, ...], drawn: Mapping[str, Figure]) -> str:
+    """Return the page of a line as built; ``drawn`` has its figures by name, whose size is changed."""
     definition = found.built.definition
     head = [
         f"<h1>{markup.text(definition.title or definition.name)}</h1>",
@@ -23,7 +27,7 @@ def page(found: AsBuiltOutcome, file: str, doubts: tuple[str, ...]) -> str:
         *(markup.warning(words) for words in doubts),
         markup.pairs([("design", file), *as_built_tables.summary(found)]),
     ]
-    return markup.document(f"{definition.name} as built", head, [part for part in _parts(found) if part.body])
+    return markup.document(f"{definition.name} as built", head, [part for part in _parts(found, drawn) if part.body])
 
 
 def _badge(found: AsBuiltOutcome) -> str:
@@ -33,7 +37,7 @@ def _badge(found: AsBuiltOutcome) -> str:
     return f"<p><span class='badge {kind}'>{markup.text(words)}</span></p>"
 
 
-def _parts(found: AsBuiltOutcome) -> Iterator[Part]:
+def _parts(found: AsBuiltOutcome, drawn: Mapping[str, Figure]) -> Iterator[Part]:
     before, after = (rise[found.built.is_measured] for rise in (found.before, found.after))
     error = found.built.error[found.built.is_measured]
     yield Part("figures", "In figures", (markup.tiles([
@@ -43,7 +47,7 @@ def _parts(found: AsBuiltOutcome) -> Iterator[Part]:
         ("expected with the changes", f"{1e3 * np.sqrt(np.mean(after**2)):.1f}", "mm"),
         ("droppers to change", str(int(found.corrections.is_changed.sum())), ""),
     ]),))  # fmt: skip
-    errors = inline_figure(as_built_plots.errors(found), "errors", "error of the length of every dropper")
+    errors = inline_figure(drawn["errors"], "errors", "error of the length of every dropper")
     yield Part("errors", "Lengths as fitted", (
         markup.figure("Length as fitted less designed", errors, "Dashed: the tolerance."),
         markup.note(
@@ -51,7 +55,7 @@ def _parts(found: AsBuiltOutcome) -> Iterator[Part]:
             "has them. A support that has sunk shows as droppers beside it that are too long."
         ),
     ))  # fmt: skip
-    heights = inline_figure(as_built_plots.heights(found), "heights", "heights before, and expected after the changes")
+    heights = inline_figure(drawn["heights"], "heights", "heights before, and expected after the changes")
     yield Part("heights", "Heights before and after", (
         markup.figure("Height of the contact wire over that of the design", heights),
     ))  # fmt: skip

@@ -146,6 +146,11 @@ def _by_structures(run: MeasuredRun, known: dict[str, float]) -> Alignment:
 def _by_staggers(run: MeasuredRun, courses: tuple[WireCourse, ...]) -> Alignment:
     there = np.isfinite(run.stagger)
     x, y = run.position[there], run.stagger[there]
+    if x[-1] - x[0] < _LEAST_WAY:
+        raise AsBuiltError(
+            f"{run.source}: staggers are given over {x[-1] - x[0]:.0f} m, and {_LEAST_WAY:g} m are needed to find "
+            "their place: give more, or none and positions as the design has them"
+        )
     fits = _Fits.over(x, y, courses)
     shift, scale = fits.best
     shift, scale = _refined(x, y, courses, shift, scale)
@@ -166,6 +171,11 @@ def _by_staggers(run: MeasuredRun, courses: tuple[WireCourse, ...]) -> Alignment
 
 
 def _nowhere(run: MeasuredRun, fits: _Fits, correlation: float) -> str:
+    if np.isnan(correlation):
+        return (
+            f"{run.source}: the staggers do not say where the run was: they are the same throughout, or it shares less "
+            "than half of its way with the line"
+        )
     text = (
         f"{run.source}: the staggers do not fit the design: at best they correlate with {correlation:.2f}, and "
         f"{LEAST_CORRELATION:g} is the least"
@@ -278,7 +288,7 @@ def _refined(
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:
     both: BoolArray = np.isfinite(a) & np.isfinite(b)
-    if both.sum() < 3 or not (a[both].std() > 0.0 and b[both].std() > 0.0):
+    if both.sum() < 3 or not (a[both].std() > 1e-6 and b[both].std() > 1e-6):
         return float("nan")
     return float(np.corrcoef(a[both], b[both])[0, 1])
 

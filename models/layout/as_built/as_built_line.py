@@ -65,7 +65,7 @@ class AsBuilt:
         Where they are, height of the wire there in the design, and as measured (NaN: not measured) [m].
     error, uncertainty : ndarray, shape (k,)
         Length as fitted minus designed, and its standard error [m]; NaN where not measured, the latter also where
-        there are too few heights to tell.
+        there are too few heights to tell, or it hangs loose.
     is_slack : ndarray, shape (k,)
         Droppers that carry nothing, or too little to tell: their error is what is given, or more.
     influence : sparse, shape (k, k)
@@ -332,9 +332,10 @@ def _uncertainty(
     Droppers that were not measured have errors like the others', which reach a little into the heights beside them.
     """
     result, measured = np.full(len(x), np.nan), np.isfinite(error)
+    acts = influence.diagonal() != 0.0
     usual = float(np.mean(error[measured] ** 2))
     for index, deviation in enumerate(deviations):
-        here = np.flatnonzero((section == index) & measured)
+        here = np.flatnonzero((section == index) & measured & acts)
         if deviation is None or not here.size or not np.isfinite(deviation.sigma):
             continue
         inverse = splu(sp.csc_matrix(influence[here][:, here].T))
@@ -384,9 +385,10 @@ def _difference(
     rise: FloatArray, error: FloatArray, x: FloatArray, slack: BoolArray, influence: sp.csc_matrix
 ) -> float:
     """Return by how much J^-1 of the heights differs from form finding, of errors up to 10 mm [m]."""
-    measured = np.isfinite(rise)
+    measured = np.isfinite(rise) & (influence.diagonal() != 0.0)
     other = np.zeros(len(x))
-    other[measured] = splu(sp.csc_matrix(influence[measured][:, measured])).solve(rise[measured])
+    if measured.any():
+        other[measured] = splu(sp.csc_matrix(influence[measured][:, measured])).solve(rise[measured])
     near = np.abs(x[:, None] - x[slack][None, :]).min(axis=1, initial=np.inf) < _NEAR
     with np.errstate(invalid="ignore"):
         compared = measured & ~near & (np.abs(error) <= COMPARED)

@@ -92,8 +92,9 @@ def correct(
     """
     length, designed = built.state.unstrained_length[droppers], design.unstrained_length[droppers]
     lowest = np.minimum(np.minimum(allowed.shortest, designed) - length, 0.0)
-    count = len(droppers) if allowed.only is None else min(allowed.only, len(droppers))
-    chosen = np.arange(len(droppers)) if count == len(droppers) else most_useful(influence, rise, count, tell)
+    acting = np.flatnonzero(influence.diagonal())
+    count = len(acting) if allowed.only is None else min(allowed.only, len(acting))
+    chosen = acting if count == len(acting) else most_useful(influence, rise, count, tell)
     exact = np.zeros(len(droppers))
     exact[chosen] = _least_squares(influence[:, chosen], rise, lowest[chosen])
     steps = np.rint(exact / allowed.step)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from models.arrays import FloatArray
+from models.definition_files.toml_reader import Problem
 from models.layout.as_built.measured_run import MeasuredRun
 from models.layout.csv_sheets import SheetGrid, read_csv
-from models.layout.sheet_problems import Place, SheetProblems
+from models.layout.sheet_problems import LayoutError, Place, SheetProblems
 from models.layout.sheet_table import SheetColumn, SheetTable, read_table
 from models.layout.xlsx_sheets import read_xlsx
 
@@ -23,6 +26,8 @@ COLUMNS: Final = (
 )
 #: Rows that a run needs.
 _LEAST: Final = 3
+#: Problems of a column that are listed.
+_LISTED: Final = 10
 _SHEET: Final = "measured"
 
 
@@ -44,9 +49,25 @@ def read_measured_run(path: Path) -> MeasuredRun:
             problems.add(table.heading("height"), "a column 'height' with the heights of the wire is needed")
         if table.has("position"):
             _check_positions(table, problems)
-    problems.finish()
+    try:
+        problems.finish()
+    except LayoutError as error:
+        raise LayoutError(_first_ones(error.problems)) from None
     assert table is not None
     return _run(path, table)
+
+
+def _first_ones(problems: Sequence[Problem]) -> tuple[Problem, ...]:
+    """Return the first problems of each column, and how many more there are: a run has thousands of rows."""
+    listed, count = [], Counter[str]()
+    for problem in problems:
+        column = problem.key.rpartition("column ")[2] if "column " in problem.key else ""
+        count[column] += 1
+        if not column or count[column] <= _LISTED:
+            listed.append(problem)
+    more = {column: number - _LISTED for column, number in count.items() if column and number > _LISTED}
+    file = problems[0].file
+    return (*listed, *(Problem(file, f"column {c}", f"... and {n} more rows are wrong") for c, n in more.items()))
 
 
 def _grid(path: Path, problems: SheetProblems) -> SheetGrid | None:

@@ -139,7 +139,8 @@ def test_the_uplift_of_the_air_goes_with_the_speed():
     assert fast[-1, 0, 0, 2] - first[-1, 0, 0, 2] > 1e-6
 
 
-def test_a_mechanism_keeps_to_its_profile():
+def test_a_mechanism_keeps_to_its_profile(monkeypatch):
+    monkeypatch.setenv(SWITCH, "numpy")
     part = MultibodyPantographPart(
         replace(library("CX_multibody"), speed_profile=SpeedProfile(time=(0.0, 0.02, 1.0), speed=(40.0, 40.0, 38.5)))
     )
@@ -202,7 +203,8 @@ def _angle(made, y):
     return 2.0 * np.arctan2(p[2], p[0])
 
 
-def test_energy_counts_the_work_of_the_train():
+def test_energy_counts_the_work_of_the_train(monkeypatch):
+    monkeypatch.setenv(SWITCH, "numpy")
     drifts = []
     for h in (1e-3, 5e-4):
         given = library("CX_multibody").with_values({"monitor_energy": 1})

@@ -62,8 +62,8 @@ def check_heights(definition: MechanismDefinition) -> str:
     """
     if definition.base_height is None and definition.start_height is None:
         return ""
-    mechanism = Mechanism(definition)
     try:
+        mechanism = Mechanism(definition)
         standing = settle_springs(mechanism)
         base = definition.base_height or definition.reference_height - mechanism.strip_height(standing)
         if definition.base_height is not None:

@@ -38,6 +38,8 @@ def test_pieces_are_level_beyond_their_ends_and_add_up():
     both = RunningSurface((bump, worn))
     assert [both.height(x) for x in (0.0, 9.0, 10.0, 11.0, 20.0, 40.0)] == [0.0, -5e-4, 5e-4, -5e-4, -5e-4, 0.0]
     assert [both.slope(x) for x in (0.0, 9.0, 10.0, 11.0, 20.0, 30.0)] == [0.0] * 6
+    whole = both.whole()
+    assert [whole.at(x) for x in (0.0, 9.3, 10.4, 40.0)] == [pytest.approx(both.at(x)) for x in (0.0, 9.3, 10.4, 40.0)]
     x = np.linspace(7.0, 31.0, 2001)
     heights = np.array([both.height(v) for v in x])
     slopes = np.array([both.slope(v) for v in x])
@@ -139,10 +141,10 @@ def profiled(tmp_path, line_maker):
     """Read a line of a file, with a profile beside it."""
     from models.library.catalogue import line_path
 
-    def read(content, *, carried=False, name="wear.csv"):
+    def read(content, *, carried=False, name="wear.csv", library="LN2"):
         (tmp_path / ("running_surface.csv" if carried else name)).write_bytes(content)
         line = tmp_path / "worn.toml"
-        text = line_path("LN2").read_text(encoding="utf-8")
+        text = line_path(library).read_text(encoding="utf-8")
         line.write_text(f'{text}\n[running_surface]\nprofile = "{name}"\n', encoding="utf-8")
         return load(line, carried=carried)
 
@@ -189,6 +191,24 @@ def test_a_wrong_profile_is_told(profiled, content, said):
         profiled(content)
     assert said in str(caught.value)
     assert str(caught.value).startswith(str(caught.value.problems[0].file))
+
+
+@pytest.mark.parametrize(
+    ("ring", "points", "said"),
+    [
+        (False, "1200,0\n1210,0", "wear.csv: lies at 1200 ... 1210 m, beside the line, which is at -3.1 ... 1136.9 m"),
+        (
+            True,
+            "900,0\n1000,0",
+            "wear.csv: lies at 900 ... 1000 m: a line that closes on itself has one lap, 0 ... 990 m",
+        ),
+        (True, "0,0.0001\n990,0", "the last height must be the first, 0.1 mm, not 0 mm"),
+    ],
+)
+def test_a_profile_of_another_place_is_told(profiled, ring, points, said):
+    with pytest.raises(DefinitionError) as caught:
+        profiled(f"position,height\n{points}\n".encode(), library="LN2_ring" if ring else "LN2")
+    assert said in str(caught.value)
 
 
 def test_all_mistakes_of_a_profile_are_told_at_once(profiled):

@@ -83,6 +83,15 @@ def test_staggers_of_another_line_are_refused(line):
         align(run_of(x, noise), line, wire(SUPPORTS, STAGGER))
 
 
+def test_staggers_that_say_nothing_are_refused(line):
+    x = np.arange(0.0, 550.0, 0.5)
+    with pytest.raises(AsBuiltError, match="do not say where the run was: they are the same throughout"):
+        align(run_of(x, np.full(len(x), 0.1)), line, wire(SUPPORTS, STAGGER))
+    few = np.where(np.arange(len(x)) == 7, 0.1, np.nan)
+    with pytest.raises(AsBuiltError, match="staggers are given over 0 m, and 100 m are needed"):
+        align(run_of(x, few), line, wire(SUPPORTS, STAGGER))
+
+
 def test_the_other_sign_is_recognised(line):
     x = np.arange(0.0, 550.0, 0.5)
     supports, stagger = SUPPORTS[[0, 2, 3, 5, 8, 9, 12]], 0.2 * np.array([1.0, -1.0, 0.3, 0.9, 0.2, -0.8, 1.0])

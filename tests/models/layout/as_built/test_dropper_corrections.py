@@ -106,3 +106,13 @@ def test_changes_leave_no_dropper_slack(design):
     errors[10] = -0.055
     found = corrected(design, errors, only=1, step=5e-3)
     assert not (found.state.is_slack & ~with_errors(design, errors).is_slack).any()
+
+
+def test_a_loose_dropper_stays_and_the_others_do_without_it(design):
+    """80 mm too long it moves nothing; its neighbours, right themselves, bring the wire nearer to the design."""
+    errors = 0.08 * (ALL == 10)
+    found = corrected(design, errors)
+    assert with_errors(design, errors).is_slack[10]
+    assert found.change[10] == 0.0
+    before, after = (np.sum((heights(s) - heights(design)) ** 2) for s in (with_errors(design, errors), found.state))
+    assert after < before

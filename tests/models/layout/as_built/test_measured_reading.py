@@ -60,3 +60,14 @@ def test_mistakes_are_told_by_row_and_column(tmp_path, lines, said):
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(LayoutError, match="cannot be read"):
         read_measured_run(tmp_path / "gone.csv")
+
+
+def test_a_column_in_another_unit_is_told_ten_times_and_counted(tmp_path):
+    rows = [f"{x},{5080 + x}" for x in range(500)]
+    with pytest.raises(LayoutError) as error:
+        read_measured_run(written(tmp_path, "position,height", *rows, "x,5"))
+    told = str(error.value).splitlines()
+    assert len(told) == 12
+    assert told[0].endswith("row 2, column B (height): 5080 is outside 2 ... 10 m: check its size and its unit")
+    assert told[-1].endswith("column B (height): ... and 490 more rows are wrong")
+    assert any("row 502, column A (position)" in line for line in told)

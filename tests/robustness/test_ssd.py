@@ -122,7 +122,7 @@ def removed_attributes(file: str) -> Iterator[Case]:
 
 
 def changed_attributes(file: str) -> Iterator[Case]:
-    """Every value in every place in `.ci/long`; else half of them in the first of an attribute's, a quarter in others."""
+    """Every value in every place in `.ci/long`; else half in the first of an attribute's, a quarter in the others."""
     seen: Counter[tuple[str, str]] = Counter()
     for root, node in nodes(file):
         for name in node.attrib:

@@ -1,7 +1,9 @@
 """The tutorial from a measuring run to a corrected line: its commands give the figures that it prints."""
 
 import csv
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -78,10 +80,24 @@ def test_both_lines_are_lines_like_any_other(workplace, droppers):
     assert built.running_surface is None
 
 
+def test_the_first_commands_are_those_of_the_page():
+    assert len(COMMANDS) == 2
+    assert "--only 10" in COMMANDS[1]
+
+
 @pytest.mark.long
-def test_a_short_run_on_the_line_as_built(workplace, capsys):
-    """Of which the normal run has the line at rest, in test_fitted_lengths."""
-    line = str(workplace / "asbuilt" / "asbuilt.toml")
-    arguments = ("--start", "551", "--end", "660", "--interval", "640", "655", "--quiet")
-    assert main(["couple", line, "CX", *arguments]) == 0
-    assert "standard deviation [N]" in capsys.readouterr().out
+@pytest.mark.parametrize("name", ["designed", "built", "corrected"])
+def test_a_run_gives_the_figures_of_the_page(workplace, name):
+    """Of which the normal run has the line at rest, in test_fitted_lengths and test_line_as_built."""
+    new, run = (re.search(rf"^openpanto ({verb} {name}.*)$", PAGE, re.MULTILINE) for verb in ("new", "run"))
+    row = re.search(rf"^\| {name} \| (\S+) \| (\S+) \| (\S+) \| (\S+) \|$", PAGE, re.MULTILINE)
+    assert None not in (new, run, row)
+    for command in (new[1], run[1]):
+        done = subprocess.run(
+            [sys.executable, "-m", "openpanto", *command.split()], cwd=workplace, capture_output=True, text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    names = ("standard deviation [N]", "maximum [N]", "minimum [N]", "slack droppers at passage [%]")
+    told = [re.search(rf"│ {re.escape(n)} +│ +(\S+) │", done.stdout)[1] for n in names]
+    assert tuple(told) == row.groups()

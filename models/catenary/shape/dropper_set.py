@@ -67,6 +67,21 @@ def dropper_lengths(mesh: CatenaryMesh, points: FloatArray) -> FloatArray:
     return np.linalg.norm(points[upper] - points[lower], axis=1)
 
 
+def turned_over(mesh: CatenaryMesh, positions: FloatArray) -> str:
+    """Return in words where the upper end of a dropper would hang below its lower one; empty if nowhere does."""
+    lower, upper = mesh.droppers.T
+    height = np.where(np.isnan(mesh.given_length), positions[upper, 2] - positions[lower, 2], np.inf)
+    over = np.flatnonzero(height < 0.0)
+    if not over.size:
+        return ""
+    worst = over[height[over].argmin()]
+    place = f"at {positions[lower[worst], 0]:.2f} m by {-1e3 * height[worst]:.0f} mm"
+    return (
+        f"the upper ends of {over.size} dropper(s) would hang below the lower ones, {place}; give more encumbrance or "
+        "tension above them, or shorter spans"
+    )
+
+
 def _rows(mesh: CatenaryMesh, points: FloatArray) -> sp.csr_matrix:
     lower, upper = mesh.droppers.T
     direction = points[upper] - points[lower]

@@ -21,7 +21,7 @@ from models.arrays import BoolArray, FloatArray
 from models.catenary.definition.line_definition import COMPONENTS, GRAVITY, CatenaryDefinition
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_conditions import DropperConditions, dropper_conditions
-from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set
+from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set, turned_over
 from models.catenary.shape.line_matrices import (
     Matrices,
     arm_load,
@@ -172,7 +172,7 @@ def _settled(
     force = np.full(len(mesh.droppers), _FIRST_FORCE) if design is None else design.dropper_force
     # What a design keeps as displacements (of the wire at its arms, their stretch) is no move of the reference.
     kept = np.zeros(mesh.fixed.shape) if design is None else unstretched * design.displacement.reshape(-1, NODE_DOFS)
-    slack = np.zeros(len(mesh.droppers), dtype=bool)
+    slack, first = np.zeros(len(mesh.droppers), dtype=bool), points
     for iteration in range(_MAX_ITERATIONS):
         shape = _shape(definition, mesh, points, design)
         matrices = shape.matrices
@@ -184,7 +184,9 @@ def _settled(
         load = matrices.load if design is None else matrices.load + (guides - stretch) @ kept.ravel()
         displacement, force = _solve(shape, matrices.K - stretch + guides, conditions, load)
         move = np.where(movable, (displacement.reshape(-1, NODE_DOFS) - kept)[:, :3], 0.0)
-        _check_move(shape, move)
+        if iteration == 0:
+            first = _displaced(points, displacement)
+        _check_move(shape, move, first)
         now_slack = _slack(mesh, _displaced(points, displacement))
         if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
             # Solve once more without the guides, to remove what the tolerance of the iteration leaves of them.
@@ -198,7 +200,7 @@ def _settled(
     search = "form finding of" if design is None else "the search for the condition of"
     raise EquilibriumError(
         f"{search} line '{definition.name}' has not settled after {_MAX_ITERATIONS} iterations: "
-        f"a point still moves by {np.abs(move).max():.2g} m"
+        f"{turned_over(mesh, first) or f'a point still moves by {np.abs(move).max():.2g} m'}"
     )
 
 
@@ -218,16 +220,16 @@ def _displaced(points: FloatArray, displacement: FloatArray) -> FloatArray:
     return points + displacement.reshape(-1, NODE_DOFS)[:, :3]
 
 
-def _check_move(shape: LineShape, move: FloatArray) -> None:
-    """Stop if form finding diverges."""
+def _check_move(shape: LineShape, move: FloatArray, first: FloatArray) -> None:
+    """Stop if form finding diverges; the first positions that it found say best why."""
     size = np.abs(move).max(axis=1)
     worst = int(size.argmax())  # the first NaN, if there is one
     if not size[worst] <= _LOST:
-        raise EquilibriumError(
-            f"line '{shape.definition.name}' has no static equilibrium of the wanted shape: form finding moves the "
-            f"point at x = {shape.points[worst, 0]:.2f} m by {size[worst]:.2g} m; check tensions, masses, pre-sag and "
-            "dropper lengths"
+        why = turned_over(shape.mesh, first) or (
+            f"form finding moves the point at x = {shape.points[worst, 0]:.2f} m by {size[worst]:.2g} m; check "
+            "tensions, masses, pre-sag and dropper lengths"
         )
+        raise EquilibriumError(f"line '{shape.definition.name}' has no static equilibrium of the wanted shape: {why}")
 
 
 def _movable(mesh: CatenaryMesh, *, carries_arms: bool) -> np.ndarray:

@@ -78,7 +78,8 @@ def blow_off(model: CatenaryModel, pressure: float, section: int = 0) -> BlowOff
     middle = 0.5 * (ends[1:] + ends[:-1])
     wind = _forces(definition, pressure)["contact_wire"]
     places = np.interp(ends, x, still)
-    held = np.array([False, *(s.has_steady_arm for s in definition.sections[section].inner_supports), False])
+    supports = mesh.support_nodes[mesh.section[mesh.support_nodes] == section]
+    held = np.array([False, *np.isin(supports, mesh.arms[:, 1]).tolist(), False])
     if definition.sections[section].periodic:
         held = np.append(held[1:-1], held[1])
     apart = ~(held[1:] & held[:-1])

@@ -266,6 +266,14 @@ def test_a_shape_that_runs_away_is_one_sentence(line_maker, name, value):
     assert "\n" not in str(caught.value)
 
 
+def test_a_messenger_wire_that_sags_below_the_contact_wire_is_named(line_maker):
+    """T 14 kN, 23 N/m: its sag of half a metre takes more than the encumbrance."""
+    line = line_maker(spans=3)
+    line = dataclasses.replace(line, profile=dataclasses.replace(line.profile, encumbrance=0.3))
+    with pytest.raises(EquilibriumError, match=r"the upper ends of \d+ dropper\(s\) would hang below the lower ones"):
+        find_form(line, build_mesh(line))
+
+
 def test_what_nothing_holds_is_one_sentence(line_maker, monkeypatch):
     line = line_maker(spans=3)
     mesh = build_mesh(line)

@@ -11,6 +11,7 @@ from models.catenary.definition.wind_definition import DesignWind
 from models.catenary.line_model import CatenaryModel
 from models.catenary.statics.blow_off import blow_off
 from models.library.catalogue import load_line
+from tests.models.conftest import make_fault
 
 PRESSURE = 961.04
 
@@ -115,3 +116,12 @@ def test_the_string_has_the_tension_of_the_day_and_the_curvature_of_its_span(sho
     assert found.string_blown[2] > 1.1 * cold.string_blown[2]
     np.testing.assert_allclose(found.blown[2:4] / found.string_blown[2:4], 0.99, atol=0.01)
     np.testing.assert_allclose(cold.offset[1:-1], cold.string[1:-1], rtol=0.02)
+
+
+def test_spans_beside_a_loose_arm_are_no_strings_held_at_both_ends(short_line):
+    plain = blow_off(CatenaryModel(short_line), 961.0)
+    loose = blow_off(CatenaryModel(dataclasses.replace(short_line, fault=(make_fault("arm_loose", support=2),))), 961.0)
+    beside = np.isnan(loose.string) & ~np.isnan(plain.string)
+    spans, x = short_line.sections[0].spans, short_line.sections[0].inner_supports[1].x
+    assert beside.tolist() == [x in (span.start, span.end) for span in spans]
+    assert loose.offset[beside].max() > 1.5 * plain.offset[beside].max()

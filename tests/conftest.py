@@ -30,7 +30,6 @@ LONGEST: Final = (
     "master/batch/sweep/test_dask_engine.py",
     "test_projects.py",
     "fmus/slave/test_library_fmus.py",
-    "test_site.py",
     "interop/test_paths.py",
     "models/catenary/condition/test_line_condition.py",
     "test_python_interface.py",

@@ -17,6 +17,7 @@ import pytest
 
 import openpanto
 from openpanto import VERBS, command_line
+from tests.effort import rest
 
 ROOT = Path(__file__).parents[1]
 #: What help does without.
@@ -125,9 +126,8 @@ def test_doctor_names_versions_and_what_is_there(call):
 @pytest.mark.parametrize(
     "line",
     [
-        ["build", "Pantograph_CX", "--out", "fmus_here"],
-        ["doctor"],
         ["run", "cx_ln2", "--stop", "0.01", "--quiet", "--no-report", "--isolate"],
+        *rest(["build", "Pantograph_CX", "--out", "fmus_here"], ["doctor"]),
     ],
     ids=lambda line: line[0],
 )

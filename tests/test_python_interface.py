@@ -103,6 +103,7 @@ def test_importing_a_package_imports_nothing_else(package):
     assert not {name for name in loaded if name.startswith((f"{package}.", "numpy", "pandas", "lxml"))}
 
 
+@pytest.mark.long  # a step of `.ci/run`
 def test_a_users_script_passes_a_strict_type_checker(tmp_path):
     pytest.importorskip("mypy", reason="the extra 'dev' is not installed")
     good, bad = tmp_path / "good.py", tmp_path / "bad.py"

@@ -1,4 +1,4 @@
-"""The documentation site builds without warnings and loads nothing from elsewhere."""
+"""The documentation site builds without warnings and loads nothing from elsewhere; a step of `.ci/run`."""
 
 import re
 import subprocess
@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip("mkdocs", reason="the extra 'docs' is not installed")
 pytest.importorskip("latex2mathml", reason="the extra 'docs' is not installed")
 
+pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[1]
 
 
@@ -24,19 +25,16 @@ def site(tmp_path_factory):
     return {str(p.relative_to(folder)): p.read_text(encoding="utf-8") for p in folder.rglob("*.html")}
 
 
-@pytest.mark.slow
 def test_nothing_is_loaded_from_elsewhere(site):
     loading = re.compile(r'<(?:script|link|img|iframe)\b[^>]*?(?:src|href)="((?:https?:)?//[^"]*)"')
     assert not {(page, url) for page, text in site.items() for url in loading.findall(text)}
 
 
-@pytest.mark.slow
 def test_every_formula_is_mathml(site):
     assert sum(text.count("<math") for text in site.values()) > 100
     assert not [page for page, text in site.items() if "arithmatex" in text]
 
 
-@pytest.mark.slow
 def test_generated_pages_are_there(site):
     assert "<code>youngs_modulus</code>" in site["reference/line-keys.html"]
     assert "<code>carries_weights</code>" in site["reference/pantograph-keys.html"]

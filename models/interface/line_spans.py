@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.condition.tensioning import wire_tensions
+from models.catenary.condition.faults import active_of
+from models.catenary.condition.line_condition import find_condition
+from models.catenary.definition.fault_definition import TensionLoss
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.track_definition import TIGHTEST_RADIUS
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
 from models.catenary.shape.support_places import SupportPlaces
+from models.catenary.statics.found_tension import found_tension
 from models.catenary.statics.span_table import LENGTHS, String, radii
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
@@ -209,11 +212,16 @@ def _own_staggers(definition: CatenaryDefinition) -> list[Staggers]:
 
 
 def _tension(definition: CatenaryDefinition) -> float:
-    """Return the tension of the contact wire, at another temperature than the design's the least that it has [N]."""
-    if definition.tensioning is None or definition.tensioning.is_design:
+    """Return the tension of the contact wire, in another condition than the design's the least that it has [N]."""
+    is_design = definition.tensioning is None or definition.tensioning.is_design
+    if is_design and not any(active_of(definition, TensionLoss)):
         return definition.contact_wire.tension
-    wires = wire_tensions(kept_form(definition, build_mesh(definition)))
-    return min(float(w.tension.min()) for w in wires if w.component == "contact_wire")
+    static = find_condition(kept_form(definition, build_mesh(definition)))
+    return min(
+        float(found_tension(static, "contact_wire", index, np.array([0.5 * (s.start + s.end)]))[0])
+        for index, section in enumerate(definition.sections)
+        for s in section.spans
+    )
 
 
 def _check(radii: Sequence[float], staggers: Sequence[Staggers]) -> None:

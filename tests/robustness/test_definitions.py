@@ -138,6 +138,11 @@ OTHER_WAYS = {
         '[track]\npositions = [[0, 50, 150], "m", "probe"]\ncurvature = [[0, 0.001, 0.0015], "1/m", "probe"]',
         '[track]\npositions = [[0, 50, 150], "m", "probe"]\nradius = [[0, 1000, 700], "m", "probe"]',
     ),
+    "as built": (
+        ROUTE,
+        "[ends]",
+        f'[as_built]\ndropper_length_errors = [{[*range(-10, 10)]}, "mm", "probe"]\n[ends]',
+    ),
     "auxiliary wire": (
         line_path("Shinkansen"),
         "[dropper]",

@@ -122,7 +122,7 @@ def removed_attributes(file: str) -> Iterator[Case]:
 
 
 def changed_attributes(file: str) -> Iterator[Case]:
-    """Every value in the first of an attribute's places; in the others all only in `.ci/long`, else one in four."""
+    """Every value in every place in `.ci/long`; else half in the first of an attribute's, a quarter in the others."""
     seen: Counter[tuple[str, str]] = Counter()
     for root, node in nodes(file):
         for name in node.attrib:
@@ -131,7 +131,7 @@ def changed_attributes(file: str) -> Iterator[Case]:
             values = BAD_NUMBERS if name in NUMBERS else BAD_TEXTS
             place = seen[name_of(node), name]
             seen[name_of(node), name] += 1
-            for value in values if IS_LONG or not place else values[place % 4 :: 4]:
+            for value in values if IS_LONG else values[place % 4 :: 4 if place else 2]:
                 before = node.get(name)
                 node.set(name, value)
                 sound = (name, value.strip()) in (("order", ""), ("variables", ""))

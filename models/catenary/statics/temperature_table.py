@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.arrays import FloatArray
+from models.catenary.condition.faults import tension_left
 from models.catenary.condition.line_condition import find_condition
 from models.catenary.condition.tensioning import WireTension, ruling_span, swing, wire_tensions
-from models.catenary.definition.line_definition import CatenaryDefinition
+from models.catenary.definition.line_definition import COMPONENTS, CatenaryDefinition
 from models.catenary.definition.section_definition import Section, Span
 from models.catenary.shape.form_finding import EquilibriumError, StaticState
 from models.catenary.shape.kept_form import kept_form
@@ -124,7 +125,7 @@ def _at(design: StaticState, temperature: float, index: int, speed: float) -> Li
     designed = replace(design, shape=replace(design.shape, definition=definition))
     try:
         state = find_condition(designed)
-        wires = [wire for wire in wire_tensions(designed) if wire.section == index]
+        wires = [_left(state, wire) for wire in wire_tensions(designed) if wire.section == index]
     except EquilibriumError as error:
         where = f"at {temperature - 273.15:g} degC"
         raise EquilibriumError(str(error) if where in str(error) else f"{where}: {error}") from error
@@ -144,6 +145,15 @@ def _at(design: StaticState, temperature: float, index: int, speed: float) -> Li
         waves=_slowest(definition, contact, upper, speed),
         highest=highest_wires(state, definition.overbridge),
     )
+
+
+def _left(state: StaticState, wire: WireTension) -> WireTension:
+    """Return what a fault leaves of the tensions of a wire: the same share everywhere."""
+    mesh = state.shape.mesh
+    share = tension_left(state.shape.definition, mesh)
+    own = (mesh.component == COMPONENTS.index(wire.component)) & (mesh.section[mesh.beams[:, 0]] == wire.section)
+    left = float(share[own][0])
+    return replace(wire, tension=left * wire.tension, at_tensioner=left * wire.at_tensioner)
 
 
 def _slowest(definition: CatenaryDefinition, contact: WireTension, upper: WireTension, speed: float) -> Waves:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from models.catenary.condition.faults import active_of
+from models.catenary.definition.fault_definition import TensionLoss
 from models.catenary.definition.line_definition import CatenaryDefinition, Wire
 
 #: Highest speed of operation over the wave speed (EN 50119; section 2.1 of the 2012 thesis).
@@ -61,9 +63,14 @@ def wave_speed(wire: Wire, length: float) -> float:
 
 
 def contact_wire_wave_speed(definition: CatenaryDefinition) -> float:
-    """Return the wave speed of the contact wire in the longest span, where it is lowest [m/s]."""
+    """Return the wave speed of the contact wire in the longest span, where it is lowest [m/s].
+
+    Of a wire that has lost tension in some section it is the speed there.
+    """
     longest = max(span.length for section in definition.sections for span in section.spans)
-    return wave_speed(definition.contact_wire, longest)
+    lost = (f.amount for f in active_of(definition, TensionLoss) if f.wire == "contact_wire")
+    wire = definition.contact_wire
+    return wave_speed(replace(wire, tension=wire.tension * (1.0 - max(lost, default=0.0))), longest)
 
 
 def reflection_factor(upper: Wire, contact: Wire) -> float:

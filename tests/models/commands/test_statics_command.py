@@ -45,7 +45,8 @@ def test_room_under_the_bridge_at_rest_lifted_and_over_temperature(statics_folde
         cold, warm = csv.DictReader(file)
     left = "clearance under bridge 1 [m]"
     assert float(cold[left]) < float(warm[left])  # a messenger wire between springs is tighter in the cold
-    assert float(cold["wave speed [km/h]"]) == pytest.approx(429.5, abs=0.1)
+    left = 0.95 * 0.9 * 20e3  # after friction and the fault that takes a tenth
+    assert float(cold["wave speed [km/h]"]) == pytest.approx(3.6 * (left / 1.334) ** 0.5, rel=1e-3)
 
 
 def test_the_summary_can_be_read_whatever_a_bridge_is_called(statics_folder):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from models import in_wind, over_temperature, span_table, statics
+from models.catenary.definition.fault_definition import FAULT_KINDS
 from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.definition.tensioning_definition import Tensioning, TensioningDevice
 from models.catenary.shape.form_finding import EquilibriumError
@@ -98,6 +99,17 @@ def test_spans_have_the_tension_that_the_devices_leave(line):
     rubbed = span_table(Line(dataclasses.replace(line.definition, tensioning=tensioning)), limit=0.4)
     assert span_table(line, limit=0.4).tension == line.definition.contact_wire.tension
     assert rubbed.tension == pytest.approx(0.9 * line.definition.contact_wire.tension)
+
+
+def test_a_loss_of_tension_counts_over_temperature_and_in_spans(line):
+    lost = FAULT_KINDS["tension_loss"](kind="tension_loss", wire="contact_wire", value=0.2)
+    weak = Line(dataclasses.replace(line.definition, fault=(lost,)))
+    left = 0.8 * line.definition.contact_wire.tension
+    assert span_table(weak, limit=0.4).tension == pytest.approx(left)
+    titles, columns = over_temperature(weak, ["15 degC"]).tables["temperature"]
+    assert columns[titles.index("contact_wire at the tensioner [N]")][0] == pytest.approx(left)
+    sound = over_temperature(line, ["15 degC"]).states[0].waves.speed
+    assert over_temperature(weak, ["15 degC"]).states[0].waves.speed == pytest.approx(0.8**0.5 * sound, rel=2e-3)
 
 
 @pytest.fixture(scope="module")

@@ -117,6 +117,7 @@ def test_the_same_bits_here_with_processes_and_through_a_scheduler(swept, tmp_pa
     assert {len(workers) for workers in used.values()} == {2}
 
 
+@pytest.mark.long  # `test_child_engine` tries it in every run
 def test_a_run_whose_worker_always_dies_is_a_row_and_the_others_go_on(exiting_toy, command, tmp_path):
     process = command("--over", "catenary.fail_at=0.2,9,10", "--jobs", "1", quiet=False)
     code, error = ended(process)
@@ -128,6 +129,7 @@ def test_a_run_whose_worker_always_dies_is_a_row_and_the_others_go_on(exiting_to
     assert (data["status"], data["finished"]) == ("complete", 3)
 
 
+@pytest.mark.long  # as are all of them, one after the other, below
 def test_a_worker_that_is_killed_costs_its_run_one_retry(command, tmp_path, whole_table):
     with cluster_of(tmp_path / "cluster") as cluster:
         process = command(*GRID, "--scheduler", cluster.address, quiet=False)

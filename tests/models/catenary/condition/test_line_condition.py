@@ -386,6 +386,10 @@ def test_faults_are_of_the_droppers_that_they_name():
         assert design.shape.mesh.section[node] == section - 1
         wanted = line.sections[section - 1].spans[3].droppers[1]
         assert math.isclose(design.shape.mesh.points[node, 0], wanted, abs_tol=1e-9)
+
+
+@pytest.mark.long
+def test_a_fault_is_of_a_dropper_and_never_of_a_hanger():
     line = load_line("Shinkansen")
     (section,) = line.sections
     spans = tuple(dataclasses.replace(span, hangers=span.droppers[::2]) for span in section.spans)

@@ -8,9 +8,10 @@ import pytest
 from models.catenary.condition.tensioning import anchored_tension
 from models.catenary.definition.tensioning_definition import Tensioning, TensioningDevice
 from models.catenary.statics.temperature_table import temperature_table
-from models.catenary.statics.wire_waves import waves
+from models.catenary.statics.wire_waves import contact_wire_wave_speed, waves
 from models.interface.line_and_pantograph import Line
 from models.interface.line_statics import statics
+from tests.models.conftest import make_fault
 
 REFERENCE = 288.15
 
@@ -47,3 +48,16 @@ def test_friction_in_the_weights_slows_waves_by_its_root(short_line):
     (found,) = temperature_table(line, [REFERENCE])
     share = found.waves.speed / waves(short_line, 0.0, 50.0).speed
     assert share == pytest.approx(math.sqrt(0.95), rel=1e-3)  # bending stays
+
+
+def test_a_wire_that_has_lost_tension_carries_slower_waves(ln2):
+    """By the square root of what is left, where the fault acts: in the warning of the speed and in the FMU."""
+    loss = make_fault("tension_loss", wire="contact_wire", value=0.19)
+    faster, slower = (
+        contact_wire_wave_speed(dataclasses.replace(ln2, fault=(fault,)))
+        for fault in (dataclasses.replace(loss, active=0), loss)
+    )
+    assert faster == contact_wire_wave_speed(ln2)
+    assert slower / faster == pytest.approx(0.9, rel=1e-3)  # it bends as before
+    of_another = make_fault("tension_loss", wire="messenger_wire", value=0.19)
+    assert contact_wire_wave_speed(dataclasses.replace(ln2, fault=(of_another,))) == faster

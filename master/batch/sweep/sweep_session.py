@@ -15,6 +15,7 @@ from typing import Any, Final
 from master.batch.batch_session import PacedFiles, run_tasks
 from master.batch.sweep.held_fmus import held_fmus
 from master.batch.sweep.pages import sweep_page
+from master.batch.sweep.pages.criticality import unseen_note
 from master.batch.sweep.pages.sweep_view import read_view, view_of
 from master.batch.sweep.sensitivity import SensitivityIndices, described
 from master.batch.sweep.sensitivity_table import failed_note, sensitivity_csv, sensitivity_data, sensitivity_of
@@ -229,6 +230,8 @@ def sweep(
                     return so_far
 
                 if why := prepared.announced:
+                    tell(why)
+                if why := unseen_note(state.setting.get("places", {}), state.setting.get("interval", (None, None))):
                     tell(why)
                 with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
                     tell(_announcement(make_runs_of, prepared.base.start, missing, state, chosen))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
@@ -19,6 +19,8 @@ from master.report.charts.chart import Axis, Bars, Chart
 
 #: Figures that are compared, the first of them by which droppers are ranked.
 _FIGURES: Final = ("maximum", "minimum", "sigma", "uplift", "slack droppers", "share of loss")
+#: Most faults that a note names.
+_MOST_NAMED: Final = 4
 #: Width of bars at supports [m].
 _WIDTH: Final = 5.0
 _ACTIVE: Final = re.compile(r"(?:.*\.)?fault\[(\d+)\]\.active")
@@ -109,10 +111,37 @@ def acting_names(view: SweepView, row: Row) -> str:
     return "; ".join(_part(view, faults[t]).name for t in acting_faults(row, list(faults.values()))) or "none"
 
 
+def unseen_note(places: Mapping[str, str], interval: tuple[float | None, float | None]) -> str:
+    """Return which of the faults that act in turn lie where no run is judged, empty if none does.
+
+    Parameters
+    ----------
+    places : mapping
+        Name of a varied parameter -> what its FMU says of it.
+    interval : (float, float)
+        Interval of interest [m]; None: open.
+    """
+    low, high = -math.inf if interval[0] is None else interval[0], math.inf if interval[1] is None else interval[1]
+    parts = [_described(name, said) for name, said in places.items() if _ACTIVE.fullmatch(name)]
+    unseen = [part.name for part in parts if part.position < low or part.position > high]
+    if not unseen:
+        return ""
+    where = " ".join([f"from {low:g} m"] * (low > -math.inf) + [f"to {high:g} m"] * (high < math.inf))
+    shown = "; ".join(unseen[:_MOST_NAMED]) + (" ..." if len(unseen) > _MOST_NAMED else "")
+    return (
+        f"{len(unseen)} of {len(parts)} faults lie outside the interval of interest, {where}, in which "
+        f"runs are judged ({shown}): what they change where they are is not seen; take others, or another interval"
+    )
+
+
 def _part(view: SweepView, parameter: SweptColumn) -> FaultyPart:
-    match = _SAID.search(view.places.get(parameter.name, ""))
+    return _described(parameter.name, view.places.get(parameter.name, ""))
+
+
+def _described(parameter: str, text: str) -> FaultyPart:
+    match = _SAID.search(text)
     if match is None:
-        return FaultyPart(parameter.name.removesuffix(".active"), math.nan)
+        return FaultyPart(parameter.removesuffix(".active"), math.nan)
     said = match[1]
     at = _AT.search(said)
     name = said[: at.start()] if at else said

@@ -120,7 +120,7 @@ def _chapters(view: SweepView, pantograph: str, number: int) -> Iterator[Chapter
     listed = [p for p in view.of_kind("listed") if p not in faults]
     others = [*grid, *_grouping(view, listed)]
     if found := criticality.criticalities(view, rows, [*grid, *listed]):
-        yield _faults(found, number)
+        yield _faults(found, number, criticality.unseen_note(view.places, view.interval))
         rows = [row for row in rows if not criticality.acting_faults(row, faults)]  # the other charts mix no faults
     if len(grid) > 1 and (charts := grid_charts.map_charts(view, rows, others, f"map_{number}")):
         names = [view.short_names[p.title] for p in grid]
@@ -142,13 +142,14 @@ def _grouping(view: SweepView, listed: Sequence[SweptColumn]) -> list[SweptColum
     return [SweptColumn("variant", "listed")] if any(row.get("variant") for row in view.rows) else list(listed)
 
 
-def _faults(found: Sequence[criticality.Criticality], number: int) -> Chapter:
+def _faults(found: Sequence[criticality.Criticality], number: int, unseen: str) -> Chapter:
     figures = [f.title.removesuffix(" [1]") for f in found[0].figures]
     heads = [*(["parameters"] if len(found) > 1 else []), "fault", "position [m]", *figures]
     rows = criticality.ranking_rows(found)
     leading = 2 if len(found) > 1 else 1
     ranking = html_markup.table(heads, rows[:MOST_ROWS], leading=leading, is_sortable=True)
-    text = (f"<p class='note'>{_FAULTS}</p>", ranking)
+    warning = [f"<p class='warning'>{html_markup.text(unseen)}</p>"] if unseen else []
+    text = (*warning, f"<p class='note'>{_FAULTS}</p>", ranking)
     return Chapter(
         "faults", "Which fault matters", text, tuple(criticality.criticality_charts(found, f"fault_{number}"))
     )

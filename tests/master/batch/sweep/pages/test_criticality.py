@@ -1,11 +1,12 @@
 """Which dropper matters: each fault alone against the healthy line."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 
-from master.batch.sweep.pages.criticality import criticalities, criticality_charts, ranking_rows
+from master.batch.sweep.pages.criticality import criticalities, criticality_charts, ranking_rows, unseen_note
 from master.batch.sweep.pages.sweep_page import chapters, page
 from tests.master.batch.sweep.pages.conftest import failure, row, view
 
@@ -102,6 +103,19 @@ def test_a_fault_whose_run_failed_is_not_drawn_as_harmless():
     (found,) = faults(missing)
     assert np.isnan(found.faulty[1, 0])
     assert ranking_rows([found])[-1][2] == "-"
+
+
+def test_faults_where_no_run_is_judged_are_told():
+    at = [float(re.search(r" at ([\d.]+) m", PLACES[fault])[1]) for fault in FAULTS]
+    assert unseen_note(PLACES, (min(at), max(at))) == unseen_note(PLACES, (None, None)) == ""
+    assert unseen_note({FAULTS[0]: "", "line.speed": "x; dropper 1 of span 2 at 5.00 m"}, (10.0, 20.0)) == ""
+    told = unseen_note(PLACES, (min(at) + 0.1, None))
+    assert told.startswith(f"1 of 3 faults lie outside the interval of interest, from {min(at) + 0.1:g} m, in which")
+    assert "(span 14, dropper 1)" in told
+    assert "3 of 3 faults" in unseen_note(PLACES, (0.0, 1.0))
+    setting = {"places": PLACES, "interval": [0.0, 1.0]}
+    (chapter, *_) = chapters(view(ROWS, dict.fromkeys(FAULTS, ""), setting=setting))
+    assert chapter.text[0].startswith("<p class='warning'>3 of 3 faults lie outside")
 
 
 @pytest.mark.parametrize("rows", [ROWS[1:], ROWS[:1], []], ids=["no healthy line", "no fault", "nothing"])

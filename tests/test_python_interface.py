@@ -333,6 +333,7 @@ def test_figures_of_a_foreign_record_are_those_of_the_run(toy_run):
         (lambda _: master.open_scenario("x.ssp", stop="5 m"), "stop: '5 m' is not a time"),
         (lambda _: master.contact_figures([0, 1], [1, 2, 3], 0.1), "equally long rows"),
         (lambda _: master.contact_figures([0, 1], [1, 2], 0.1), "cutoff 20 Hz"),
+        (lambda _: master.contact_figures([0, 1], [1, 2], [0, 1]), "step must be one number"),
         (lambda _: master.contact_figures([0, 1], [1, 2], 0.001), "fewer than two samples"),
         (lambda _: master.read_results("nowhere"), "is not a results folder"),
     ],

@@ -374,6 +374,10 @@ def contact_figures(
         raise RequestError(
             f"position and force must be equally long rows, not of shapes {places.shape}, {forces.shape}"
         )
+    if np.ndim(step):
+        raise RequestError(
+            "step must be one number, the time between two samples in s: position, force, step in this order"
+        )
     if not (np.isfinite(places).all() and np.isfinite(forces).all() and 0.0 < step < math.inf):
         raise RequestError("position, force and step must be finite numbers, and the step greater than 0 s")
     if not 0.0 < 2.0 * cutoff * step < 1.0:

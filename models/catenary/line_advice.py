@@ -11,7 +11,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from models.arrays import BoolArray, FloatArray
+from models.arrays import BoolArray, ComplexArray, FloatArray
 from models.catenary.condition.faults import active_of
 from models.catenary.definition.fault_definition import HardPoint
 from models.catenary.definition.line_definition import CatenaryDefinition, Contact
@@ -201,13 +201,26 @@ def short_waves(points: FloatArray, shortest: float) -> float:
     """
     x, r = points.T
     count = min(math.ceil((x[-1] - x[0]) / min(0.25 * shortest, float(np.diff(x).min()))), _LONGEST_PROFILE)
-    places = np.linspace(x[0], x[-1], max(count, 2))
+    places = np.linspace(x[0], x[-1], 1 << (max(count, 2) - 1).bit_length())
     heights = np.interp(places, x, r)
     heights -= np.linspace(heights[0], heights[-1], len(heights))  # what is left closes on itself
-    power = np.abs(np.fft.rfft(heights))[1:] ** 2
+    power = np.abs(_transform(heights)[1 : len(heights) // 2 + 1]) ** 2
     waves = np.arange(1, len(power) + 1) / (x[-1] - x[0])
     total = float(power.sum())
     return math.sqrt(float(power[waves * shortest > 1.0].sum()) / total) if total else 0.0
+
+
+def _transform(values: FloatArray) -> ComplexArray:
+    """Return the discrete Fourier transform of as many values as a power of two.
+
+    By halves (Cooley and Tukey 1965): standalone FMUs bring numpy without its transforms.
+    """
+    terms = values.astype(np.complex128)[None]
+    while len(terms) < len(values):
+        half = terms.shape[1] // 2
+        turned = np.exp(-1j * np.pi * np.arange(len(terms)) / len(terms))[:, None] * terms[:, half:]
+        terms = np.concatenate([terms[:, :half] + turned, terms[:, :half] - turned])
+    return terms[:, 0]
 
 
 def slack_law_warning(definition: CatenaryDefinition) -> str:

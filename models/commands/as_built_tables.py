@@ -138,7 +138,7 @@ def _alignment(found: AsBuiltOutcome) -> str:
     if not a.by:
         return "none: positions as they are (the run has neither staggers nor structures of the design)"
     scale = f", stretched by {1e2 * a.scale:+.4f} % ({a.scale * found.built.run.way:+.2f} m)" if a.scale else ""
-    how = f", correlation {a.correlation:.4f}" if math.isfinite(a.correlation) else f", {len(a.design)} of them"
+    how = f", correlation {a.correlation:.4f}" if math.isfinite(a.correlation) else f", {a.structures} of them"
     sure = f" (+- {a.standard_error:.2f} m, by the heights)" if math.isfinite(a.standard_error) else ""
     return f"by {a.by}: shifted by {a.shift:+.2f} m in its middle{sure}{scale}{how}"
 

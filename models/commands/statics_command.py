@@ -178,6 +178,9 @@ def _profile_rows(result: LineStatics) -> list[tuple[str, str]]:
     contact = next(p for p in result.profiles if p.component == "contact_wire")
     z = contact.z[rest_profile.within(contact, result.span)]
     rows = [("contact wire, highest and lowest [m]", f"{z.max():.4f}, {z.min():.4f}")]
+    place, offset = rest_profile.largest_offset(contact, result.supports.x)
+    side = "left" if offset > 0.0 else "right"
+    rows.append(("largest offset of the contact wire [mm]", f"{1e3 * abs(offset):.0f} {side} at {place:.0f} m"))
     d = result.span_droppers
     if not len(d.length):
         return rows

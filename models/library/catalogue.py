@@ -109,6 +109,8 @@ def _path(kind: Kind, name: str, folders: Iterable[Path] | None) -> Path:
         known = definition_names(kind, searched)
         other: Kind = "pantographs" if kind == "lines" else "lines"
         advice = f"; it is a {other[:-1]}" if definition_files(other, name, searched) else hint(name, known)
+        if name and (inside := definition_names(kind, [Path(name)])):
+            advice = f"; {name} is a project: name its file, {Path(name, kind, inside[0]).as_posix()}.toml"
         text = f"no {kind.removesuffix('s')} '{name}' in the library; known: {', '.join(known)}{advice}"
         if absent := search_path.absent_folders():
             text += f"; {absent}"

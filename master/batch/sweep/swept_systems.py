@@ -181,6 +181,7 @@ def scenario_setting(base: System, plan: SweepPlan) -> dict[str, Any]:
         "speeds": {c.name: v for c in pantographs(base) if (v := _speed(c)) is not None},
         "contacts": {c.pantograph: c.prefix for c in reversed(find_contacts(base.connections))},
         "places": described,
+        **({"changes": dict(base.changes)} if base.changes else {}),
     }
 
 

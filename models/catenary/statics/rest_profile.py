@@ -91,6 +91,17 @@ def within(profile: Profile, span: Span) -> BoolArray:
     return (profile.x >= span.start - 0.01) & (profile.x <= span.end + 0.01)
 
 
+def largest_offset(wire: Profile, supports: FloatArray) -> tuple[float, float]:
+    """Return where a wire is farthest from the middle of the track, and its y there [m].
+
+    Sought from the first to the last support: beyond them the wires run to their anchors.
+    """
+    first, last = (supports[0], supports[-1]) if len(supports) else (-np.inf, np.inf)
+    between = np.flatnonzero((wire.x >= first - 0.01) & (wire.x <= last + 0.01))
+    worst = between[np.abs(wire.y[between]).argmax()]
+    return float(wire.x[worst]), float(wire.y[worst])
+
+
 def arm_loads(model: CatenaryModel, section: int = 0) -> ArmLoads:
     """Return the loads of a section's steady arms, from their elongation."""
     mesh, static = model.mesh, model.static

@@ -12,7 +12,7 @@ import numpy as np
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.section_definition import Span
 from models.catenary.shape.track import track_at
-from models.catenary.statics.rest_profile import Droppers
+from models.catenary.statics.rest_profile import Droppers, largest_offset
 from models.commands import route_plots, statics_plots, temperature_report, wind_report
 from models.commands.desk import page_markup as markup
 from models.commands.desk.inline_figure import inline_figure
@@ -131,6 +131,9 @@ def _track(definition: CatenaryDefinition, section: int) -> str:
 
 def _figures(result: LineStatics) -> Part:
     e, w, d = result.elasticity, result.waves, result.span_droppers
+    contact = next(p for p in result.profiles if p.component == "contact_wire")
+    place, offset = largest_offset(contact, result.supports.x)
+    side = "left" if offset > 0.0 else "right"
     hung = "droppers and hangers" if d.is_hanger.any() else "droppers"
     body = [
         markup.tiles([
@@ -139,6 +142,7 @@ def _figures(result: LineStatics) -> Part:
             ("non-uniformity u", f"{100.0 * e.non_uniformity:.1f}", "%"),
             (f"{hung}, shortest", f"{1e3 * d.length.min():.0f}" if len(d.length) else NOTHING, "mm"),
             (f"{hung}, longest", f"{1e3 * d.length.max():.0f}" if len(d.length) else NOTHING, "mm"),
+            ("contact wire's largest offset", f"{1e3 * abs(offset):.0f}", "mm"),
             ("wave speed C", f"{3.6 * w.speed:.0f}", "km/h"),
             ("limit of operation 0.7 C", f"{3.6 * w.limit:.0f}", "km/h"),
             ("reflection factor r", f"{w.reflection:.3f}", ""),
@@ -146,7 +150,8 @@ def _figures(result: LineStatics) -> Part:
             ("amplification r / Doppler", f"{w.amplification:.2f}" if math.isfinite(w.amplification) else NOTHING, ""),
         ]),
         markup.note(
-            f"Elasticity and droppers of span {result.number}, {result.span.start:g} ... {result.span.end:g} m; waves "
+            f"Elasticity and droppers of span {result.number}, {result.span.start:g} ... {result.span.end:g} m; the "
+            f"largest offset at rest is {side} of the middle at {place:.0f} m, between the supports; waves "
             "with the tensions that the wires have there."
         ),
     ]  # fmt: skip

@@ -57,6 +57,8 @@ class Alignment:
         Of the staggers; NaN if they were not used.
     standard_error : float
         Of the positions, as far as scattering heights leave them open [m]; NaN if heights did not take part.
+    structures : int
+        How many structures it is made of.
     """
 
     by: str
@@ -64,6 +66,7 @@ class Alignment:
     design: FloatArray
     correlation: float = float("nan")
     standard_error: float = float("nan")
+    structures: int = 0
 
     def position(self, x: FloatArray) -> FloatArray:
         """Return the design's positions of places of the run, shape (n,) [m]."""
@@ -146,8 +149,8 @@ def _by_structures(run: MeasuredRun, known: dict[str, float]) -> Alignment:
     if len(names) > 2:
         line = np.polynomial.Polynomial.fit(measured, design, 1)
         if np.abs(line(measured) - design).max() <= _SEEN:
-            return Alignment("structures", ends, line(ends))
-    return Alignment("structures", measured, design)
+            return Alignment("structures", ends, line(ends), structures=len(names))
+    return Alignment("structures", measured, design, structures=len(names))
 
 
 def _by_staggers(run: MeasuredRun, courses: tuple[WireCourse, ...]) -> Alignment:

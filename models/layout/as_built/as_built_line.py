@@ -192,9 +192,12 @@ def _deviations(
     """Yield how far the measured wire is from the design's, section by section, where a wire is alone."""
     which = np.where(np.isfinite(run.height), section_alone(courses, x), -1)
     if (which < 0).all():
+        named = any(s.structure for section in design.shape.definition.sections for s in section.supports)
+        cure = "; the run names structures, and the design none: name them in its [supports]"
         raise AsBuiltError(
             f"{run.source}: no row lies on the line, which reaches from {min(c.x[0] for c in courses):.1f} to "
             f"{max(c.x[-1] for c in courses):.1f} m; the run from {x.min():.1f} to {x.max():.1f} m"
+            f"{cure if any(run.structure) and not named else ''}"
         )
     axis = run.height - worn_depth(design.shape.definition, run)
     for index, course in enumerate(courses):

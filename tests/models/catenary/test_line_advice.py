@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from models.catenary import line_advice
 from models.catenary.definition.line_definition import Contact, Rayleigh
 from models.catenary.definition.surface_definition import RunningSurface
 from models.catenary.line_advice import (
@@ -159,3 +160,9 @@ def test_of_a_measured_surface_the_waves_count_not_the_points(ln2, length, is_sh
     surface = RunningSurface(profile="wear.csv", points=tuple(map(tuple, points.tolist())))
     said = surface_warning(dataclasses.replace(ln2, running_surface=surface), 300.0 / 3.6, 1e-3)
     assert said.startswith("the running surface of wear.csv has waves, and steps of 1 ms") is is_short
+
+
+@pytest.mark.parametrize("count", [2, 16, 1024])
+def test_the_transform_is_that_of_numpy(count):
+    values = np.random.default_rng(1).standard_normal(count)
+    assert line_advice._transform(values) == pytest.approx(np.fft.fft(values), abs=1e-11)

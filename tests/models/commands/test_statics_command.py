@@ -49,6 +49,19 @@ def test_room_under_the_bridge_at_rest_lifted_and_over_temperature(statics_folde
     assert float(cold["wave speed [km/h]"]) == pytest.approx(3.6 * (left / 1.334) ** 0.5, rel=1e-3)
 
 
+def test_the_offset_at_rest_is_that_of_a_chord(statics_folder):
+    """From 100 to 150 m, where the curve is sharpest between arms: the mean of the staggers, and kappa L^2 / 8.
+
+    Weight in the canted plane, errors and the fault add a few centimetres; the ends beyond the arms do not count.
+    """
+    with (statics_folder / "summary.csv").open() as file:
+        rows = {row["quantity"]: row["value"] for row in csv.DictReader(file)}
+    offset, side, _, place, _ = rows["largest offset of the contact wire [mm]"].split()
+    assert float(offset) == pytest.approx(1e3 * (0.5 * (0.1 + 0.15) + 0.00125 * 50.0**2 / 8.0), abs=40.0)
+    assert side == "left"
+    assert float(place) == pytest.approx(125.0, abs=5.0)
+
+
 def test_the_summary_can_be_read_whatever_a_bridge_is_called(statics_folder):
     with (statics_folder / "summary.csv").open() as file:
         names = [row["quantity"] for row in csv.DictReader(file)]

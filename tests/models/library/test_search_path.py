@@ -75,6 +75,13 @@ def test_a_name_that_is_not_there_is_answered_by_the_known_ones(project):
         line_path("mine", search_path(project))
 
 
+def test_a_project_given_for_a_line_is_answered_by_its_file(project, monkeypatch):
+    define(project, "lines", "Mine")
+    monkeypatch.chdir(project.parent)
+    with pytest.raises(UnknownNameError, match=rf"is a project: name its file, {project.name}/lines/Mine\.toml"):
+        line_path(project.name)
+
+
 def test_a_line_given_for_a_pantograph_is_recognised():
     with pytest.raises(UnknownNameError, match=r"it is a line$"):
         pantograph_path("LN2")

@@ -243,6 +243,7 @@ def _parameter_rows(view: SweepView) -> Iterator[tuple[str, str]]:
         )
         count = "1 value" if len(found) == 1 else f"{len(found)} values"
         yield p.title, f"{p.distribution}: {count}" if p.distribution else text
+    yield from ((f"{name}, in all runs", str(value)) for name, value in view.changes.items())
     names = {"samples": "samples", "seed": "seed", "method": "method of sampling", "static_force": "static force"}
     is_sampled = any(p.distribution for p in view.parameters)
     if view.request.get("sensitivity") or not any(p.distribution and not p.is_seed for p in view.parameters):

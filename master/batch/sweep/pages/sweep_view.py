@@ -138,6 +138,8 @@ class SweepView:
         How the names of a pantograph's contact variables begin.
     places : dict
         Description of each parameter that makes a fault act, by its name.
+    changes : dict
+        Values that all runs have in place of the scenario's (``--set``), as given, by ``component.parameter``.
     folder : Path, optional
         Holds the runs that were kept.
     indices : tuple of dict
@@ -158,6 +160,7 @@ class SweepView:
     speeds: Mapping[str, float] = field(default_factory=dict)
     contacts: Mapping[str, str] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)
+    changes: Mapping[str, str] = field(default_factory=dict)
     folder: Path | None = None
     indices: tuple[Mapping[str, Any], ...] = ()
 
@@ -307,6 +310,7 @@ def view_of(
         speeds=setting.get("speeds", {}),
         contacts=setting.get("contacts", {}),
         places=setting.get("places", {}),
+        changes=dict(setting.get("changes", {})),
         folder=folder,
         indices=tuple(indices),
     )

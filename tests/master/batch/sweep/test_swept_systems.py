@@ -5,8 +5,10 @@ from dataclasses import replace
 import pytest
 
 from master.batch.sweep.sweep_plan import SweepRequest, make_plan
-from master.batch.sweep.swept_systems import ForceLaw, SweepRun, make_runs
+from master.batch.sweep.swept_systems import ForceLaw, SweepRun, make_runs, scenario_setting
 from master.errors import RequestError
+from master.scenario.open_scenario import open_scenario
+from master.scenario.overrides import Overrides
 
 
 def _runs(system, **request):
@@ -19,6 +21,14 @@ def test_the_stop_time_follows_the_speed(toy_system):
     assert [r.stop for r in _runs(toy_system, over={"catenary.stiffness": "1,2"})] == [1.0, 1.0]
     assert [r.stop for r in _runs(toy_system, over={"speed": "50,55"}, stop=0.95)] == [0.95, 0.95]
     assert [r.stop for r in _runs(toy_system, over={"speed": "50", "stop": "1,2"})] == [1.0, 2.0]
+
+
+def test_values_of_all_runs_are_kept_as_they_were_given(toy, toy_system):
+    request = SweepRequest.read({"over": {"speed": "50"}})
+    with open_scenario(toy, Overrides(parameters={"catenary.stiffness": "5000"}), build=False) as found:
+        setting = scenario_setting(found.system, make_plan(found.system, request))
+    assert setting["changes"] == {"catenary.stiffness": "5000"}
+    assert "changes" not in scenario_setting(toy_system, make_plan(toy_system, request))
 
 
 def test_the_title_of_a_run_names_its_values(toy_system):

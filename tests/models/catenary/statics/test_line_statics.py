@@ -54,6 +54,13 @@ def test_reflection_doppler_and_amplification():
     assert wire_waves.waves(load_line("LN2"), 130.0, 50.0).amplification == math.inf
 
 
+def test_the_largest_offset_is_sought_between_the_supports():
+    x = np.arange(0.0, 60.0, 10.0)
+    wire = rest_profile.Profile("contact_wire", x, np.array([-0.9, 0.2, 0.3, -0.4, 0.2, 0.8]), np.full(6, 5.0))
+    assert rest_profile.largest_offset(wire, np.array([10.0, 25.0, 40.0])) == (30.0, -0.4)
+    assert rest_profile.largest_offset(wire, np.array([])) == (0.0, -0.9)
+
+
 def test_droppers_of_a_compound_line_reflect_at_the_auxiliary_wire():
     line = load_line("Shinkansen")
     expected = wire_waves.reflection_factor(line.auxiliary_wire, line.contact_wire)

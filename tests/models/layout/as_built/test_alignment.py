@@ -128,12 +128,13 @@ def test_structures_stretch_the_way_between_them(named, monkeypatch):
     monkeypatch.setattr(alignment, "_SEEN", 0.1)
     run = structures((70, "M1"), (71, "M1"), (121, "M2"), (170, "M3"), (220, "other"))
     found = align(run, named, wire(SUPPORTS, STAGGER))
-    assert found.by == "structures"
+    assert (found.by, found.structures) == ("structures", 3)
     assert found.position(np.array([70.0, 95.5, 121.0, 145.5, 170.0])) == pytest.approx([50, 75, 100, 125, 150])
     assert found.position(np.array([60.0, 180.0])) == pytest.approx([50.0 - 10 * 50 / 51, 150.0 + 10 * 50 / 49])
     monkeypatch.setattr(alignment, "_SEEN", 0.7)
     straight = align(run, named, wire(SUPPORTS, STAGGER))
     assert straight.is_straight
+    assert straight.structures == 3
     assert straight.position(np.array([70.0, 121.0, 170.0])) == pytest.approx(
         np.array([49.67, 100.67, 149.67]), abs=0.02
     )

@@ -130,6 +130,8 @@ def test_heights_of_another_line_are_refused(line, design):
     nowhere = dataclasses.replace(run, stagger=np.full(len(run.position), np.nan), position=run.position + 9000.0)
     with pytest.raises(AsBuiltError, match=r"no row lies on the line, which reaches from 0\.0 to 300\.0 m; the run"):
         find_as_built(line, nowhere)
+    with pytest.raises(AsBuiltError, match=r"the run names structures, and the design none"):
+        find_as_built(line, dataclasses.replace(nowhere, structure=("M1",) * len(run.position)))
     few = dataclasses.replace(
         run, height=np.where(np.arange(len(run.height)) == 1, 5.1, np.nan), stagger=np.full(len(run.height), np.nan)
     )

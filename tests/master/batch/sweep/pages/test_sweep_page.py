@@ -7,7 +7,7 @@ import pytest
 
 from master.batch.sweep.pages.sweep_page import MOST_ROWS, chapters, file_charts, page
 from master.report.html_markup import asset
-from tests.master.batch.sweep.pages.conftest import SAMPLED, failure, grid_rows, row, sample_rows, view
+from tests.master.batch.sweep.pages.conftest import SAMPLED, SETTING, failure, grid_rows, row, sample_rows, view
 from tests.master.batch.sweep.pages.test_sensitivity_charts import indices
 
 #: What every page carries.
@@ -56,6 +56,13 @@ def test_samples_of_seeds_have_a_seed_and_no_method():
     assert "method of sampling" not in html
     assert "<td>seed</td>" in html
     assert "<td>seed</td>" not in page(view(rows, {"line.seed": ""}, over=("line.seed",)))
+
+
+def test_values_of_all_runs_are_on_the_page(grid):
+    changed = view(grid_rows((250.0, 300.0), (19.0, 20.0)), dict.fromkeys(("speed [km/h]", "tension [kN]"), ""),
+                   setting={**SETTING, "changes": {"line.irregularity.sigma": "10 mm"}})  # fmt: skip
+    assert re.search(r"<td[^>]*>line\.irregularity\.sigma, in all runs</td>\s*<td[^>]*>10 mm</td>", page(changed))
+    assert "in all runs" not in page(grid)
 
 
 def test_seeds_of_a_grid_are_samples():

@@ -37,6 +37,7 @@ def test_the_setting_names_speeds_contacts_and_the_interval(swept, toy_system):
     ((name, speed),) = setting["speeds"].items()
     assert speed == pytest.approx(3.6 * parameter_value(toy_system.component(name), "speed"))
     assert setting["contacts"].keys() == {name}
+    assert "changes" not in setting
     assert setting["interval"] == [toy_system.settings.interval.start, toy_system.settings.interval.end]
 
 

@@ -61,7 +61,7 @@ def with_surface(table: Table, surface: RunningSurface, *, carried: bool) -> Run
         table.problem("running_surface.profile", f"{path.name}{text}")
     if len(mistakes) > _MOST:
         table.problem("running_surface.profile", f"{path.name}: ... and {len(mistakes) - _MOST} more mistakes")
-    return replace(surface, points=tuple(points))
+    return replace(surface, points=() if mistakes else tuple(points))
 
 
 def place_problem(points: Sequence[_Point], section: Section) -> str:

@@ -191,6 +191,7 @@ def test_a_wrong_profile_is_told(profiled, content, said):
         profiled(content)
     assert said in str(caught.value)
     assert str(caught.value).startswith(str(caught.value.problems[0].file))
+    assert "beside the line" not in str(caught.value), "where its other points are says nothing"
 
 
 @pytest.mark.parametrize(

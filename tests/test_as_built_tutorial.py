@@ -58,6 +58,7 @@ def test_figures_are_those_of_the_page(workplace):
     for name, value in told:
         assert name in page, name
         assert value in page, f"{name}: {value}"
+    assert "droppers that hang slack, or may: 5; they may be longer than heights tell" in page
 
 
 def test_what_was_hidden_in_the_run_is_found(droppers, truth):

@@ -126,6 +126,11 @@ def _doubts(found: AsBuiltOutcome) -> Iterator[str]:
             f"form finding and the influences of lengths differ by {1e3 * built.difference:.2f} mm: what droppers are "
             "to be changed by is less sure than it looks"
         )
+    if slack := int((built.is_slack & built.is_measured).sum()):
+        yield (
+            f"droppers that hang slack, or may: {slack}; they may be longer than heights tell, by which they are to be "
+            "changed: measure them before they are cut"
+        )
     if missing := int((~built.is_measured).sum()):
         yield f"{missing} droppers have too few measured heights beside them: they are taken as designed"
 

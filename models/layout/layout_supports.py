@@ -123,10 +123,24 @@ class _SectionWriter:
         lengths = [_plain(round(b - a, 9)) for a, b in pairwise(section.x)]
         self.draft.put(f"{key}lengths", [lengths, "m", self._source()], place)
         self.draft.put(f"{key}end", [_plain(section.x[-1]), "m", self._source()], place)
-        for name, groups in (("listed", section.droppers), ("listed_hangers", section.hangers)):
+        has_hangers = self._check_hangers(f"{key}hangers")
+        for name, groups in (("listed", section.droppers), ("listed_hangers", section.hangers))[: 1 + has_hangers]:
             filled = ((number, hung) for number, hung in enumerate(groups, 1) if hung.rows)
             for entry, (number, hung) in enumerate(filled, 1):
                 self._put_hung(f"{key}{name}[{entry}]", number, hung)
+
+    def _check_hangers(self, key: str) -> bool:
+        """Return whether the line has hangers, having told where they lack, or hang though it has none."""
+        has_hangers = self.draft.data.get("type") == "compound"
+        for number, (hung, (a, b)) in enumerate(zip(self.section.hangers, pairwise(self.section.x), strict=True), 1):
+            if has_hangers and not hung.rows and not self.droppers.told("kind").any():
+                text = f"span {number}, {a:g} ... {b:g} m, has no hanger, and the line an auxiliary wire: add its rows"
+                self.problems.add(self.droppers.heading("kind"), text)
+                self.draft.told.add(key)
+            elif hung.rows and not has_hangers:
+                text = "'hanger' is between auxiliary and messenger wire, and the line has no row 'auxiliary_wire'"
+                self.problems.add(self.droppers.place(hung.rows[0], "kind"), text)
+        return has_hangers
 
     def _put_hung(self, key: str, number: int, hung: HungRows) -> None:
         source = f"{self.file}, {spanned(self.droppers, hung.rows)}"

@@ -57,7 +57,7 @@ def _read(table: Table) -> Fault | None:
     for key in table.names():
         if kind not in _OWN_KEYS.get(key, (kind,)):
             table.offers(key)
-            table.problem(key, f"means nothing for kind '{kind}', of {' and '.join(_OWN_KEYS[key])}: remove it")
+            table.problem(key, f"means nothing for kind '{kind}', of {', '.join(_OWN_KEYS[key])}: remove it")
     return field_schema.read(FAULT_KINDS[kind], table, kind=kind)
 
 

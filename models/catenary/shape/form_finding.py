@@ -375,9 +375,11 @@ def _check_arms(shape: LineShape, force: FloatArray) -> None:
         listed = ", ".join(
             f"the arm at {a:.2f} m pushes with {-f:.1f} N" for a, f in list(zip(x, force[pushing], strict=True))[:8]
         )
+        is_drawn = shape.definition.irregularity.stagger_sigma and np.isfinite(shape.mesh.given_length).any()
+        drawn = ", or take a smaller irregularity.stagger_sigma or another seed" if is_drawn else ""
         raise EquilibriumError(
             f"line '{shape.definition.name}': {listed}: an arm must pull; change its side "
-            "(arm_side in [supports]) or the stagger"
+            f"(arm_side in [supports]) or the stagger{drawn}"
         )
 
 

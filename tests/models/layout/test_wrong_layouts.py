@@ -381,6 +381,16 @@ CASES: dict[str, tuple[Callable[[dict[str, Any]], None], list[tuple[str, str]]]]
          *[("droppers, row 1, column B (span)", f"span {k}") for k in range(2, 5)],
          ("supports, row 6, column C (span_length)", "no span begins at the last support: empty the cell")],
     ),
+    "hangers of no wire": (
+        instead("droppers", re.sub(r";[123];", ";;", DROPPERS.replace("dropper", "kind").replace(";1;9", ";hanger;9"))),
+        [(f"droppers, row {r}, column B (kind)", "'hanger' is between auxiliary and messenger wire, and the line has")
+         for r in range(2, 17, 3)],
+    ),
+    "an auxiliary wire without hangers": (
+        change("wires", "dropper;12", "auxiliary_wire;65;0.6;84.7;4\nhanger;12;0.1;84.7;\ndropper;12"),
+        [("droppers, row 1", f"span {k}, {50 * k - 50} ... {50 * k} m, has no hanger, and the line an auxiliary wire")
+         for k in range(1, 6)],
+    ),
     "sections of the supports alone": (
         change("supports", "structure", "section", "A1", "A", "M1", "A", "M2", "A", "M3", "A", "M4", "A", "A2", "A"),
         [("droppers, row 1", "the column 'section' is missing: which of the sections A is each dropper of?")],

@@ -376,3 +376,10 @@ def test_a_hard_point_has_a_node_of_its_own_or_that_of_a_clamp_beside_it(short):
         found = condition_of(design, with_fault(line, "hard_point", position=place, value=40.0)).shape.mesh
         (heaviest,) = np.flatnonzero(found.clamp_mass > 30.0)
         assert found.points[heaviest, 0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_an_arm_that_an_error_makes_push_is_told_with_it(short):
+    line, design = short
+    wild = line.with_values({"irregularity.stagger_sigma": 0.5, "irregularity.seed": 6})
+    with pytest.raises(EquilibriumError, match=r"pull; .* stagger, or take a smaller irregularity\.stagger_sigma"):
+        condition_of(design, wild)

@@ -335,7 +335,7 @@ def test_faults_of_arms_supports_wires_are_read_with_their_parameters():
     [
         (other("arm_loose", support=40), "support", "there is no support 40: between its anchors the section has 23"),
         (other("arm_loose", value=[1, "m", SOURCE]), "value", "means nothing for kind 'arm_loose', of dropper_slipped"),
-        (other("arm_loose", dropper=2), "dropper", "of dropper_broken and dropper_slipped: remove it"),
+        (other("arm_loose", dropper=2), "dropper", "of dropper_broken, dropper_slipped: remove it"),
         (other("support_sunk", value=[2, "m", SOURCE]), "value", "outside -1 ... 1 m"),
         ({"kind": "support_sunk", "support": 4}, "value", "is missing: how far has the support sunk?"),
         ({"kind": "support_sunk", "value": [1, "mm", SOURCE]}, "support", "is missing"),

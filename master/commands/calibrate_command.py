@@ -55,6 +55,8 @@ def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[]
             check()
             calibration.store_value(*place, found.value, note)
             print(f"stored in {place[0]}")
+        elif options.set:
+            print("not stored: it is for the values of --set, which the scenario does not have")
     return 0
 
 

@@ -32,7 +32,7 @@ def optimise_verb(options: argparse.Namespace) -> int:
     overrides = overrides_of(options)
     request = _request(options)
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
-        prepared = PreparedOptimisation.of(scenario.system, request, str(options.scenario))
+        prepared = PreparedOptimisation.of(scenario.system, request, str(options.scenario), overrides.options)
         if options.dry_run:
             text = f"{prepared.outcome.goal.text}: can be looked for, in at most {request.max_runs} run(s)"
             Terminal(width=WIDTH).print(text, markup=False)

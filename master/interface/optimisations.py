@@ -131,6 +131,6 @@ def optimise(
     with scenario_files.open_scenario(chosen.path, replace(chosen.overrides, may_stop_early=False)) as opened:
         folder = Path(out) if out is not None else Path("results") / "optimise" / opened.system.name
         keep_apart(folder, opened.package)
-        prepared = PreparedOptimisation.of(opened.system, request, str(chosen.path))
+        prepared = PreparedOptimisation.of(opened.system, request, str(chosen.path), chosen.overrides.options)
         engine = engine_of(jobs, scheduler, tell, is_script=True)
         return Optimisation(folder, run_optimisation(prepared, folder, page, engine, tell, tell))

@@ -67,6 +67,18 @@ class Overrides:
     faults: tuple[int, ...] = ()
     faults_of: FaultsOf = "each-dropper"
 
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Step and scheme as the command ``run`` takes them, as far as they are given.
+
+        Examples
+        --------
+        >>> Overrides(step=0.0005, scheme="jacobi").options
+        ('--step', '0.0005', '--scheme', 'jacobi')
+        """
+        given = {"--step": self.step, "--scheme": self.scheme}
+        return tuple(word for name, value in given.items() if value is not None for word in (name, str(value)))
+
     def source(self, written: str) -> str:
         """Return the source of a component, which is another for a line FMU of ours that lists faults.
 

@@ -80,7 +80,7 @@ def _parameter(outcome: OptimisationOutcome, b: BoundedParameter, value: float) 
 
 def command(outcome: OptimisationOutcome, run: SweepRun) -> str:
     """Return the command that makes a run by itself."""
-    values = {
+    values = dict(outcome.changes) | {
         target: b.parameter.text(value)
         for b, value in zip(outcome.bounds, outcome.point(run), strict=True)
         for target in b.parameter.targets
@@ -88,9 +88,10 @@ def command(outcome: OptimisationOutcome, run: SweepRun) -> str:
     for row in outcome.rows_of(run) if outcome.goal.mean_force else ():
         values[f"{row['pantograph']}.{STATIC_FORCE}"] = repr(row["static force [N]"])
     own = {b.parameter.name: v for b, v in zip(outcome.bounds, outcome.point(run), strict=True)}
+    own |= {} if outcome.request.stop is None else {"stop": outcome.request.stop}
     times = [f"--{name} {own[name]!r}" for name in ("step", "stop") if name in own]
     settings = [f"--set {shlex.quote(f'{name}={value}')}" for name, value in values.items()]
-    return " ".join(["openpanto run", shlex.quote(outcome.place), *settings, *times])
+    return " ".join(["openpanto run", shlex.quote(outcome.place), *settings, *times, *outcome.options])
 
 
 def page(outcome: OptimisationOutcome) -> str:
@@ -121,6 +122,9 @@ def _found(outcome: OptimisationOutcome, best: SweepRun) -> list[str]:
         rows.append([b.parameter.name, shown(b.start, unit), shown(value, unit), *ends, place or "none"])
     heads = ["parameter", "start", "best", "lower bound", "upper bound", "at bound"]
     parts = ["<h2>Parameters</h2>", html_markup.table(heads, rows)]
+    if outcome.changes:
+        given = ", ".join(f"{name} = {value}" for name, value in outcome.changes.items())
+        parts.append(f"<p class='note'>In all runs: {html_markup.text(given)}.</p>")
     parts += ["<h2>Figures</h2>", html_markup.table(["figure", "start", "best"], list(_figures(outcome, best)))]
     if outcome.at_bounds:
         names = ", ".join(outcome.at_bounds)

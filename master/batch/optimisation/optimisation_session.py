@@ -6,9 +6,9 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -64,6 +64,10 @@ class OptimisationOutcome(MadeRuns):
         Where the scenario is, as a command names it.
     ended : str
         Why the search ended, empty if it has not.
+    changes : mapping
+        Values that all runs have in place of the scenario's (``--set``), as given, by ``component.parameter``.
+    options : tuple of str
+        Other options of all runs, as the command ``run`` takes them.
     """
 
     scenario: str
@@ -72,6 +76,8 @@ class OptimisationOutcome(MadeRuns):
     bounds: tuple[BoundedParameter, ...]
     place: str = ""
     ended: str = ""
+    changes: Mapping[str, str] = field(default_factory=dict)
+    options: tuple[str, ...] = ()
 
     @property
     def start(self) -> float | None:
@@ -141,6 +147,7 @@ def as_data(outcome: OptimisationOutcome) -> dict[str, Any]:
         "date": outcome.date,
         "versions": dict(outcome.versions),
         "request": outcome.request.model_dump(mode="json", exclude_none=True),
+        **({"changes": dict(outcome.changes)} if outcome.changes else {}),
         "goal": outcome.goal.text,
         "figure": outcome.goal.figure,
         "unit": outcome.goal.unit,
@@ -197,8 +204,19 @@ class PreparedOptimisation:
     outcome: OptimisationOutcome
 
     @classmethod
-    def of(cls, base: System, request: OptimisationRequest, place: str = "") -> PreparedOptimisation:
-        """Return the optimisation that a request asks for; ``place`` is how a command names the scenario.
+    def of(
+        cls, base: System, request: OptimisationRequest, place: str = "", options: tuple[str, ...] = ()
+    ) -> PreparedOptimisation:
+        """Return the optimisation that a request asks for.
+
+        Parameters
+        ----------
+        base : System
+        request : OptimisationRequest
+        place : str
+            How a command names the scenario.
+        options : tuple of str
+            What the command ``run`` is to be told besides values, for runs like these.
 
         Raises
         ------
@@ -211,7 +229,9 @@ class PreparedOptimisation:
         corners = itertools.product(*((b.low, b.high) for b in bounds)) if len(bounds) <= _MOST_CORNERS else ()
         points = (tuple(b.start for b in bounds), *corners)
         make_runs(base, SweepPlan(tuple(b.parameter for b in bounds), points), asked)
-        begun = OptimisationOutcome(base.name, request, goal, bounds, place=place or base.name)
+        begun = OptimisationOutcome(
+            base.name, request, goal, bounds, place=place or base.name, changes=base.changes, options=options
+        )
         return cls(base, asked, begun)
 
 

@@ -335,6 +335,9 @@ def test_calibrate_stores_what_it_finds(toy, in_folder, capsys):
     before = (toy / "parameters.ssv").read_text()
     options = ["--parameter", "pantograph.static_force", "--mean", "120", "--no-build"]
     assert main(["calibrate", str(toy), *options, "--dry-run"]) == 0
+    assert "stored" not in capsys.readouterr().out
+    assert main(["calibrate", str(toy), *options, "--set", "catenary.stiffness=5500"]) == 0
+    assert "not stored: it is for the values of --set" in capsys.readouterr().out
     assert (toy / "parameters.ssv").read_text() == before
     assert main(["calibrate", str(toy), *options]) == 0
     after = (toy / "parameters.ssv").read_text()

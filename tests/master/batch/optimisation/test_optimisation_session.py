@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -116,6 +117,24 @@ def test_the_command_that_is_told_makes_the_best_run_again(toy_system, toy, tmp_
     with open_scenario(toy, Overrides(parameters=values), build=False) as found:
         again = run(found.system, tmp_path / "again").assessments()[0].quality
     assert again.sigma == done.value(best)
+
+
+def test_what_all_runs_were_given_is_kept_and_part_of_the_command(toy, tmp_path):
+    request = {"minimise": "sigma", "vary": {"pantograph.damping": "100:400"}, "max_runs": 1}
+    overrides = Overrides(parameters={"catenary.stiffness": "5000"}, step=0.002, scheme="gauss-seidel")
+    with open_scenario(toy, overrides, build=False) as found:
+        wanted = OptimisationRequest.read(request)
+        prepared = PreparedOptimisation.of(found.system, wanted, str(toy), overrides.options)
+        done = optimise(prepared, tmp_path / "out", page)
+    told = command(done, done.best)
+    assert told.startswith(f"openpanto run {toy} --set catenary.stiffness=5000 --set ")
+    assert told.endswith(" --step 0.002 --scheme gauss-seidel")
+    assert json.loads((tmp_path / "out" / "optimise.json").read_text())["changes"] == {"catenary.stiffness": "5000"}
+    assert "In all runs: catenary.stiffness = 5000." in (tmp_path / "out" / "optimise.html").read_text()
+    with open_scenario(toy, Overrides(stop=1.5), build=False) as found:
+        stopped = OptimisationRequest.read({**request, "stop": 1.5})
+        begun = PreparedOptimisation.of(found.system, stopped, str(toy)).outcome
+    assert "--stop 1.5" in command(replace(done, request=begun.request), done.best)
 
 
 def test_runs_that_end_too_soon_to_have_figures_have_failed_and_the_reason_is_told(toy, tmp_path, capsys):

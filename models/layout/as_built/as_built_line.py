@@ -19,7 +19,7 @@ from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
 from models.catenary.statics.dropper_influence import dropper_influence
 from models.catenary.statics.wire_course import HeldShapes, WireCourse, held_shapes, section_alone, wire_courses
 from models.layout.as_built.alignment import Alignment, align
-from models.layout.as_built.measured_run import AsBuiltError, MeasuredRun
+from models.layout.as_built.measured_run import AsBuiltError, MeasuredRun, worn_depth
 from models.layout.as_built.wire_deviation import WireDeviation, wire_deviation
 
 #: Heights that differ from the design by more than this, half of them, are of another line or in another unit [m].
@@ -269,26 +269,6 @@ def _moved(alignment: Alignment, way: _Way) -> Alignment:
     if max(abs(shift), abs(stretch)) > _FARTHEST:
         return alignment
     return alignment.moved(shift, stretch / (0.5 * np.ptp(alignment.design)), float(np.sqrt(way.covariance[0, 0])))
-
-
-def worn_depth(definition: CatenaryDefinition, run: MeasuredRun) -> FloatArray:
-    """Return what is worn off the wire's underside at every row, shape (n,) [m].
-
-    Raises
-    ------
-    AsBuiltError
-        If the thickness was measured, and the definition does not say that of a new wire.
-    """
-    known = np.isfinite(run.thickness)
-    if not known.any():
-        return np.zeros(len(run.position))
-    if definition.contact_wire.diameter is None:
-        raise AsBuiltError(
-            f"{run.source}: the thickness says what is worn off only beside that of a new wire: give 'diameter' in "
-            f"[contact_wire] of line '{definition.name}'"
-        )
-    thickness = np.interp(run.position, run.position[known], run.thickness[known])
-    return np.asarray(definition.contact_wire.diameter - thickness)
 
 
 def _held_nodes(design: StaticState, section: int) -> IntArray:

@@ -13,8 +13,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.catenary.statics.wire_course import WireCourse, wire_courses
-from models.layout.as_built.as_built_line import AsBuilt, worn_depth
-from models.layout.as_built.measured_run import AsBuiltError
+from models.layout.as_built.as_built_line import AsBuilt
+from models.layout.as_built.measured_run import AsBuiltError, worn_depth
 from models.layout.as_built.wire_deviation import WireDeviation
 
 #: Standard errors from which on the course at an arm is more than noise.

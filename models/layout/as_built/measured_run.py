@@ -1,11 +1,18 @@
-"""A measuring run: heights of the contact wire along the track, as measured and read."""
+"""A measuring run: heights of the contact wire along the track, as measured and read, and what is worn off there."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
 
 from models.arrays import FloatArray
+from models.catenary.definition.line_definition import CatenaryDefinition
 from models.definition_files.parameter import ParameterError
+
+#: A wire may be made and measured thicker than its diameter by this factor.
+_THICKER: Final = 1.05
 
 
 class AsBuiltError(ParameterError):
@@ -43,3 +50,29 @@ class MeasuredRun:
     def way(self) -> float:
         """Return how far it reaches [m]."""
         return float(self.position[-1] - self.position[0])
+
+
+def worn_depth(definition: CatenaryDefinition, run: MeasuredRun) -> FloatArray:
+    """Return what is worn off the wire's underside at every row, shape (n,) [m].
+
+    Raises
+    ------
+    AsBuiltError
+        If the thickness was measured, and the definition does not say that of a new wire, or says less.
+    """
+    known = np.isfinite(run.thickness)
+    if not known.any():
+        return np.zeros(len(run.position))
+    if definition.contact_wire.diameter is None:
+        raise AsBuiltError(
+            f"{run.source}: the thickness says what is worn off only beside that of a new wire: give 'diameter' in "
+            f"[contact_wire] of line '{definition.name}'"
+        )
+    if (thickest := float(run.thickness[known].max())) > _THICKER * definition.contact_wire.diameter:
+        at = float(run.position[int(np.nanargmax(run.thickness))])
+        raise AsBuiltError(
+            f"{run.source}: at {at:.1f} m the wire was measured {1e3 * thickest:.2f} mm thick, and a new one of line "
+            f"'{definition.name}' has {1e3 * definition.contact_wire.diameter:.2f} mm: check the unit, and the diameter"
+        )
+    thickness = np.interp(run.position, run.position[known], run.thickness[known])
+    return np.asarray(definition.contact_wire.diameter - thickness)

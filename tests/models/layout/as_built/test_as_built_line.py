@@ -117,6 +117,9 @@ def test_worn_wire_is_not_taken_for_short_droppers(line, design, errors):
     run = dataclasses.replace(run, thickness=0.0138 - off(x))
     with pytest.raises(AsBuiltError, match=r"run.csv: the thickness says .* give 'diameter' in \[contact_wire\]"):
         find_as_built(line, run)
+    thick = dataclasses.replace(run, thickness=np.where(x > 150.0, 0.0146, 0.0138))
+    with pytest.raises(AsBuiltError, match=r"at 15\d\.\d m the wire was measured 14\.60 mm .* has 13\.80 mm: check"):
+        find_as_built(worn, thick)
     found = find_as_built(worn, run)
     assert np.abs(found.error - errors).max() < 1e-4
     surface = leftover_surface(found)

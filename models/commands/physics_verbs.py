@@ -29,7 +29,7 @@ def add_statics(verbs: Any) -> None:
     parser.add_argument("line", help="name in the library, or a definition file")
     parser.add_argument("--span", type=int, default=None, help="span in detail, from 1 (default: the middle one)")
     parser.add_argument("--section", type=int, default=1, help="section of a line with overlaps, from 1 (default 1)")
-    parser.add_argument("--speed", type=positive, default=300.0, help="speed of the train, km/h (default 300)")
+    parser.add_argument("--speed", type=positive, help="speed of the train, km/h (300 if it is not given)")
     parser.add_argument("--force", type=positive, default=100.0, help="force of the elasticity [N] (default 100)")
     parser.add_argument(
         "--temperature", type=finite, nargs="+", default=[], metavar="T",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -28,6 +29,10 @@ from models.interface.line_over_temperature import LineOverTemperature, at_tempe
 from models.interface.line_statics import LineStatics, at_rest
 from models.library.catalogue import doubts, line_path, load_line
 
+#: Speed of the train if none is given [km/h].
+_SPEED: Final = 300.0
+_TRAIN: Final = "speed of the train"
+
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, and write if asked to."""
@@ -50,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
 def show(name: str, found: Found) -> None:
     """Print figures and tables."""
     result, over, wind = found.result, found.over, found.wind
-    print_table(f"{name}: {result.model.definition.title}", ("quantity", "value"), summary(result))
+    print_table(f"{name}: {result.model.definition.title}", ("quantity", "value"), figures(found))
     print_table(f"Droppers of span {result.number}", _DROPPER_COLUMNS, _dropper_rows(result))
     if over is not None:
         _print_temperatures(over)
@@ -73,9 +78,15 @@ def analyse(arguments: argparse.Namespace) -> LineStatics:
     definition = definition.with_values(own_settings(arguments.set, "line", definition))
     if arguments.temperature:
         check_tensioned(definition)
-    found = at_rest(definition, arguments.span, arguments.section, arguments.speed / 3.6, arguments.force)
+    found = at_rest(definition, arguments.span, arguments.section, (arguments.speed or _SPEED) / 3.6, arguments.force)
+    if arguments.speed is None and found.warnings:
+        warn([f"no --speed is given, so that of the train is taken as {_SPEED:g} km/h"])
     warn(found.warnings)
     return found
+
+
+def _speed_text(arguments: argparse.Namespace) -> str:
+    return f"{_SPEED:g} km/h, as no --speed is given" if arguments.speed is None else f"{arguments.speed:g} km/h"
 
 
 def _in_wind(result: LineStatics, arguments: argparse.Namespace) -> LineInWind:
@@ -95,7 +106,8 @@ def _asked(result: LineStatics, arguments: argparse.Namespace) -> Iterator[tuple
     sections = len(result.model.definition.sections)
     if sections > 1:
         yield "section", f"{result.section + 1} of {sections}"
-    yield "speed of the train, force of the elasticity", f"{arguments.speed:g} km/h, {arguments.force:g} N"
+    yield _TRAIN, _speed_text(arguments)
+    yield "force of the elasticity", f"{arguments.force:g} N"
     if arguments.temperature:
         yield "temperatures", ", ".join(f"{t:g}" for t in arguments.temperature) + " \u00b0C"
     if arguments.wind is not None:
@@ -120,6 +132,11 @@ def _print_temperatures(over: LineOverTemperature) -> None:
     )
     rows = [*((j.what, j.text) for j in over.judgements), *temperature_report.swings(over.states)]
     print_table("Movements and waves", ("quantity", "value"), rows)
+
+
+def figures(found: Found) -> list[tuple[str, str]]:
+    """Return the speed that all is judged at, and the `summary` of the line."""
+    return [*(pair for pair in found.asked if pair[0] == _TRAIN), *summary(found.result)]
 
 
 def summary(result: LineStatics) -> list[tuple[str, str]]:
@@ -148,7 +165,7 @@ def write(folder: Path, found: Found) -> None:
     result = found.result
     for name, (titles, columns) in result.tables.items():
         write_csv(folder / f"{name}.csv", titles, [column.astype(float) for column in columns])
-    lines = [f"{_quoted(name)},{_quoted(value)}" for name, value in summary(result)]
+    lines = [f"{_quoted(name)},{_quoted(value)}" for name, value in figures(found)]
     write_text(folder / "summary.csv", "\n".join(["quantity,value", *lines]) + "\n")
     plots = {
         "span": statics_plots.span_profile(result.profiles, result.droppers, result.span),

@@ -1,13 +1,14 @@
 """What ``statics`` writes: tables and figures of a line in a curve."""
 
 import csv
+from types import SimpleNamespace
 
 import pytest
 
 from models import statics
 from models.commands.physics_main import main
 from models.commands.physics_options import shown_progress
-from models.commands.statics_command import summary
+from models.commands.statics_command import _asked, summary
 from models.interface.line_and_pantograph import Line
 from tests.models.commands.conftest import ROUTE
 
@@ -31,6 +32,7 @@ def test_the_strip_chart_is_there_as_both_kinds_of_file(statics_folder):
 
 def test_verdicts_are_in_the_summary(statics_folder):
     text = (statics_folder / "summary.csv").read_text()
+    assert "speed of the train,120 km/h\n" in text.replace('"', "")
     assert "keeps 0.25 at least (ADIF)" in text
     assert '"steepest gradient [permil], IFE 6.3","1.00 at 50 m: keeps 4 at 120 km/h"' in text
 
@@ -111,3 +113,11 @@ def test_an_interrupted_list_of_temperatures_leaves_no_half_results(capsys, monk
     assert said.err.endswith("error: interrupted\n")
     assert said.out == ""
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("given", "told"), [(None, "300 km/h, as no --speed is given"), (250.0, "250 km/h")])
+def test_a_speed_that_nobody_gave_is_told(given, told):
+    asked = SimpleNamespace(speed=given, force=100.0, temperature=[], set=[])
+    asked.wind = asked.pressure = asked.limit = asked.head = None
+    line = SimpleNamespace(model=SimpleNamespace(definition=SimpleNamespace(sections=[0])))
+    assert dict(_asked(line, asked)) == {"speed of the train": told, "force of the elasticity": "100 N"}

@@ -43,7 +43,7 @@ def sweep_verb(options: argparse.Namespace) -> int:
         prepared = PreparedSweep.of(scenario.system, request)
         check_overridden(prepared.outcome.plan, (*overrides.parameters, *(["step"] if overrides.step else [])))
         if options.dry_run:
-            if text := prepared.announced:
+            for text in filter(None, (prepared.announced, prepared.unseen)):
                 note(text)
             Terminal(width=WIDTH).print(f"{len(prepared.outcome.runs)} run(s), all can be made", markup=False)
             return 0

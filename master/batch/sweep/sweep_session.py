@@ -176,6 +176,12 @@ class PreparedSweep:
             return ""
         return described(request.sensitivity, len(plan.parameters), request.samples or 0)
 
+    @property
+    def unseen(self) -> str:
+        """Which faults lie where no run is judged, empty if none does."""
+        setting = self.outcome.setting
+        return unseen_note(setting.get("places", {}), setting.get("interval", (None, None)))
+
 
 def sweep(
     prepared: PreparedSweep,
@@ -231,8 +237,8 @@ def sweep(
 
                 if why := prepared.announced:
                     tell(why)
-                if why := unseen_note(state.setting.get("places", {}), state.setting.get("interval", (None, None))):
-                    tell(why)
+                if unseen := prepared.unseen:
+                    tell(unseen)
                 with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
                     tell(_announcement(make_runs_of, prepared.base.start, missing, state, chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)

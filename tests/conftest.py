@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import compileall
 import gc
+import os
 from pathlib import Path
 from typing import Final
 
@@ -47,6 +48,9 @@ def group(item: pytest.Item) -> str:
     return next((name for begin, name in TOGETHER.items() if place.startswith(begin)), place)
 
 
+#: Processes of pytest-xdist, each with a thread of BLAS for every core, would wait for one another; set before NumPy is
+#: there, and for what the tests start.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 #: For how long other processes hold the processor is no fault of a test.
 settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("suite")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import compileall
 import gc
 import os
+import signal
 from pathlib import Path
 from typing import Final
 
@@ -51,6 +52,10 @@ def group(item: pytest.Item) -> str:
 #: Processes of pytest-xdist, each with a thread of BLAS for every core, would wait for one another; set before NumPy is
 #: there, and for what the tests start.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+#: Under ``nohup``, or in the background of a script, signals are ignored, by all that tests start as well; they test signals.
+for _number in (signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGINT)):
+    if signal.getsignal(_number) == signal.SIG_IGN:
+        signal.signal(_number, signal.SIG_DFL if _number != signal.SIGINT else signal.default_int_handler)
 #: For how long other processes hold the processor is no fault of a test.
 settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("suite")

@@ -52,7 +52,7 @@ def group(item: pytest.Item) -> str:
 #: Processes of pytest-xdist, each with a thread of BLAS for every core, would wait for one another; set before NumPy is
 #: there, and for what the tests start.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-#: Under ``nohup``, or in the background of a script, signals are ignored, by all that tests start as well; they test signals.
+#: Signals that ``nohup``, or the background of a script, has all ignore that tests start, too, would be tested in vain.
 for _number in (signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGINT)):
     if signal.getsignal(_number) == signal.SIG_IGN:
         signal.signal(_number, signal.SIG_DFL if _number != signal.SIGINT else signal.default_int_handler)

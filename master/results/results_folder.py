@@ -135,17 +135,26 @@ def claimed(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def taken_over(folder: Path, marker: str, generator: str, kind: str) -> Iterator[None]:
+def taken_over(folder: Path, marker: str, generator: str, kind: str, scenario: str | None = None) -> Iterator[None]:
     """Work alone in a new folder, or in one whose JSON file ``marker`` names its ``generator``; no results are removed.
+
+    With a ``scenario``, one whose JSON file names another is left alone, too: its table would be replaced.
 
     Raises
     ------
     FolderInUseError
         If another process works in it.
     MasterError
-        If it exists and is no ``kind`` of this tool, or cannot be made.
+        If it exists and is no ``kind`` of this tool, or that of another scenario, or cannot be made.
     """
     check_free(folder, marker, generator, kind)
+    found = scenario if scenario is None else _contents(folder / marker).get("scenario", scenario)
+    if found != scenario:
+        a = "an" if kind[0] in "aeio" else "a"
+        raise MasterError(
+            f"{folder} holds {a} {kind} of the scenario '{found}', this one is of '{scenario}'; "
+            "choose another with --out"
+        )
     with _alone_in(folder, "folder"):
         _remove(folder, _PARTS)
         yield
@@ -243,11 +252,16 @@ def identity(folder: Path) -> str:
 
 def made_by(path: Path, generator: str) -> bool:
     """Whether a JSON file names this ``generator``."""
+    return _contents(path).get("generator") == generator
+
+
+def _contents(path: Path) -> dict[str, Any]:
+    """Return what a JSON file holds; nothing if it cannot be read or holds something else."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(found, dict) and found.get("generator") == generator
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:

@@ -272,7 +272,7 @@ def optimise(
     trial = None
     try:
         with (
-            results_folder.taken_over(folder, JSON, files.generator, files.kind),
+            results_folder.taken_over(folder, JSON, files.generator, files.kind, state.scenario),
             unfinished(folder / JSON),
             closing(SweepJournal(folder)) as journal,
             chosen.opened(prepared.base, RunPlace(folder / "runs", "figures")) as make,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -25,7 +24,7 @@ from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
 from master.batch.sweep.sweep_run import RunPlace, SweepResult
 from master.batch.sweep.sweep_table import MadeRuns, as_csv, has_parquet, unjudged_note, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
-from master.errors import InterruptedRunError, MasterError
+from master.errors import InterruptedRunError
 from master.report.report_files import write_charts
 from master.results import results_folder
 from master.system.components import System
@@ -221,8 +220,7 @@ def sweep(
     files = SweepFiles()
     found: dict[str, SweepResult] = {}
     try:
-        with results_folder.taken_over(folder, JSON, files.generator, files.kind):
-            _check_scenario(folder, state.scenario)
+        with results_folder.taken_over(folder, JSON, files.generator, files.kind, state.scenario):
             _remove_leftovers(folder)
             with closing(SweepJournal(folder)) as journal:
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
@@ -276,18 +274,6 @@ def _write_sensitivity(done: SweepOutcome, folder: Path, tell: Callable[[str], N
         results_folder.write_json(folder / SENSITIVITY_JSON, sensitivity_data(found))
     if text := failed_note(done.request, found, len(done.failures)):
         tell(text)
-
-
-def _check_scenario(folder: Path, scenario: str) -> None:
-    """Refuse to replace the table of another scenario's sweep."""
-    try:
-        found = json.loads((folder / JSON).read_text(encoding="utf-8")).get("scenario")
-    except (OSError, ValueError):  # a new folder
-        return
-    if found != scenario:
-        raise MasterError(
-            f"{folder} holds a sweep of the scenario '{found}', this one is of '{scenario}'; choose another with --out"
-        )
 
 
 def _remove_leftovers(folder: Path) -> None:

@@ -102,6 +102,16 @@ def test_another_folder_is_left_alone(optimised, tmp_path):
         optimised(max_runs=8)
 
 
+def test_an_optimisation_of_another_scenario_is_left_alone(optimised, tmp_path):
+    optimised(max_runs=8)
+    file = tmp_path / "out" / "optimise.json"
+    before = file.read_text().replace('"scenario": "bowl"', '"scenario": "plate"')
+    file.write_text(before)
+    with pytest.raises(MasterError, match="holds an optimisation of the scenario 'plate', this one is of 'bowl'"):
+        optimised(max_runs=8)
+    assert file.read_text() == before
+
+
 def test_the_command_that_is_told_makes_the_best_run_again(toy_system, toy, tmp_path):
     """With the mean force held: the static force that was found is part of the command."""
     request = {"minimise": "sigma", "vary": {"pantograph.damping": "100:400"}, "subject_to": ["mean=120N"]}

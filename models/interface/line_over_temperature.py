@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,22 +17,19 @@ from models.catenary.statics.wire_waves import OPERATION_LIMIT
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.definition_files.si_units import OFFSETS
-from models.interface.column_frames import Table, table_frame
+from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_statics import LineStatics, given, listed, whole
 from models.interface.norm_judgement import Judgement
 from models.interface.support_verdicts import clearance_at_temperatures
 from models.library.norm_tables import norm_sources, support_limits
 
-if TYPE_CHECKING:
-    import pandas
-
 #: 0 degC [K].
 ZERO = OFFSETS["degC"]
 
 
 @dataclass(frozen=True)
-class LineOverTemperature:
+class LineOverTemperature(Tabled):
     """A section of a line at some temperatures; SI.
 
     Attributes
@@ -86,16 +82,6 @@ class LineOverTemperature:
         tension = ("temperature [degC]", "wire", "from [m]", "to [m]", "tension [N]")
         joined = tuple(np.concatenate(column) for column in zip(*parts, strict=True))
         return {"temperature": (tuple(columns), tuple(map(np.array, columns.values()))), "tension": (tension, joined)}
-
-    def frame(self, name: str = "temperature") -> pandas.DataFrame:
-        """Return one of the `tables` as a data frame (needs pandas).
-
-        Raises
-        ------
-        ParameterError
-            If there is no such table.
-        """
-        return table_frame(self.tables, name)
 
 
 def over_temperature(

@@ -49,6 +49,7 @@ def test_tables_have_the_rows_of_what_was_asked_for(line, rest):
     assert over.frame()["temperature [degC]"].tolist() == pytest.approx([-20.0, 40.0])
     assert len(over.frame("tension")) == 2 * 2 * 6
     assert rest.frame("overbridges")["lift [m]"][0] > 0.01
+    assert list(rest.frame()) == list(rest.tables["droppers"][0])
     table = span_table(line, speed=29.0, head=1600, radii=["1 km"])
     assert table.frame("spans").index.tolist() == [1000.0]
     assert table.frame().shape == (41, 2)

@@ -22,7 +22,7 @@ from models.definition_files.parameter import ParameterError
 from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_statics import LineStatics, given, whole
-from models.interface.norm_judgement import Judgement, kept
+from models.interface.norm_judgement import Judgement, verdict_word
 from models.library.norm_tables import lateral_norm
 
 #: Strongest wind that is meant [m/s], [Pa].
@@ -82,7 +82,7 @@ class LineInWind(Tabled):
             yield Judgement(
                 "offset in the wind, worst span [mm]",
                 f"{1e3 * self.offset[worst]:.0f} in span {worst + 1}{spans}",
-                kept(is_kept=not beyond),
+                verdict_word(is_kept=not beyond),
                 f"{1e3 * self.limit[worst]:.0f} there",
                 self.source,
             )
@@ -143,7 +143,7 @@ def in_wind(
     --------
     >>> blown = in_wind("EN50318_2002", speed="20 m/s", limit="0.4 m")
     >>> round(blown.pressure, 1), blown.judgements[0].word
-    (250.0, 'keeps')
+    (250.0, 'passed')
     """
     definition, index = _section(line, section)
     own, chosen = asked_limit(limit, head)

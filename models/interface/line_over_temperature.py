@@ -20,7 +20,7 @@ from models.definition_files.si_units import OFFSETS
 from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_statics import LineStatics, given, listed, whole
-from models.interface.norm_judgement import Judgement
+from models.interface.norm_judgement import Judgement, verdict_word
 from models.interface.support_verdicts import clearance_at_temperatures
 from models.library.norm_tables import norm_sources, support_limits
 
@@ -194,7 +194,7 @@ def _loss(states: Sequence[LineAtTemperature]) -> Judgement:
     return Judgement(
         "largest loss of tension [% of nominal]",
         f"{100.0 * share:.1f}, {component.replace('_', ' ')} at {temperature:g} degC",
-        "within" if share <= largest else "beyond",
+        verdict_word(is_kept=share <= largest),
         f"{100.0 * largest:g} (TB 10009-2016)",
         norm_sources("supports")["largest_loss"],
     )
@@ -208,7 +208,7 @@ def _waves(states: Sequence[LineAtTemperature]) -> Iterator[Judgement]:
         yield Judgement(
             f"{3.6 * speed:g} km/h over the slowest wave speed [1]",
             f"{speed / C:.3f}, {3.6 * C:.1f} km/h at {slowest.temperature - ZERO:g} degC",
-            "within" if speed <= OPERATION_LIMIT * C else "beyond",
+            verdict_word(is_kept=speed <= OPERATION_LIMIT * C),
             f"{OPERATION_LIMIT:g} (EN 50119)",
             "EN 50119, as section 2.1 of the 2012 thesis gives it",
         )

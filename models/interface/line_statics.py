@@ -58,7 +58,7 @@ class LineStatics(Tabled):
         ``highest``, ``clearance``, ``encumbrance``, ``lift`` [m] of every bridge over the line.
     judgements : tuple of Judgement
         What norms say of supports, droppers, gradients and overbridges: ``what``, ``figure``, ``word``, ``limit``,
-        ``source``, ``is_kept``.
+        ``source``, ``passed``.
     elasticity : Elasticity
         ``x`` [m], ``value`` [m/N] along the span, ``minimum``, ``maximum``, ``non_uniformity``.
     others : dict

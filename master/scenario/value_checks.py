@@ -35,8 +35,8 @@ def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
     """
     for pantograph in pantographs(system):
         yield from _idle(pantograph)
-        if not may_stop_early and (text := _uncovered(system, pantograph)):
-            yield text
+        if not may_stop_early:
+            yield from filter(None, [_uncovered(system, pantograph)])
 
 
 def uncovered(system: System) -> str:

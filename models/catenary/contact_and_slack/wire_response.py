@@ -104,6 +104,8 @@ class WirePoint(NamedTuple):
 
     def moved_by(self, other: WirePoint) -> float:
         """Return how far the wire is moved here by a unit force at another point [m/N]."""
+        if other is self:
+            return self.compliance
         here, there = self.response, other.response
         moved = float(self.load @ (there.columns.at(here.interval.ends) @ other.load))
         if here.interval.modes == there.interval.modes:

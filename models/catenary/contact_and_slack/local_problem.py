@@ -137,8 +137,8 @@ class LocalProblem:
         free_force : ndarray, shape (n_droppers,)
             Pulls T of the droppers in the free solution [N].
         contacts : sequence of ContactCandidate
-        strip_compliance : ndarray, shape (n_contacts, n_contacts)
-            Retreat of the strips per contact force within the step [m/N]; zero for prescribed strips.
+        strip_compliance : ndarray, shape (n_pantographs,)
+            Retreat of a strip per force on it within the step [m/N]; zero for prescribed strips.
         slack : ndarray of int
             Droppers that were slack at the last step, as a start.
 
@@ -150,7 +150,7 @@ class LocalProblem:
         if not contacts and not slack.size and free_force.min(initial=0.0) >= 0.0:
             return LocalForces([], [], [], _NONE, _NOTHING)
         if len(contacts) == 1 and not slack.size:
-            found = self._single_contact(free_force, contacts[0], float(strip_compliance[0, 0]))
+            found = self._single_contact(free_force, contacts[0], strip_compliance.item(contacts[0].pantograph))
             if found is not None:
                 return found
         n = len(contacts)
@@ -230,12 +230,13 @@ class _Effects:
         self._problem, self._contacts, self._slack = problem, contacts, slack
         n, size = len(contacts), len(contacts) + slack.size
         self.moved, self.pulled = np.zeros((n, size)), np.zeros((problem.unilateral.size, size))
-        self.moved[:, :n] = -strip_compliance
         for k, source in enumerate(contacts):
             columns = source.point.response.columns
             self.pulled[columns.dropper_index, k] = columns.dropper_force.dot(source.point.load)
             for i, target in enumerate(contacts):
-                self.moved[i, k] -= target.point.moved_by(source.point)
+                self.moved[i, k] = -target.point.moved_by(source.point)
+                if target.pantograph == source.pantograph:  # two contacts of one strip share its retreat
+                    self.moved[i, k] -= strip_compliance[source.pantograph]
         for k, j in enumerate(slack.tolist(), n):
             column = problem.dropper_columns[j]
             self.pulled[column.dropper_index, k] = -column.dropper_force[:, 0]

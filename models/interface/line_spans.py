@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -23,14 +23,11 @@ from models.catenary.statics.found_tension import found_tension
 from models.catenary.statics.span_table import LENGTHS, String, radii
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import Table, table_frame
+from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_in_wind import asked_limit, asked_wind, check_limit
 from models.interface.line_statics import given, listed
 from models.library.norm_tables import lateral_norm
-
-if TYPE_CHECKING:
-    import pandas
 
 #: Radii for which the largest span is given unless others are asked for; infinite: straight track [m].
 RADII: Final = (200.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1000.0, 1500.0, 2000.0, 3000.0, 5000.0, math.inf)
@@ -41,7 +38,7 @@ Staggers = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class SpanTable:
+class SpanTable(Tabled):
     """Smallest radius for a span and largest span for a radius, for pairs of staggers; SI.
 
     Attributes
@@ -59,6 +56,8 @@ class SpanTable:
     largest_span : ndarray, shape (n_staggers, n_radii)
         [m]; NaN where the staggers alone are beyond the limit, infinite where no wind moves the wire.
     """
+
+    is_indexed = True
 
     pressure: float
     force: float
@@ -85,16 +84,6 @@ class SpanTable:
             "radii": (("span [m]", *self.names), (np.array(self.lengths), *self.smallest_radius)),
             "spans": (("radius [m]", *self.names), (np.array(self.radii), *self.largest_span)),
         }
-
-    def frame(self, name: str = "radii") -> pandas.DataFrame:
-        """Return one of the `tables` as a data frame with the first column as index (needs pandas).
-
-        Raises
-        ------
-        ParameterError
-            If there is no such table.
-        """
-        return table_frame(self.tables, name, is_indexed=True)
 
 
 def span_table(

@@ -49,6 +49,7 @@ def test_tables_have_the_rows_of_what_was_asked_for(line, rest):
     assert over.frame()["temperature [degC]"].tolist() == pytest.approx([-20.0, 40.0])
     assert len(over.frame("tension")) == 2 * 2 * 6
     assert rest.frame("overbridges")["lift [m]"][0] > 0.01
+    assert list(rest.frame()) == list(rest.tables["droppers"][0])
     table = span_table(line, speed=29.0, head=1600, radii=["1 km"])
     assert table.frame("spans").index.tolist() == [1000.0]
     assert table.frame().shape == (41, 2)
@@ -58,7 +59,7 @@ def test_clearances_are_judged_at_rest_lifted_and_where_it_is_coldest(rest):
     found = {j.what: j for j in rest.judgements}
     at_rest = found["clearance under A-4, at rest [m]"]
     (lifted,) = (j for what, j in found.items() if "lifted" in what)
-    assert at_rest.is_kept
+    assert at_rest.passed
     assert float(lifted.figure) == pytest.approx(float(at_rest.figure) - rest.overbridges.lift[0], abs=1e-3)
     assert "from memory" in at_rest.source
     over = over_temperature(rest, ["40 degC", "-20 degC"])
@@ -71,9 +72,9 @@ def test_clearances_are_judged_at_rest_lifted_and_where_it_is_coldest(rest):
 
 def test_a_verdict_in_the_wind_counts_the_spans_beyond(rest):
     (kept,) = in_wind(rest, pressure=300.0, limit=0.5).judgements
-    assert (kept.word, kept.limit, kept.source) == ("keeps", "500 there", "as asked for")
+    assert (kept.word, kept.limit, kept.source) == ("passed", "500 there", "as asked for")
     (beyond,) = in_wind(rest, pressure=3000.0, limit=0.3).judgements
-    assert not beyond.is_kept
+    assert not beyond.passed
     assert "4 of 4 spans beyond" in beyond.figure
     assert in_wind(rest, pressure=300.0).judgements == ()
     assert np.isnan(in_wind(rest, pressure=300.0).limit).all()

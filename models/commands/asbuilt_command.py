@@ -72,7 +72,7 @@ def _print(line: str, found: AsBuiltOutcome) -> None:
 
 def write(folder: Path, found: AsBuiltOutcome, design_path: Path, source: str) -> None:
     """Write the definitions as built and as corrected, the running surface and the table."""
-    text, built = design_path.read_text(encoding="utf-8"), found.built
+    text, built = design_path.read_text(encoding="utf-8-sig"), found.built
     surface = "" if found.surface.is_even else SURFACE
     designed = built.design.unstrained_length
     where = f"openpanto asbuilt, from {source}".replace("\\", "/").replace('"', "'")

@@ -45,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     _check_written(arguments.out, design_path, arguments.measured)
     warn(doubts("lines", arguments.line))
     measured = read_measured_run(arguments.measured)
+    warn(measured.notes)
     allowed = Allowed(1e-3 * arguments.step, arguments.only, support_limits().shortest_dropper)
     with _progress(quiet=arguments.quiet) as tell:
         found = judge_as_built(definition, measured, 1e-3 * arguments.tolerance, allowed, tell)

@@ -44,4 +44,4 @@ def _width() -> int | None:
 def _failing(cases: Sequence[CaseOutcome]) -> Iterator[str]:
     for outcome in cases:
         for row in outcome.failing:
-            yield f"FAILS: {outcome.case.name}, {row.title}: {row.shown}, wanted {row.reference}"
+            yield f"FAILED: {outcome.case.name}, {row.title}: {row.shown}, wanted {row.reference}"

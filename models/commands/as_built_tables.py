@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
+from models.interface.norm_judgement import verdict_word
 from models.layout.as_built.as_built_outcome import AGREEMENT, AsBuiltOutcome
 
 #: Columns of what is printed and shown of a dropper.
@@ -164,8 +165,9 @@ def _surface(found: AsBuiltOutcome) -> str:
 def _difference(difference: float) -> str:
     if math.isnan(difference):
         return "not compared: no error up to 10 mm far from slack droppers"
-    kept = "within" if difference <= AGREEMENT else "beyond"
-    return f"{1e3 * difference:.4f}, {kept} {1e3 * AGREEMENT:g} (form finding, and the inverse of the influences)"
+    verdict = verdict_word(is_kept=difference <= AGREEMENT)
+    ways = "form finding, and the inverse of the influences"
+    return f"{1e3 * difference:.4f}: {verdict}, limit {1e3 * AGREEMENT:g} ({ways})"
 
 
 def _heights(rise: FloatArray) -> str:

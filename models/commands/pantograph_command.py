@@ -17,6 +17,7 @@ from models.commands.force_over_speed import SPEEDS, print_over_speed, tabulated
 from models.commands.physics_files import set_heading, show_no_noise, write_csv, write_figure
 from models.commands.physics_options import check_folder, new_folder, own_settings, print_table, warn
 from models.definition_files.parameter import ParameterError
+from models.interface.norm_judgement import verdict_word
 from models.library.catalogue import doubts, load_pantograph, pantograph_path
 from models.pantograph.lumped import lumped_rig as lumped
 from models.pantograph.lumped.lumped_advice import idle_values
@@ -124,9 +125,9 @@ def _print_loop(loop: FloatArray, limit: float | None) -> None:
     print_table(f"Static force with the strip moved up and down at {_SLOW:g} m/s", LOOP, rows)
     if limit is not None:
         worst = int(np.argmax(loop[:, 4]))
-        verdict = "within" if loop[worst, 4] <= limit else "beyond"
+        verdict = verdict_word(is_kept=loop[worst, 4] <= limit)
         found = f"{loop[worst, 4]:.2f} N at {loop[worst, 0]:.3f} m"
-        print(f"largest half difference {found}: {verdict} the limit of {limit:g} N")
+        print(f"largest half difference {found}: {verdict}, limit {limit:g} N")
 
 
 def write(folder: Path, result: Characteristics) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from models.commands.physics_files import write_csv, write_figure
 from models.commands.statics_plots import COLOURS, GREY
 from models.interface.line_in_wind import LineInWind
+from models.interface.norm_judgement import verdict_word
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +29,7 @@ def rows(wind: LineInWind) -> list[Sequence[str]]:
             f"{1e3 * wind.found.offset[k]:.0f}",
             "" if math.isnan(wind.found.string[k]) else f"{1e3 * wind.found.string[k]:.0f}",
             "" if math.isnan(limit) else f"{1e3 * limit:.0f}",
-            "" if math.isnan(limit) else "keeps" if wind.found.offset[k] <= limit else "does not keep",
+            "" if math.isnan(limit) else verdict_word(is_kept=wind.found.offset[k] <= limit),
         )
         for k, limit in enumerate(wind.limit.tolist())
     ]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from models.arrays import BoolArray, FloatArray
 from models.definition_files.parameter import ParameterError
@@ -16,19 +17,32 @@ if TYPE_CHECKING:
 Table = tuple[tuple[str, ...], tuple[FloatArray | BoolArray, ...]]
 
 
-def table_frame(tables: Mapping[str, Table], name: str, is_indexed: bool = False) -> pandas.DataFrame:
-    """Return one of some tables; its first column may be the index.
+class Tabled(ABC):
+    """What can be had as tables, and each of them as a data frame."""
 
-    Raises
-    ------
-    ParameterError
-        If there is no such table.
-    ImportError
-        If pandas is not installed.
-    """
-    if name not in tables:
-        raise ParameterError(f"there is no table '{name}'; there are {', '.join(tables)}")
-    return column_frame(*tables[name], is_indexed)
+    #: Whether the first column is the index of its data frame.
+    is_indexed: ClassVar[bool] = False
+
+    @property
+    @abstractmethod
+    def tables(self) -> Mapping[str, Table]:
+        """Columns by name."""
+
+    def frame(self, name: str | None = None) -> pandas.DataFrame:
+        """Return one of the `tables`, by default the first, as a data frame (needs pandas).
+
+        Raises
+        ------
+        ParameterError
+            If there is no such table.
+        ImportError
+            If pandas is not installed.
+        """
+        tables = self.tables
+        chosen = next(iter(tables)) if name is None else name
+        if chosen not in tables:
+            raise ParameterError(f"there is no table '{chosen}'; there are {', '.join(tables)}")
+        return column_frame(*tables[chosen], self.is_indexed)
 
 
 def column_frame(

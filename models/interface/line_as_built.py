@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from models.arrays import FloatArray
 from models.catenary.condition.fitted_lengths import droppers_along
 from models.catenary.definition.surface_definition import RunningSurface
 from models.catenary.shape.form_finding import StaticState
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import Table, table_frame
+from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_statics import given
 from models.layout.as_built.as_built_outcome import AsBuiltOutcome, judge_as_built
@@ -19,15 +19,12 @@ from models.layout.as_built.dropper_corrections import Allowed
 from models.layout.as_built.measured_reading import read_measured_run
 from models.library.norm_tables import support_limits
 
-if TYPE_CHECKING:
-    import pandas
-
 #: What a tolerance or a step may be [m].
 _SIZES: Final = (1e-4, 0.5)
 
 
 @dataclass(frozen=True)
-class LineAsBuilt:
+class LineAsBuilt(Tabled):
     """A line as it hangs, and as it would be corrected; SI.
 
     Attributes
@@ -70,16 +67,6 @@ class LineAsBuilt:
             ),
             "running_surface": (("position [m]", "height [mm]"), (found.surface.x, 1e3 * found.surface.r)),
         }
-
-    def frame(self, name: str = "droppers") -> pandas.DataFrame:
-        """Return one of the `tables` as a data frame (needs pandas).
-
-        Raises
-        ------
-        ParameterError
-            If there is no such table.
-        """
-        return table_frame(self.tables, name)
 
 
 def as_built(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -19,14 +19,11 @@ from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.shape.track import track_at
 from models.catenary.statics.blow_off import BlowOff, blow_off
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import Table, table_frame
+from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_statics import LineStatics, given, whole
-from models.interface.norm_judgement import Judgement, kept
+from models.interface.norm_judgement import Judgement, verdict_word
 from models.library.norm_tables import lateral_norm
-
-if TYPE_CHECKING:
-    import pandas
 
 #: Strongest wind that is meant [m/s], [Pa].
 _FASTEST: Final = 100.0
@@ -36,7 +33,7 @@ _FARTHEST: Final = 2.0
 
 
 @dataclass(frozen=True)
-class LineInWind:
+class LineInWind(Tabled):
     """A section of a line in the wind, from either side, and what it may be blown by; SI.
 
     Attributes
@@ -85,7 +82,7 @@ class LineInWind:
             yield Judgement(
                 "offset in the wind, worst span [mm]",
                 f"{1e3 * self.offset[worst]:.0f} in span {worst + 1}{spans}",
-                kept(is_kept=not beyond),
+                verdict_word(is_kept=not beyond),
                 f"{1e3 * self.limit[worst]:.0f} there",
                 self.source,
             )
@@ -109,16 +106,6 @@ class LineInWind:
         arms = {"x [m]": f.arm_x, "rise, wind to the left [m]": rise[:, 0], "rise, wind to the right [m]": rise[:, 1]}
         every = {"wind": spans, "plan": plan, "arms": arms}
         return {name: (tuple(columns), tuple(columns.values())) for name, columns in every.items()}
-
-    def frame(self, name: str = "wind") -> pandas.DataFrame:
-        """Return one of the `tables` as a data frame (needs pandas).
-
-        Raises
-        ------
-        ParameterError
-            If there is no such table.
-        """
-        return table_frame(self.tables, name)
 
 
 def in_wind(
@@ -156,7 +143,7 @@ def in_wind(
     --------
     >>> blown = in_wind("EN50318_2002", speed="20 m/s", limit="0.4 m")
     >>> round(blown.pressure, 1), blown.judgements[0].word
-    (250.0, 'keeps')
+    (250.0, 'passed')
     """
     definition, index = _section(line, section)
     own, chosen = asked_limit(limit, head)

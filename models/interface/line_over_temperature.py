@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,22 +17,19 @@ from models.catenary.statics.wire_waves import OPERATION_LIMIT
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.definition_files.si_units import OFFSETS
-from models.interface.column_frames import Table, table_frame
+from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.line_statics import LineStatics, given, listed, whole
-from models.interface.norm_judgement import Judgement
+from models.interface.norm_judgement import Judgement, verdict_word
 from models.interface.support_verdicts import clearance_at_temperatures
 from models.library.norm_tables import norm_sources, support_limits
-
-if TYPE_CHECKING:
-    import pandas
 
 #: 0 degC [K].
 ZERO = OFFSETS["degC"]
 
 
 @dataclass(frozen=True)
-class LineOverTemperature:
+class LineOverTemperature(Tabled):
     """A section of a line at some temperatures; SI.
 
     Attributes
@@ -86,16 +82,6 @@ class LineOverTemperature:
         tension = ("temperature [degC]", "wire", "from [m]", "to [m]", "tension [N]")
         joined = tuple(np.concatenate(column) for column in zip(*parts, strict=True))
         return {"temperature": (tuple(columns), tuple(map(np.array, columns.values()))), "tension": (tension, joined)}
-
-    def frame(self, name: str = "temperature") -> pandas.DataFrame:
-        """Return one of the `tables` as a data frame (needs pandas).
-
-        Raises
-        ------
-        ParameterError
-            If there is no such table.
-        """
-        return table_frame(self.tables, name)
 
 
 def over_temperature(
@@ -208,7 +194,7 @@ def _loss(states: Sequence[LineAtTemperature]) -> Judgement:
     return Judgement(
         "largest loss of tension [% of nominal]",
         f"{100.0 * share:.1f}, {component.replace('_', ' ')} at {temperature:g} degC",
-        "within" if share <= largest else "beyond",
+        verdict_word(is_kept=share <= largest),
         f"{100.0 * largest:g} (TB 10009-2016)",
         norm_sources("supports")["largest_loss"],
     )
@@ -222,7 +208,7 @@ def _waves(states: Sequence[LineAtTemperature]) -> Iterator[Judgement]:
         yield Judgement(
             f"{3.6 * speed:g} km/h over the slowest wave speed [1]",
             f"{speed / C:.3f}, {3.6 * C:.1f} km/h at {slowest.temperature - ZERO:g} degC",
-            "within" if speed <= OPERATION_LIMIT * C else "beyond",
+            verdict_word(is_kept=speed <= OPERATION_LIMIT * C),
             f"{OPERATION_LIMIT:g} (EN 50119)",
             "EN 50119, as section 2.1 of the 2012 thesis gives it",
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,20 +23,17 @@ from models.catenary.statics.overbridge_room import OverbridgeRoom, overbridge_r
 from models.catenary.statics.support_loads import SupportLoads, support_loads
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
-from models.interface.column_frames import Table, table_frame
+from models.interface.column_frames import Table, Tabled
 from models.interface.line_and_pantograph import Line, open_line
 from models.interface.norm_judgement import Judgement
 from models.interface.support_verdicts import overbridge_verdicts, support_verdicts
 from models.library.norm_tables import gradient_limits, support_limits
 
-if TYPE_CHECKING:
-    import pandas
-
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
-class LineStatics:
+class LineStatics(Tabled):
     """A section of a line at rest, and one span in detail; SI.
 
     Attributes
@@ -61,7 +58,7 @@ class LineStatics:
         ``highest``, ``clearance``, ``encumbrance``, ``lift`` [m] of every bridge over the line.
     judgements : tuple of Judgement
         What norms say of supports, droppers, gradients and overbridges: ``what``, ``figure``, ``word``, ``limit``,
-        ``source``, ``is_kept``.
+        ``source``, ``passed``.
     elasticity : Elasticity
         ``x`` [m], ``value`` [m/N] along the span, ``minimum``, ``maximum``, ``non_uniformity``.
     others : dict
@@ -122,16 +119,6 @@ class LineStatics:
             same = [(p.x, p.y, p.z) for p in self.profiles if p.component == component]  # stitch wires one by one
             found[component] = (("x [m]", "y [m]", "z [m]"), _joined(same))
         return found
-
-    def frame(self, name: str) -> pandas.DataFrame:
-        """Return one of the `tables` as a data frame (needs pandas).
-
-        Raises
-        ------
-        ParameterError
-            If there is no such table.
-        """
-        return table_frame(self.tables, name)
 
 
 def statics(

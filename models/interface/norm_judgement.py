@@ -1,12 +1,12 @@
-"""A figure that was held against a limit: what, how much, where, whether it keeps it, where the limit is from."""
+"""A figure that was held against a limit: what, how much, where, whether it passes, where the limit is from."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
-Word = Literal["keeps", "does not keep", "within", "beyond"]
-_KEPT: Final = ("keeps", "within")
+#: The words of runs' reports and of ``verify``; with proof: passed only if something is proven.
+Word = Literal["passed", "with proof", "failed"]
 
 
 @dataclass(frozen=True)
@@ -19,13 +19,12 @@ class Judgement:
         What was judged, with its unit.
     figure : str
         How much, and where.
-    word : {"keeps", "does not keep", "within", "beyond"}
+    word : {"passed", "with proof", "failed"}
+        The verdict; with proof: it passes only if something is proven.
     limit : str
         The limit, with what it is of.
     source : str
         Where the limit is from.
-    is_conditional : bool
-        Whether it is kept only if something is proven.
     """
 
     what: str
@@ -33,19 +32,18 @@ class Judgement:
     word: Word
     limit: str
     source: str = ""
-    is_conditional: bool = False
 
     @property
-    def is_kept(self) -> bool:
+    def passed(self) -> bool:
         """Whether the limit is kept, and nothing has to be proven for that."""
-        return self.word in _KEPT and not self.is_conditional
+        return self.word == "passed"
 
     @property
     def text(self) -> str:
         """Figure, verdict and limit in a line."""
-        return f"{self.figure}: {self.word} {self.limit}"
+        return f"{self.figure}: {self.word}, limit {self.limit}"
 
 
-def kept(*, is_kept: bool) -> Word:
+def verdict_word(*, is_kept: bool) -> Word:
     """Return the word for a limit that is kept or is not."""
-    return "keeps" if is_kept else "does not keep"
+    return "passed" if is_kept else "failed"

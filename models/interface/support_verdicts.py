@@ -11,7 +11,7 @@ from models.catenary.definition.overbridge_definition import Overbridge
 from models.catenary.statics.overbridge_room import OverbridgeRoom
 from models.catenary.statics.rest_profile import Droppers
 from models.catenary.statics.support_loads import SupportLoads
-from models.interface.norm_judgement import Judgement, kept
+from models.interface.norm_judgement import Judgement, verdict_word
 from models.library.norm_tables import GradientLimits, SupportLimits, clearances, norm_sources
 
 #: Gradients below this are those of rounding.
@@ -35,7 +35,7 @@ def support_verdicts(
         yield Judgement(
             "shortest dropper [m]",
             f"{droppers.length[shortest]:.3f} at {droppers.x[shortest]:.2f} m",
-            kept(is_kept=bool(droppers.length[shortest] >= limits.shortest_dropper)),
+            verdict_word(is_kept=bool(droppers.length[shortest] >= limits.shortest_dropper)),
             f"{limits.shortest_dropper:g} at least (ADIF)",
             sources["shortest_dropper"],
         )
@@ -93,7 +93,7 @@ def _clearance(name: str, state: str, left: float, own: float | None, norm: floa
     return Judgement(
         f"clearance under {name}, {state} [m]",
         f"{left:.3f}",
-        kept(is_kept=bool(left >= least)),
+        verdict_word(is_kept=bool(left >= least)),
         f"{least:g} at least ({'EN 50119, from memory: check' if own is None else 'as its file says'})",
         source if own is None else "the line's file",
     )
@@ -113,7 +113,7 @@ def _gradient_verdicts(
             yield Judgement(
                 f"{what} [permil], {norm.name}",
                 f"{1e3 * values[worst]:.2f} at {supports.x[worst]:g} m",
-                kept(is_kept=bool(values[worst] <= limit + _LEVEL)),
+                verdict_word(is_kept=bool(values[worst] <= limit + _LEVEL)),
                 f"{1e3 * limit:g} at {3.6 * speed:g} km/h",
                 sources[norm.name],
             )
@@ -124,11 +124,11 @@ def _largest(x: FloatArray, lateral: FloatArray, limits: SupportLimits, sources:
     what, figure = "largest lateral load of an arm [N]", f"{lateral[worst]:.0f} at {x[worst]:g} m"
     standard, proof = limits.largest_lateral, limits.largest_with_proof
     if lateral[worst] <= standard:
-        return Judgement(what, figure, "within", f"{standard:g} (ADIF, standard arm)", sources["largest_lateral"])
+        return Judgement(what, figure, "passed", f"{standard:g} (ADIF, standard arm)", sources["largest_lateral"])
     if lateral[worst] <= proof:
-        limit = f"{standard:g}, within {proof:g} (ADIF, with proof)"
-        return Judgement(what, figure, "beyond", limit, sources["largest_with_proof"], is_conditional=True)
-    return Judgement(what, figure, "beyond", f"{proof:g} (ADIF, with proof)", sources["largest_with_proof"])
+        limit = f"{standard:g}, and {proof:g} with proof (ADIF)"
+        return Judgement(what, figure, "with proof", limit, sources["largest_with_proof"])
+    return Judgement(what, figure, "failed", f"{proof:g} (ADIF, with proof)", sources["largest_with_proof"])
 
 
 def _smallest(x: FloatArray, lateral: FloatArray, limits: SupportLimits, sources: dict[str, str]) -> Judgement:
@@ -136,7 +136,7 @@ def _smallest(x: FloatArray, lateral: FloatArray, limits: SupportLimits, sources
     return Judgement(
         "smallest lateral load of an arm [N]",
         f"{lateral[worst]:.0f} at {x[worst]:g} m",
-        kept(is_kept=bool(lateral[worst] >= limits.smallest_lateral)),
+        verdict_word(is_kept=bool(lateral[worst] >= limits.smallest_lateral)),
         f"{limits.smallest_lateral:g} at least (from memory: check)",
         sources["smallest_lateral"],
     )

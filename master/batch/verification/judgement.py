@@ -12,11 +12,11 @@ from master.batch.verification.quantities import QUANTITIES, Measured, Quantity
 from master.errors import MasterError
 from master.results.run_results import Results
 
-#: holds; near: outside its range, but within the tolerance stated for it; fails; and of rows that are only
+#: passed; near: outside its range, but within the tolerance stated for it; failed; and of rows that are only
 #: reported: agrees, departs.
-Verdict = Literal["holds", "near", "fails", "agrees", "departs"]
+Verdict = Literal["passed", "near", "failed", "agrees", "departs"]
 Place = Literal["inside", "near", "outside"]
-FAILING: Final[Verdict] = "fails"
+FAILING: Final[Verdict] = "failed"
 _ORDER: Final = ("inside", "near", "outside")
 #: Share by which a figure may miss a limit through rounding.
 _ROUNDING: Final = 1e-9
@@ -167,7 +167,7 @@ def verdict_of(row: Row, place: Place, in_band: bool = True) -> Verdict:
         return FAILING
     if row.kind == "report":
         return "agrees" if place == "inside" else "departs"
-    verdicts: dict[Place, Verdict] = {"inside": "holds", "near": "near", "outside": "fails"}
+    verdicts: dict[Place, Verdict] = {"inside": "passed", "near": "near", "outside": "failed"}
     return verdicts[place]
 
 

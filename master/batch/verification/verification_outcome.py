@@ -15,12 +15,12 @@ from master.errors import InterruptedRunError, MasterError
 from master.results.run_results import Results
 
 #: Version of ``verify.json``; a file without one is of version 1.
-FORMAT: Final = 2
+FORMAT: Final = 3
 #: Verdicts in the order in which they are counted, with the words for several rows.
 WORDS: Final[Mapping[Verdict, str]] = {
-    "holds": "hold",
+    "passed": "passed",
     "near": "near",
-    "fails": "FAIL",
+    "failed": "FAILED",
     "agrees": "reported: agree",
     "departs": "reported: depart",
 }

@@ -17,17 +17,17 @@ from master.results.run_results import Results
 
 #: Classes of the verdicts in the style sheet of the pages.
 _KINDS: Final[dict[Verdict, str]] = {
-    "holds": "pass",
+    "passed": "pass",
     "near": "near",
-    "fails": "fail",
+    "failed": "fail",
     "agrees": "soft",
     "departs": "soft",
 }
 _HEADS: Final = "<tr><th>quantity</th><th class='n'>computed</th><th>reference</th><th>source</th><th>verdict</th></tr>"
 _LEGEND: Final = (
-    "<b class='pass'>holds</b>: within its range, or within the tolerance of its value. "
+    "<b class='pass'>passed</b>: within its range, or within the tolerance of its value. "
     "<b class='near'>near</b>: outside its range, but within the tolerance stated for it. "
-    "<b class='fail'>FAILS</b>: neither. A row marked <i>indicative</i> must hold too, though its source "
+    "<b class='fail'>FAILED</b>: neither. A row marked <i>indicative</i> must hold too, though its source "
     "calls its own data indicative. A row marked <i>report</i> fails only outside its band; otherwise it "
     "<b class='soft'>agrees</b> or <b class='soft'>departs</b>. "
     "Percentages are of the value, or of the nearer limit of the range."
@@ -81,7 +81,7 @@ def _overview(cases: Sequence[CaseOutcome]) -> str:
     rows = "".join(
         f"<tr><td><a href='#{text(c.case.name)}'>{text(c.case.name)}</a></td>"
         f"<td>{text(c.case.title)}</td><td>{text(count_verdicts((c,)))}</td>"
-        f"<td class='{'pass' if c.passed else 'fail'}'>{'passes' if c.passed else 'FAILS'}</td></tr>"
+        f"<td class='{'pass' if c.passed else 'fail'}'>{'passed' if c.passed else 'FAILED'}</td></tr>"
         for c in cases
     )
     heads = "<tr><th>case</th><th>subject</th><th>rows</th><th>verdict</th></tr>"

@@ -15,9 +15,9 @@ from master.batch.verification.verification_outcome import CaseOutcome, count_ve
 from master.report.result_tables import ruled_table
 
 _STYLES: Final[dict[Verdict, str]] = {
-    "holds": "green",
+    "passed": "green",
     "near": "yellow",
-    "fails": "bold red",
+    "failed": "bold red",
     "agrees": "dim",
     "departs": "dim yellow",
 }

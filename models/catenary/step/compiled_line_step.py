@@ -13,7 +13,7 @@ from models.arrays import FloatArray, IntArray
 from models.catenary.condition.running_surface import SurfacePiece
 from models.catenary.contact_and_slack.contact_wire import ContactWire
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError, not_settled
-from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
+from models.catenary.line_state import CatenaryState, ContactResult, StripMotion, empty_result
 from models.catenary.linear_motion.attachment_solver import Sparse
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.line_motion import LineMotion
@@ -26,10 +26,10 @@ from models.catenary.step.step_records import StepRecords
 from models.contact_law import continuous_contact
 
 #: No forces that are given, and no strips.
-_NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
+_NO_FORCES = np.zeros((0, 3))
 _NO_STRIPS = np.zeros((0, 2, 2, 3)), np.zeros(0)
-#: No droppers.
-_NONE, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
+#: No slack droppers.
+_NONE, _NO_LACK = np.zeros(0, dtype=np.int64), np.zeros(0)
 
 #: Displacements of attachments from which on a solution about a load takes less time than a whole one.
 _LONG = 12000
@@ -92,7 +92,8 @@ class CompiledLineStep:
         self._slack, self._lacks = np.zeros(n_droppers, dtype=np.int64), np.zeros(n_droppers)
         self._report = np.zeros(5, dtype=np.int64)
         sizes = 2 * (n_attached,) + 2 * (n_droppers,) + 2 * self._sizes[:1]
-        self._work = (numbers, *map(np.zeros, sizes), self._slack, self._lacks)
+        self._work = (numbers, *map(np.zeros, sizes), self._slack, self._lacks, self._report)
+        self._no_result = empty_result(0, len(line.wires))
         self._lay_out(1)
 
     def step(self, state: CatenaryState, motion: StripMotion) -> ContactResult:
@@ -100,42 +101,38 @@ class CompiledLineStep:
         shape = state.element.shape
         result = ContactResult(np.empty(shape), np.empty((*shape, 3)))
         strips = np.ascontiguousarray(motion.strip), np.ascontiguousarray(motion.compliance)
-        self._run(state, strips, (_NOWHERE, _NOTHING), state.element.size, (result.force, result.point))
+        self._run(state, strips, _NO_FORCES, state.element.size, result)
         return result
 
     def push(self, state: CatenaryState, forces: Sequence[GivenForce]) -> None:
         """Advance the line by one step under forces that are given at its end; see `StepEngine`."""
-        given = _NOWHERE, _NOTHING
-        if forces:
-            placed = [(s, *self._wires[s].locate(x), force) for s, x, force in forces]
-            given = np.array([place[:2] for place in placed]), np.array([place[2:] for place in placed])
-        nothing = np.zeros((0, len(self._wires)))
-        self._run(state, _NO_STRIPS, given, len(forces), (nothing, nothing[:, :, None]))
+        given = np.array(forces, dtype=np.float64) if forces else _NO_FORCES
+        self._run(state, _NO_STRIPS, given, len(forces), self._no_result)
 
     def _run(
         self,
         state: CatenaryState,
         strips: tuple[FloatArray, FloatArray],
-        given: tuple[IntArray, FloatArray],
+        given: FloatArray,
         places: int,
-        out: tuple[FloatArray, FloatArray],
+        result: ContactResult,
     ) -> None:
         """Do one step, with what the kernels ask for on the way."""
-        packed, report, records = self._packed(state.motion), self._report, self._records
-        if places > len(self._load):
+        motion, report, records = state.motion, self._report, self._records
+        packed = self._packed(motion)
+        if places > self._places:
             self._lay_out(places)
-        moving = state.motion.attached, packed.table, packed.pull
+        loaded, load = np.empty((places, 2), dtype=np.int64), np.empty((places, 2))
         before = state.element, state.impact_velocity, state.loaded, state.load, state.slack, state.compensation
+        arrays = motion.attached, packed.table, packed.pull, *before, *strips, given
         records.begin()
         report[0] = 0
-        while answer := self.kernels.step(self._entries(), moving, before, strips, given, out):
+        while answer := self.kernels.step(self._entries(), *arrays, loaded, load, result.force, result.point):
             self._answer(answer)
         packed.moved = True
-        _, _, loaded, slack, ahead = report.tolist()
-        state.loaded, state.load = _NOWHERE, _NOTHING
-        if loaded:
-            state.loaded, state.load = self._loaded[:loaded].copy(), self._load[:loaded].copy()
-        state.slack, state.compensation = _NONE, _NO_FORCES
+        _, _, count, slack, ahead = report.tolist()
+        state.loaded, state.load = (loaded, load) if count == places else (loaded[:count], load[:count])
+        state.slack, state.compensation = _NONE, _NO_LACK
         if slack:
             state.slack = np.flatnonzero(self._slack)
             state.compensation = self._lacks[state.slack]
@@ -149,17 +146,18 @@ class CompiledLineStep:
             self._records.add_interval(lacks)
         elif answer == kernels.DROPPER_LACKS:
             self._records.add_dropper(lacks)
+        elif answer == kernels.NO_WIRE:
+            raise IndexError(f"a force is given on a contact wire other than 0 to {len(self._wires) - 1}")
         elif answer == kernels.NO_SOLUTION:
             raise LocalSolutionError("slack and contact forces have no solution: their compliances are singular")
         else:
             raise not_settled(slack, contacts)
 
     def _lay_out(self, places: int) -> None:
-        """Make room for so many points of wires, and for as many forces on them."""
-        self._loaded, self._load = np.zeros((places, 2), dtype=np.int64), np.zeros((places, 2))
+        """Make room for so many points of wires."""
+        self._places = places
         points = *np.zeros((6, places), dtype=np.int64), *np.zeros((10, places))
-        work = *self._work, self._loaded, self._load, self._report
-        self._arrays = *self._line, *work, *points, *(np.zeros(places * size) for size in self._sizes)
+        self._arrays = *self._line, *self._work, *points, *(np.zeros(places * size) for size in self._sizes)
         self._book: ArrayBook | None = None
 
     def _entries(self) -> IntArray:

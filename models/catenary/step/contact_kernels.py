@@ -171,6 +171,16 @@ def _first_element(starts, guess, x):
 
 
 @part
+def locate(wires, section, x):
+    """Return the element at a position of the track and the share of the way along it; see `ContactWire.locate`."""
+    first, last = wires.first[section] + section, wires.first[section + 1] + section - 1
+    if wires.period[section] > 0.0:
+        x -= math.floor((x - wires.starts[first]) / wires.period[section]) * wires.period[section]
+    i = last_before(wires.starts, first, last, x)
+    return i - first, (x - wires.starts[i]) / (wires.starts[i + 1] - wires.starts[i])
+
+
+@part
 def last_before(values, low, high, x):
     """Return which of rising values, between two of them, is the last below ``x``; the first of them if none is."""
     while low < high:

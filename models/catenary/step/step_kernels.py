@@ -2,7 +2,7 @@
 
 Other files `*_kernels.py` hold the parts. Each has one subject, and none may import anything else of the project:
 they are joined to one source and compiled from a copy in the user's cache (`models.catenary.step.engine_choice`), which
-cannot see other files. What belongs together is handed over together, because a call costs more for every array.
+cannot see other files.
 """
 
 import math
@@ -17,6 +17,7 @@ from models.catenary.step.contact_kernels import (
     dropper_at,
     find,
     interval_at,
+    locate,
     own,
     point,
     points_of,
@@ -32,17 +33,16 @@ from models.catenary.step.mode_kernels import advance, modes_of
 from models.catenary.step.vector_kernels import compiled, part, reader
 
 #: Answers of `step`.
-DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS, DROPPER_LACKS = range(5)
+DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS, DROPPER_LACKS, NO_WIRE = range(6)
 #: Droppers: their elongation by the attachments, ``rows``, ``columns`` and ``values``; ``at_rest``, elastic force [N];
 #: ``stiffness``, ``delay`` and ``unilateral`` of the `DropperLaw`; ``known``, twice its rest_load, shape (n_attached,).
 Droppers = namedtuple("Droppers", "rows columns values at_rest stiffness delay unilateral known")
 droppers_of = reader(Droppers, "wwffffff")
 #: ``numbers``: a1, then ``contact`` of `law_of`. To work in: ``change`` of the attachments, ``pressed``, known forces
 #: on them, ``free`` pulls of the droppers and ``pull``, ``local`` coordinates of an interval and their ``rates``. What
-#: a step leaves: droppers that are ``slack`` (1), and what each ``lacks``; ``loaded`` and ``load`` on the wires, as in
-#: a `CatenaryState`; ``report``, see below.
-Work = namedtuple("Work", "numbers change pressed free pull local rates slack lacks loaded load report")
-work_of = reader(Work, "fffffffififi")
+#: a step leaves: droppers that are ``slack`` (1), and what each ``lacks``; ``report``, see below.
+Work = namedtuple("Work", "numbers change pressed free pull local rates slack lacks report")
+work_of = reader(Work, "fffffffifi")
 #: ``report``: how far the step has come; what lacks; how many forces are on the wires, how many droppers slack; an
 #: interval before a strip whose record is lacking, or -1.
 STAGE, LACKS, LOADED, SLACK, AHEAD = range(5)
@@ -50,7 +50,10 @@ _BEGUN = 1
 
 
 @compiled
-def step(book, moving, state, strips, given, out):
+def step(
+    book, attached, table, pull, element, impact, loaded, load_before, slack, compensation,
+    strips, yielding, given, loaded_after, load_after, force, place,
+):  # fmt: skip
     """Advance a line by one step, or as far as the records of intervals and droppers reach: then call again.
 
     Parameters
@@ -58,23 +61,24 @@ def step(book, moving, state, strips, given, out):
     book : ndarray of int
         Of Lanes, LanesWork, Modes, Droppers, Wires, Surfaces, Work, Points and Records, see
         `models.catenary.step.array_book`.
-    moving : (attached, table, pull)
-        attached : ndarray, shape (2, n_attached)
-        table, pull
-            See `models.catenary.step.mode_kernels.advance`.
-    state : (element, impact_velocity, loaded, load, slack, compensation)
+    attached : ndarray, shape (2, n_attached)
+    table, pull
+        See `models.catenary.step.mode_kernels.advance`.
+    element, impact, loaded, load_before, slack, compensation
         As in a `CatenaryState`; the first two are replaced.
-    strips : (strip, compliance)
+    strips, yielding
         As in a `StripMotion`.
-    given : (loaded, load)
-        Known forces on the wires at the end of the step.
-    out : (force, point)
+    given : ndarray, shape (k, 3)
+        Forces that are known at the end of the step: wire, position along the track [m], force [N].
+    loaded_after, load_after : ndarray, shape (n, 2)
+        Result, of ``work.report[LOADED]`` forces: as in a `CatenaryState`.
+    force, place
         As in a `ContactResult`.
 
     Returns
     -------
     int
-        DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS or DROPPER_LACKS; ``work.report[LACKS]`` says which.
+        DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS, DROPPER_LACKS or NO_WIRE; ``work.report[LACKS]`` says which.
     """
     lanes, lanes_work, modes, droppers = (
         lanes_of(book, 0),
@@ -83,22 +87,32 @@ def step(book, moving, state, strips, given, out):
         droppers_of(book, 25),
     )
     wires, surfaces, work = wires_of(book, 33), surfaces_of(book, 38), work_of(book, 42)
-    points, records = points_of(book, 54), records_of(book, 72)
-    (attached, table, pull), report, a1 = moving, work.report, work.numbers[0]
+    points, records = points_of(book, 52), records_of(book, 70)
+    report, a1 = work.report, work.numbers[0]
     motion = a1, table, work.change, attached
     if report[STAGE] < _BEGUN:
-        report[LACKS] = _unknown(wires, records, state[2], given[0])
-        if report[LACKS] >= 0:
-            return INTERVAL_LACKS
-        _press_known(droppers, wires, records, state, points, table, work.pressed)
+        for k in range(given.shape[0]):
+            if not 0 <= given[k, 0] < wires.period.size:
+                return NO_WIRE
+            section = np.int64(given[k, 0])
+            loaded_after[k, 0], load_after[k, 1] = section, given[k, 2]
+            loaded_after[k, 1], load_after[k, 0] = locate(wires, section, given[k, 1])
+        for known in (loaded, loaded_after[: given.shape[0]]):
+            report[LACKS] = _unknown(wires, records, known)
+            if report[LACKS] >= 0:
+                return INTERVAL_LACKS
+        for i in range(work.pressed.size):
+            work.pressed[i] = droppers.known[i]
+        for k in range(slack.size):
+            for i in range(droppers.rows[slack[k]], droppers.rows[slack[k] + 1]):
+                work.pressed[droppers.columns[i]] -= compensation[k] * droppers.values[i]
+        _press_known(wires, records, loaded, load_before, points, table, work.pressed)
+        _press_known(wires, records, loaded_after[: given.shape[0]], load_after, points, table, work.pressed)
         load(lanes, attached, work.pressed, pull, lanes_work)
         solve(lanes, lanes_work, work.change)
-        for k in range(given[0].shape[0]):
-            record, force = _known_force(wires, records, given[0], given[1], k, table, points)
-            _bend_at(records, record, points, 0, force, work.change)
         _put_free(droppers, motion, work.free)
         report[STAGE] = _BEGUN
-    report[LACKS], count = _meet(wires, surfaces, records, state, strips[0], motion, points, work)
+    report[LACKS], count = _meet(wires, surfaces, records, element, impact, strips, motion, points, work)
     if report[LACKS] >= 0:
         return INTERVAL_LACKS
     n = 0
@@ -108,11 +122,11 @@ def step(book, moving, state, strips, given, out):
             points.contacts[n] = i
             n += 1
     contacts = points.contacts[:n]
-    answer = solve_local(records, points, contacts, strips[1], droppers, work.numbers, table, state[4], work)
+    answer = solve_local(records, points, contacts, yielding, droppers, work.numbers, table, slack, work)
     if answer >= LACKING:
         report[LACKS] = answer - LACKING
         return DROPPER_LACKS
-    report[SLACK], report[LOADED] = work.slack.sum(), given[0].shape[0] + n
+    report[SLACK], report[LOADED] = work.slack.sum(), given.shape[0] + n
     if answer != SOLVED:
         return NO_SOLUTION if answer == SINGULAR else NOT_SETTLED
     _apply(records, points, contacts, table, work)
@@ -120,54 +134,33 @@ def step(book, moving, state, strips, given, out):
         attached[0, i] += work.change[i]
         attached[1, i] = a1 * work.change[i] - attached[1, i]
     advance(modes, a1, work.change, table, pull)
-    _note(points, contacts, given, state[1], work)
-    _put_result(wires, records, points, contacts, count, strips[0], motion, out)
+    _note(points, contacts, loaded_after[given.shape[0] :], load_after[given.shape[0] :], impact)
+    _put_result(wires, records, points, contacts, count, strips, motion, force, place)
     return DONE
 
 
 @part
-def _unknown(wires, records, loaded, given):
+def _unknown(wires, records, loaded):
     """Return an interval under a known force whose record is lacking, or -1."""
-    for places in (loaded, given):
-        for i in range(places.shape[0]):
-            number = wires.interval[wires.first[places[i, 0]] + places[i, 1]]
-            if records.intervals[number] < 0:
-                return number
+    for k in range(loaded.shape[0]):
+        number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
+        if records.intervals[number] < 0:
+            return number
     return -1
 
 
 @part
-def _known_force(wires, records, loaded, force, k, table, points):
-    """Add the k-th of known forces on the wires to the modes under it; return its interval's record, and the force."""
-    number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
-    record, row = records.intervals[number], own(points.row, points, 0)
-    point(records, record, loaded[k, 1] - wires.begins[number], force[k, 0], table, row, own(points.load, points, 0))
-    press(records, record, row, force[k, 1], table)
-    return record, force[k, 1]
-
-
-@part
-def _press_known(droppers, wires, records, state, points, table, pressed):
-    """Put the known forces on the attachments, beginning plus end of the step, into ``pressed``."""
-    _, _, loaded, force, slack, compensation = state
-    for i in range(pressed.size):
-        pressed[i] = droppers.known[i]
-    for k in range(slack.size):
-        for i in range(droppers.rows[slack[k]], droppers.rows[slack[k] + 1]):
-            pressed[droppers.columns[i]] -= compensation[k] * droppers.values[i]
+def _press_known(wires, records, loaded, force, points, table, pressed):
+    """Add known forces on the wires to the modes under them, and to the forces on the attachments."""
+    row, load = own(points.row, points, 0), own(points.load, points, 0)
     for k in range(loaded.shape[0]):
-        record, of_wire = _known_force(wires, records, loaded, force, k, table, points)
+        number = wires.interval[wires.first[loaded[k, 0]] + loaded[k, 1]]
+        record = records.intervals[number]
+        point(records, record, loaded[k, 1] - wires.begins[number], force[k, 0], table, row, load)
+        press(records, record, row, force[k, 1], table)
         interval = interval_at(records.whole, record)
         for j in range(interval.size):
-            pressed[records.whole[interval.ends + j]] += of_wire * points.load[j]
-
-
-@part
-def _bend_at(records, record, points, i, force, change):
-    """Add what a force on a point changes at the attachments in a step."""
-    interval = interval_at(records.whole, record)
-    share = own(points.load, points, i)[: interval.size]
-    bend(records.data, interval.columns, interval.first, interval.reach, share, force, change)
+            pressed[records.whole[interval.ends + j]] += force[k, 1] * load[j]
 
 
 @part
@@ -184,7 +177,7 @@ def _put_free(droppers, motion, free):
 
 
 @part
-def _meet(wires, surfaces, records, state, strips, motion, points, work):
+def _meet(wires, surfaces, records, element, impact, strips, motion, points, work):
     """Find all strips that cross a wire at the end of the step, forces found inside it left out.
 
     Returns
@@ -192,8 +185,7 @@ def _meet(wires, surfaces, records, state, strips, motion, points, work):
     (int, int)
         An interval whose record is lacking, or -1; how many points there are.
     """
-    element, impact, local = state[0], state[1], (work.local, work.rates)
-    count, place = 0, np.empty(3)
+    count, place, local = 0, np.empty(3), (work.local, work.rates)
     work.report[AHEAD] = -1
     for s in range(wires.period.size):
         for p in range(strips.shape[0]):
@@ -248,7 +240,9 @@ def _apply(records, points, contacts, table, work):
     for i in contacts:
         if points.force[i] != 0.0:
             press(records, points.record[i], own(points.row, points, i), points.force[i], table)
-            _bend_at(records, points.record[i], points, i, points.force[i], work.change)
+            interval = interval_at(records.whole, points.record[i])
+            share = own(points.load, points, i)[: interval.size]
+            bend(records.data, interval.columns, interval.first, interval.reach, share, points.force[i], work.change)
     for j in range(work.slack.size):
         if work.slack[j]:
             of = dropper_at(records.whole, records.droppers[j])
@@ -256,28 +250,22 @@ def _apply(records, points, contacts, table, work):
 
 
 @part
-def _note(points, contacts, given, impact, work):
-    """Record the forces at the end of the step; the next one begins with them."""
-    at = 0
-    for k in range(given[0].shape[0]):
-        work.loaded[at], work.loaded[at + 1] = given[0][k, 0], given[0][k, 1]
-        work.load[at], work.load[at + 1] = given[1][k, 0], given[1][k, 1]
-        at += 2
+def _note(points, contacts, loaded, load, impact):
+    """Record the forces of contacts at the end of the step, with which the next one begins, and their impacts."""
     impact[:] = 0.0
-    for i in contacts:
-        work.loaded[at], work.loaded[at + 1] = points.section[i], points.element[i]
-        work.load[at], work.load[at + 1] = points.xi[i], points.force[i]
-        at += 2
+    for k in range(contacts.size):
+        i = contacts[k]
+        loaded[k, 0], loaded[k, 1] = points.section[i], points.element[i]
+        load[k, 0], load[k, 1] = points.xi[i], points.force[i]
         if points.depth[i] > 0.0:
             before = points.impact[i]
             impact[points.pantograph[i], points.section[i]] = before if before > 0.0 else max(points.rate[i], 1e-6)
 
 
 @part
-def _put_result(wires, records, points, contacts, count, strips, motion, out):
+def _put_result(wires, records, points, contacts, count, strips, motion, force, place):
     """Put the contacts into the result."""
     _, table, _, attached = motion
-    force, place = out
     force[:], place[:] = 0.0, math.nan
     for i in contacts:
         force[points.pantograph[i], points.section[i]] = points.force[i]

@@ -127,9 +127,14 @@ _RIGHT: Final = " class='n'"
 _FIRST: Final = " class='first'"
 
 
+_WORST_FIRST: Final = ("failed", "with proof", "passed")
+#: Class in the style sheet and sign of a verdict.
+_SIGNS: Final = {"passed": ("pass", "\u2713"), "with proof": ("near", "!"), "failed": ("fail", "\u2717")}
+
+
 def verdicts(judged: Sequence[Judgement]) -> str:
-    """Return the table of what was held against limits, what is not kept first."""
-    ordered = sorted(judged, key=lambda j: (j.is_kept, not j.is_conditional))
+    """Return the table of what was held against limits, the worst first."""
+    ordered = sorted(judged, key=lambda j: _WORST_FIRST.index(j.word))
     rows = "".join(
         f"<tr><td>{mark(j)}</td><td class='words'>{text(j.what)}</td><td>{text(j.figure)}</td>"
         f"<td class='words'>{text(j.limit)}<div class='note'>{text(j.source)}</div></td></tr>"
@@ -141,20 +146,16 @@ def verdicts(judged: Sequence[Judgement]) -> str:
 
 def mark(judged: Judgement) -> str:
     """Return a verdict as a sign and a word, not by colour alone."""
-    if judged.is_conditional:
-        return "<span class='near'>! with proof</span>"
-    kind, sign = ("pass", "\u2713") if judged.is_kept else ("fail", "\u2717")
+    kind, sign = _SIGNS[judged.word]
     return f"<span class='{kind}'>{sign} {text(judged.word)}</span>"
 
 
 def badge(judged: Sequence[Judgement]) -> str:
-    """Return how many limits are kept, in a line."""
-    kept = sum(j.is_kept for j in judged)
-    proof = sum(j.is_conditional for j in judged)
-    broken = len(judged) - kept - proof
-    kind = "fail" if broken else "near" if proof else "pass"
-    words = f"{kept} of {len(judged)} limits kept" + (f", {proof} with proof" if proof else "")
-    words += f", {broken} not kept" if broken else ""
+    """Return how many figures passed, in a line."""
+    passed, proof, failed = (sum(j.word == word for j in judged) for word in ("passed", "with proof", "failed"))
+    kind = "fail" if failed else "near" if proof else "pass"
+    words = f"{passed} of {len(judged)} limits passed" + (f", {proof} with proof" if proof else "")
+    words += f", {failed} failed" if failed else ""
     return f"<p><span class='badge {kind}'>{text(words)}</span></p>" if judged else note("no limit was asked for")
 
 

@@ -75,9 +75,9 @@ class AsBuiltOutcome:
     def _verdicts(self) -> Iterator[str]:
         b = self.built
         for error, measured, slack, beyond in zip(b.error, b.is_measured, b.is_slack, self.is_beyond, strict=True):
-            size = ("too long" if error > 0.0 else "too short") if beyond else "within"
+            size = ("failed, too long" if error > 0.0 else "failed, too short") if beyond else "passed"
             if slack:
-                size = "slack, too long" if beyond and error > 0.0 else "slack"
+                size = "failed, slack and too long" if beyond and error > 0.0 else "slack"
             yield size if measured else "not measured"
 
 

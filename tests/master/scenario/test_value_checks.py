@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from master.scenario.value_checks import empty_cells, half_empty_rows, problems, stop_after_interval
+from master.scenario.value_checks import empty_cells, half_empty_rows, problems, stop_after_interval, uncovered
 from master.ssp.run_settings import EvaluationInterval, RunSettings
 from master.system.components import Component, Fmu, System, Variable
 from master.system.connections import Connection
@@ -76,6 +76,7 @@ def test_a_stop_time_must_cover_the_interval(stop, ends):
     if found:
         assert f"ends at {stop:g} s with 'train' at {30 + 80 * stop:.6g} m, before the end of the interval" in found[0]
         assert 'stop at 4.5 s or later, or write until="end" into Interval, or run a part of it with --stop' in found[0]
+    assert uncovered(system(stop=stop)) == "".join(found).removesuffix(", or run a part of it with --stop")
 
 
 def test_the_cure_counts_from_the_start_time_and_rounds_up():

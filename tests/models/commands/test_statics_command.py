@@ -33,8 +33,8 @@ def test_the_strip_chart_is_there_as_both_kinds_of_file(statics_folder):
 def test_verdicts_are_in_the_summary(statics_folder):
     text = (statics_folder / "summary.csv").read_text()
     assert "speed of the train,120 km/h\n" in text.replace('"', "")
-    assert "keeps 0.25 at least (ADIF)" in text
-    assert '"steepest gradient [permil], IFE 6.3","1.00 at 50 m: keeps 4 at 120 km/h"' in text
+    assert "passed, limit 0.25 at least (ADIF)" in text
+    assert '"steepest gradient [permil], IFE 6.3","1.00 at 50 m: passed, limit 4 at 120 km/h"' in text
 
 
 def test_room_under_the_bridge_at_rest_lifted_and_over_temperature(statics_folder):

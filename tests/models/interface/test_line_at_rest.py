@@ -49,16 +49,33 @@ def test_tables_have_the_rows_of_what_was_asked_for(line, rest):
     assert over.frame()["temperature [degC]"].tolist() == pytest.approx([-20.0, 40.0])
     assert len(over.frame("tension")) == 2 * 2 * 6
     assert rest.frame("overbridges")["lift [m]"][0] > 0.01
+    assert list(rest.frame()) == list(rest.tables["droppers"][0])
     table = span_table(line, speed=29.0, head=1600, radii=["1 km"])
     assert table.frame("spans").index.tolist() == [1000.0]
     assert table.frame().shape == (41, 2)
+
+
+def test_a_head_leaves_less_room_in_curves(line_maker):
+    """The working range less sway, half the gauge's play and 2.5 m2 / R, or the cap of 0.4 m (EN 15273, TSI)."""
+    definition = line_maker()
+    high = dataclasses.replace(definition, profile=dataclasses.replace(definition.profile, contact_wire_height=6.2))
+    found = span_table(Line(high), speed=29.0, head=1600, radii=[300.0, 2000.0], staggers=[(0.2, 0.2)])
+    assert np.array(found.limits) == pytest.approx([0.6 - (0.11 + 0.04 * 1.45) - 0.0275 - 2.5 / 300.0, 0.4])
+    given = [
+        span_table(Line(high), speed=29.0, limit=limit, radii=[R], staggers=[(0.2, 0.2)]).largest_span[0, 0]
+        for limit, R in zip(found.limits, found.radii, strict=True)
+    ]
+    assert found.largest_span[0].tolist() == given
+    for length, R in zip(found.lengths[::10], found.smallest_radius[0, ::10].tolist(), strict=True):
+        beside = span_table(Line(high), speed=29.0, head=1600, radii=[R - 5.0, R], staggers=[(0.2, 0.2)])
+        assert beside.largest_span[0, 0] < length <= beside.largest_span[0, 1]
 
 
 def test_clearances_are_judged_at_rest_lifted_and_where_it_is_coldest(rest):
     found = {j.what: j for j in rest.judgements}
     at_rest = found["clearance under A-4, at rest [m]"]
     (lifted,) = (j for what, j in found.items() if "lifted" in what)
-    assert at_rest.is_kept
+    assert at_rest.passed
     assert float(lifted.figure) == pytest.approx(float(at_rest.figure) - rest.overbridges.lift[0], abs=1e-3)
     assert "from memory" in at_rest.source
     over = over_temperature(rest, ["40 degC", "-20 degC"])
@@ -71,9 +88,9 @@ def test_clearances_are_judged_at_rest_lifted_and_where_it_is_coldest(rest):
 
 def test_a_verdict_in_the_wind_counts_the_spans_beyond(rest):
     (kept,) = in_wind(rest, pressure=300.0, limit=0.5).judgements
-    assert (kept.word, kept.limit, kept.source) == ("keeps", "500 there", "as asked for")
+    assert (kept.word, kept.limit, kept.source) == ("passed", "500 there", "as asked for")
     (beyond,) = in_wind(rest, pressure=3000.0, limit=0.3).judgements
-    assert not beyond.is_kept
+    assert not beyond.passed
     assert "4 of 4 spans beyond" in beyond.figure
     assert in_wind(rest, pressure=300.0).judgements == ()
     assert np.isnan(in_wind(rest, pressure=300.0).limit).all()

@@ -29,33 +29,32 @@ def said(model, speed=100.0, shortest=None, **changes):
 
 def test_loads_of_arms(model):
     for load, verdict in (
-        (2499.0, "2499 at 50 m: within 2500 (ADIF, standard arm)"),
-        (-2600.0, "2600 at 50 m: beyond 2500, within 4000 (ADIF, with proof)"),
-        (4100.0, "4100 at 50 m: beyond 4000 (ADIF, with proof)"),
+        (2499.0, "2499 at 50 m: passed, limit 2500 (ADIF, standard arm)"),
+        (-2600.0, "2600 at 50 m: with proof, limit 2500, and 4000 with proof (ADIF)"),
+        (4100.0, "4100 at 50 m: failed, limit 4000 (ADIF, with proof)"),
     ):
         assert said(model, lateral=np.array([load, 81.0, np.nan]))["largest lateral load of an arm [N]"] == verdict
     for load, verdict in (
-        (79.0, "79 at 50 m: does not keep 80 at least (from memory: check)"),
-        (81.0, "81 at 50 m: keeps 80 at least (from memory: check)"),
+        (79.0, "79 at 50 m: failed, limit 80 at least (from memory: check)"),
+        (81.0, "81 at 50 m: passed, limit 80 at least (from memory: check)"),
     ):
         assert said(model, lateral=np.array([-load, 100.0]))["smallest lateral load of an arm [N]"] == verdict
 
 
 def test_lengths_of_droppers(model):
     assert said(model, shortest=0.24)["shortest dropper [m]"].startswith("0.240 at ")
-    assert "does not keep 0.25" in said(model, shortest=0.24)["shortest dropper [m]"]
-    assert "keeps 0.25" in said(model, shortest=0.26)["shortest dropper [m]"]
+    assert "failed, limit 0.25" in said(model, shortest=0.24)["shortest dropper [m]"]
+    assert "passed, limit 0.25" in said(model, shortest=0.26)["shortest dropper [m]"]
 
 
 def test_gradients_by_speed_and_norm(model):
-    assert said(model, 160.0)["steepest gradient [permil], IFE 6.3"] == "2.00 at 100 m: keeps 2 at 160 km/h"
-    assert (
-        "keeps 3.3 at" in said(model, 160.0)["steepest gradient [permil], EN 50119:2009, table 12 (from memory: check)"]
-    )
+    assert said(model, 160.0)["steepest gradient [permil], IFE 6.3"] == "2.00 at 100 m: passed, limit 2 at 160 km/h"
+    table = "steepest gradient [permil], EN 50119:2009, table 12 (from memory: check)"
+    assert "passed, limit 3.3 at" in said(model, 160.0)[table]
     change = said(model, 160.0)["largest change of gradient [permil], IFE 6.3"]
-    assert change == "2.00 at 100 m: does not keep 1 at 160 km/h"
+    assert change == "2.00 at 100 m: failed, limit 1 at 160 km/h"
     assert (
-        "does not keep 0 at 300"
+        "failed, limit 0 at 300"
         in said(model, 300.0)["steepest gradient [permil], EN 50119:2009, table 12 (from memory: check)"]
     )
 

@@ -1,4 +1,4 @@
-"""Verdicts: what holds, what is near, what fails and what is only reported."""
+"""Verdicts: what passes, what is near, what fails and what is only reported."""
 
 import math
 
@@ -22,14 +22,14 @@ def _verdict(row, *values, others=None):
 @pytest.mark.parametrize(
     ("value", "verdict", "deviation"),
     [
-        (26.0, "holds", None),
-        (31.0, "holds", None),
+        (26.0, "passed", None),
+        (31.0, "passed", None),
         (31.5, "near", 100 * 0.5 / 31),
         (31.62, "near", 2.0),
-        (31.63, "fails", 100 * 0.63 / 31),
+        (31.63, "failed", 100 * 0.63 / 31),
         (25.48, "near", -2.0),
-        (25.47, "fails", -100 * 0.53 / 26),
-        (math.nan, "fails", None),
+        (25.47, "failed", -100 * 0.53 / 26),
+        (math.nan, "failed", None),
     ],
 )
 def test_a_range_allows_a_share_of_its_nearer_limit(value, verdict, deviation):
@@ -41,32 +41,34 @@ def test_a_range_allows_a_share_of_its_nearer_limit(value, verdict, deviation):
 def test_the_share_is_of_the_limit_not_of_the_value_even_where_limits_have_signs():
     row = _row("statistical_minimum", range=[-5, 20], tolerance_percent=2)
     assert _verdict(row, -5.09)[0] == "near"
-    assert _verdict(row, -5.11)[0] == "fails"
+    assert _verdict(row, -5.11)[0] == "failed"
     assert _verdict(row, 20.39)[0] == "near"
-    assert _verdict(row, 20.41)[0] == "fails"
+    assert _verdict(row, 20.41)[0] == "failed"
 
 
 def test_a_limit_of_zero_allows_nothing():
     row = _row("loss", maximum=0, tolerance_percent=50)
-    assert _verdict(row, 0.0) == ("holds", None)
-    assert _verdict(row, 0.01) == ("fails", None)
+    assert _verdict(row, 0.0) == ("passed", None)
+    assert _verdict(row, 0.01) == ("failed", None)
 
 
-@pytest.mark.parametrize(("value", "verdict"), [(157.0, "holds"), (158.0, "holds"), (158.1, "fails"), (156.9, "fails")])
+@pytest.mark.parametrize(
+    ("value", "verdict"), [(157.0, "passed"), (158.0, "passed"), (158.1, "failed"), (156.9, "failed")]
+)
 def test_a_value_with_an_absolute_tolerance(value, verdict):
     assert _verdict(_row("mean", value=157.5, tolerance=0.5), value)[0] == verdict
 
 
 def test_a_value_with_a_relative_tolerance_says_how_far_off_it_is():
     row = _row(value=40, tolerance_percent=8)
-    assert _verdict(row, 36.8) == ("holds", pytest.approx(-8.0))
-    assert _verdict(row, 36.7)[0] == "fails"
+    assert _verdict(row, 36.8) == ("passed", pytest.approx(-8.0))
+    assert _verdict(row, 36.7)[0] == "failed"
 
 
 def test_the_worst_of_several_counts():
     row = _row("uplift_at", at=[1, 2, 3], value=[10, 20, 30], tolerance_percent=10)
-    assert _verdict(row, 10.5, 20.0, 30.0) == ("holds", pytest.approx(5.0))
-    assert _verdict(row, 10.5, 17.0, 30.0) == ("fails", pytest.approx(-15.0))
+    assert _verdict(row, 10.5, 20.0, 30.0) == ("passed", pytest.approx(5.0))
+    assert _verdict(row, 10.5, 17.0, 30.0) == ("failed", pytest.approx(-15.0))
     judged = decide(row, QUANTITIES["uplift_at"], Measured((10.5, 17.0, 30.0), ("1 m", "2 m", "3 m")), {})
     assert "worst at 2 m" in judged.remark
 
@@ -74,9 +76,9 @@ def test_the_worst_of_several_counts():
 @pytest.mark.parametrize("kind", ["report", "must hold", "indicative"])
 def test_outside_its_band_a_row_fails_of_whatever_kind(kind):
     row = _row(value=38.9, tolerance_percent=8, band=[33, 40], kind=kind)
-    inside, beside = ("agrees", "departs") if kind == "report" else ("holds", "fails")
+    inside, beside = ("agrees", "departs") if kind == "report" else ("passed", "failed")
     assert [_verdict(row, v)[0] for v in (38.0, 34.0, 33.0)] == [inside, beside, beside]
-    assert [_verdict(row, v)[0] for v in (32.9, 40.1, 41.0, math.nan)] == ["fails"] * 4
+    assert [_verdict(row, v)[0] for v in (32.9, 40.1, 41.0, math.nan)] == ["failed"] * 4
     stated = decide(row, QUANTITIES["sigma"], Measured((41.0,)), {}).remark
     assert stated == "outside the band: untuned readings span 33 to 40 N"
     assert decide(row, QUANTITIES["sigma"], Measured((38.0,)), {}).remark == "untuned readings span 33 to 40 N"
@@ -92,24 +94,24 @@ def test_reported_rows_never_fail():
 
 def test_indicative_rows_do_fail():
     row = _row("uplift_at", at=[1], value=45, tolerance_percent=15, kind="indicative")
-    assert _verdict(row, 52.0)[0] == "fails"
+    assert _verdict(row, 52.0)[0] == "failed"
 
 
 def test_verdicts_of_a_run():
     row = _row("en50367", **{"is": True})
-    assert _verdict(row, 1.0)[0] == "holds"
-    assert _verdict(row, 0.0)[0] == "fails"
+    assert _verdict(row, 1.0)[0] == "passed"
+    assert _verdict(row, 0.0)[0] == "failed"
 
 
 def test_below_and_above_mean_all_others_strictly():
     lowest = _row(below=["a", "b"])
     others = {"a": 36.0, "b": 35.0}
-    assert _verdict(lowest, 34.9, others=others)[0] == "holds"
-    assert _verdict(lowest, 35.0, others=others)[0] == "fails"
-    assert _verdict(lowest, 35.5, others=others)[0] == "fails"
+    assert _verdict(lowest, 34.9, others=others)[0] == "passed"
+    assert _verdict(lowest, 35.0, others=others)[0] == "failed"
+    assert _verdict(lowest, 35.5, others=others)[0] == "failed"
     highest = _row("minimum", above=["a", "b"])
-    assert _verdict(highest, 36.1, others=others)[0] == "holds"
-    assert _verdict(highest, 35.5, others=others)[0] == "fails"
+    assert _verdict(highest, 36.1, others=others)[0] == "passed"
+    assert _verdict(highest, 35.5, others=others)[0] == "failed"
 
 
 @pytest.mark.parametrize(

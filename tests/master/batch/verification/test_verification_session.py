@@ -77,7 +77,16 @@ def test_a_case_that_holds(case, in_folder, capsys):
     assert _verify(case()) == 0
     out = capsys.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    said = ("mean force", "static", "force", "holds", "departs", "5 rows: 4 hold", "indicative", "page: v/verify.html")
+    said = (
+        "mean force",
+        "static",
+        "force",
+        "passed",
+        "departs",
+        "5 rows: 4 passed",
+        "indicative",
+        "page: v/verify.html",
+    )
     assert [text for text in said if text not in out] == []
     data = _data(in_folder)
     assert data["passed"] is True
@@ -99,7 +108,7 @@ def test_the_page_stands_alone_and_says_every_row(case, in_folder):
         assert row["reference"] in text
         assert row["source"] in text
     assert "Not verified." in text
-    assert "FAILS" in text
+    assert "FAILED" in text
     assert "id='chart-toy_force_catenary_1'" in text
     assert not re.search(r"https?://", text.split("<script>")[0])
     assert "sha256" in text
@@ -108,8 +117,8 @@ def test_the_page_stands_alone_and_says_every_row(case, in_folder):
 def test_a_row_that_fails_ends_with_1(case, capsys):
     assert _verify(case(FAILING)) == 1
     out = capsys.readouterr().out
-    assert "1 FAIL" in out
-    assert "FAILS: toy, standard deviation: " in out
+    assert "1 FAILED" in out
+    assert "FAILED: toy, standard deviation: " in out
     assert "wanted at least 1000 N" in out
 
 
@@ -154,7 +163,7 @@ def test_a_run_that_fails_fails_its_case_and_the_next_goes_on(case, toy, in_fold
     first, second = _data(in_folder)["cases"]
     assert (first["passed"], second["passed"]) == (False, True)
     assert "rippel" in first["failures"]["run"]
-    assert {row["verdict"] for row in first["rows"]} == {"fails", "departs"}
+    assert {row["verdict"] for row in first["rows"]} == {"failed", "departs"}
 
 
 PAIR = """
@@ -179,7 +188,7 @@ def test_runs_are_made_once_and_told_apart_by_content(case, toy, in_folder):
     (in_folder / "copy.ssp" / "parameters.ssv").write_text(values.replace('value="140"', 'value="160"'))
     assert _verify(case(PAIR, "pair"), case(), "--quiet") == 0
     assert sorted(p.name for p in (in_folder / "v" / "runs").iterdir()) == ["copy", "toy"]
-    assert _data(in_folder)["cases"][0]["rows"][0]["verdict"] == "holds"
+    assert _data(in_folder)["cases"][0]["rows"][0]["verdict"] == "passed"
 
 
 def test_a_later_verification_runs_anew(case, toy, in_folder):

@@ -70,8 +70,8 @@ def test_droppers_beyond_the_tolerance_are_named(outcome, errors):
     assert np.array_equal(outcome.is_beyond[sure], (np.abs(errors) > 0.008)[sure])
     words = np.array(outcome.verdicts)
     assert set(words[[19, 20]]) == {"not measured"}
-    assert set(words[outcome.is_beyond & (errors > 0.0)]) == {"too long"}
-    assert set(words[outcome.is_beyond & (errors < 0.0)]) == {"too short"}
+    assert set(words[outcome.is_beyond & (errors > 0.0)]) == {"failed, too long"}
+    assert set(words[outcome.is_beyond & (errors < 0.0)]) == {"failed, too short"}
 
 
 def test_the_corrected_line_hangs_as_designed_within_a_step(outcome, design, errors):

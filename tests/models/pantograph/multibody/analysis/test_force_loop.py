@@ -123,7 +123,7 @@ def test_the_command_prints_it_and_judges_by_a_limit_that_is_given(tmp_path, cap
     said = capsys.readouterr().out
     assert "from 1." in said
     assert "moved up and down at 0.05 m/s" in said
-    assert "largest half difference 9.88 N at 4.520 m: within the limit of 10 N" in said
+    assert "largest half difference 9.88 N at 4.520 m: passed, limit 10 N" in said
     rows = np.loadtxt(tmp_path / "out" / "static_force_up_down.csv", delimiter=",", skiprows=1)
     assert rows[:, 4] == pytest.approx((178.45 * 0.5 + 108.39) * SPEED)
 

@@ -157,7 +157,7 @@ class CatenaryModel:
         def positions(interval: WireInterval) -> list[float]:
             return interval.positions(interval.local(state.motion)[0])
 
-        for p, strip in enumerate(strips):
+        for p, strip in enumerate(strips.tolist()):
             for s, wire in enumerate(self.wires):
                 found = wire.find(strip, positions, int(state.element[p, s]))
                 if found is None:

@@ -147,8 +147,7 @@ class LinearStep:
 
     def _press(self, point: WirePoint, force: float) -> None:
         """Add what a force does to the modes of its interval, the attachments held."""
-        response = point.response
-        self._modal[response.interval.modes] += force * point.modal * response.inverse
+        self._modal[point.response.interval.modes] += force * point.give
 
 
 _Chain = tuple[Multiplier, Multiplier]

@@ -236,7 +236,7 @@ def _pantograph_recipe(path: Path, title: str, adapter: tuple[str, str], is_own:
 def _own_recipe(path: Path, ports: int) -> Recipe:
     """Return how to make the FMU of a user's definition; its file name gives the FMU's."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise BuildError(f"{path} cannot be read ({said(error)})") from error
     except ValueError as error:
@@ -271,7 +271,7 @@ def _definitions(folder: str) -> list[Path]:
 def _head(path: Path) -> dict[str, str]:
     """Return the plain texts of a definition; a file that cannot be read passes here, as the build says why."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return {"type": "lumped"}
     return {key: value for key, value in data.items() if isinstance(value, str)}

@@ -270,7 +270,7 @@ def _definitions(folder: str) -> list[Path]:
 def _head(path: Path) -> dict[str, str]:
     """Return the plain texts of a definition; a file that cannot be read passes here, as the build says why."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return {"type": "lumped"}
     return {key: value for key, value in data.items() if isinstance(value, str)}

@@ -21,6 +21,9 @@ from master.system.step_rounding import ROUNDING
 AFTER_INTERVAL: Final = 0.5
 #: Parameters that lift a pantograph, in N or N.m.
 _LIFTS: Final = ("static_force", "static_moment")
+#: Heights of the strip, which lie between its stops; and these.
+_HEIGHTS: Final = ("start_height", "reference_height")
+_STOPS: Final = ("lowest_height", "highest_height")
 #: Parameters that say where a pantograph is at any time.
 _WAY: Final = ("start_position", "speed")
 
@@ -37,6 +40,31 @@ def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
         yield from _idle(pantograph)
         if not may_stop_early:
             yield from filter(None, [_uncovered(system, pantograph)])
+        if found := beyond_stops(pantograph):
+            yield found[1]
+
+
+def beyond_stops(pantograph: Component) -> tuple[str, str] | None:
+    """Return which height of the strip lies beyond its stops, and a sentence on it; None if none does.
+
+    Of a pantograph whose FMU has no parameters ``lowest_height`` and ``highest_height`` nothing is said: how far the
+    arms of a mechanism reach follows from all that they are made of, which only its FMU knows.
+    """
+    low, high = (parameter_value(pantograph, name) for name in _STOPS)
+    for name in _HEIGHTS:
+        value = parameter_value(pantograph, name)
+        if value is None:
+            continue
+        given = f"{pantograph.name}.{name} = {value:g} m is"
+        if low is not None and value < low:
+            return name, f"{given} below the lowest_height of {low:g} m{_between(low, high)}"
+        if high is not None and value > high:
+            return name, f"{given} above the highest_height of {high:g} m{_between(low, high)}"
+    return None
+
+
+def _between(low: float | None, high: float | None) -> str:
+    return "" if low is None or high is None else f": between its stops the strip goes from {low:g} to {high:g} m"
 
 
 def uncovered(system: System) -> str:

@@ -45,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     _check_written(arguments.out, design_path, arguments.measured)
     warn(doubts("lines", arguments.line))
     measured = read_measured_run(arguments.measured)
+    warn(measured.notes)
     allowed = Allowed(1e-3 * arguments.step, arguments.only, support_limits().shortest_dropper)
     with _progress(quiet=arguments.quiet) as tell:
         found = judge_as_built(definition, measured, 1e-3 * arguments.tolerance, allowed, tell)
@@ -72,7 +73,7 @@ def _print(line: str, found: AsBuiltOutcome) -> None:
 
 def write(folder: Path, found: AsBuiltOutcome, design_path: Path, source: str) -> None:
     """Write the definitions as built and as corrected, the running surface and the table."""
-    text, built = design_path.read_text(encoding="utf-8"), found.built
+    text, built = design_path.read_text(encoding="utf-8-sig"), found.built
     surface = "" if found.surface.is_even else SURFACE
     designed = built.design.unstrained_length
     where = f"openpanto asbuilt, from {source}".replace("\\", "/").replace('"', "'")

@@ -129,7 +129,7 @@ class Table:
         """
         name = str(path)
         try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
+            data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         except FileNotFoundError as error:
             text = "there is no such file; a definition of the library is called by its name, without .toml"
             raise DefinitionError([Problem(name, "", text)]) from error
@@ -452,12 +452,9 @@ def _two_numbers_advice(entry: Any) -> str:
 
 
 def _toml_advice(path: Path, error: str) -> str:
-    """Return advice if the file has a byte order mark, or the line with the mistake what looks like a decimal comma."""
-    text = path.read_text(encoding="utf-8")
-    if text.startswith("\ufeff"):
-        return "; the file begins with a byte order mark: save it as UTF-8 without one"
+    """Return advice if the line with the mistake has what looks like a decimal comma."""
     number = re.search(r"at line (\d+)", error)
-    line = text.splitlines()[int(number[1]) - 1] if number else ""
+    line = path.read_text(encoding="utf-8-sig").splitlines()[int(number[1]) - 1] if number else ""
     return f"; does '{line.strip()}' have a decimal comma? write a point" if re.search(r"\d,\d", line) else ""
 
 

@@ -83,7 +83,7 @@ def doubts(kind: Kind, name: str, folders: Iterable[Path]) -> list[str]:
 def named_otherwise(path: Path) -> str:
     """Return that a definition is named otherwise than its file, empty if not or if it cannot be read."""
     try:
-        name = tomllib.loads(path.read_text(encoding="utf-8")).get("name")
+        name = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("name")
     except (OSError, ValueError):
         return ""  # reading the definition says why
     if not isinstance(name, str) or name == path.stem:

@@ -152,7 +152,7 @@ def stored_request(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8")).get("sweep", {})
+        found = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("sweep", {})
     except (OSError, ValueError, RecursionError) as error:
         raise RequestError(f"{path} cannot be read: {error}") from error
     if not isinstance(found, dict):

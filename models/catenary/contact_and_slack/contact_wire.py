@@ -19,8 +19,8 @@ from models.catenary.contact_and_slack.crossing import Crossing, Strip, crossing
 from models.catenary.linear_motion.interval_modes import IntervalModes, IntervalMotion
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
+from models.catenary.shape.element_pattern import element_dofs
 from models.catenary.shape.form_finding import StaticState
-from models.catenary.shape.line_matrices import element_dofs
 from models.catenary.shape.line_mesh import Chain
 from models.catenary.shape.wire_intervals import Interval, turns
 

@@ -34,7 +34,7 @@ _Point = tuple[float, float]
 def named_profile(path: Path) -> Path | None:
     """Return the file that a line's definition has its running surface from; None if it names none, or is no TOML."""
     try:
-        surface = tomllib.loads(path.read_text(encoding="utf-8")).get("running_surface")
+        surface = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("running_surface")
     except (OSError, ValueError):
         return None
     name = surface.get("profile") if isinstance(surface, dict) else None

@@ -97,6 +97,26 @@ def test_the_interval_begins_no_earlier_than_the_pantograph(position, begins):
         assert f"'train' starts at {position} m, beyond the start of the interval of interest, 100 m" in found[0]
 
 
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"start_height": 4.4}, "train.start_height = 4.4 m is below the lowest_height of 4.5 m"),
+        ({"start_height": 6.3}, "train.start_height = 6.3 m is above the highest_height of 6.2 m"),
+        ({"highest_height": 5.0}, "train.reference_height = 5.02 m is above the highest_height of 5 m"),
+        ({"start_height": 4.5}, ""),
+    ],
+)
+def test_a_strip_starts_between_its_stops(values, said):
+    heights = {"start_height": "5", "reference_height": "5.02", "lowest_height": "4.5", "highest_height": "6.2"}
+    found = list(problems(system(pantograph(values=values, **heights))))
+    assert [text.partition(": between its stops the strip goes from 4.5 to ")[0] for text in found] == [said] * bool(
+        said
+    )
+    low = [n for n in heights if n != "lowest_height"]
+    (alone,) = problems(system(pantograph(values={"start_height": 7.0}, **{n: heights[n] for n in low})))
+    assert alone == "train.start_height = 7 m is above the highest_height of 6.2 m"
+
+
 def test_a_part_that_was_asked_for_may_end_early_but_not_be_idle():
     assert list(problems(system(stop=1.0), may_stop_early=True)) == []
     (found,) = problems(system(pantograph(static_force="0"), stop=1.0), may_stop_early=True)

@@ -59,9 +59,12 @@ def test_a_mistake_of_a_rule_is_reported_once_for_all_spans(tmp_path):
     assert problem.text.endswith("more like this)")
 
 
-def test_a_byte_order_mark_is_named(tmp_path):
-    (marked,) = mistakes(tmp_path, ("# LN2", "\ufeff# LN2"))
-    assert marked.text.endswith("; the file begins with a byte order mark: save it as UTF-8 without one")
+def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
+    file = tmp_path / "LN2.toml"
+    file.write_text(line_path("LN2").read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert load_line(str(file)) == load_line("LN2")
+    (marked,) = mistakes(tmp_path, ("# LN2", "\ufeff# LN2"), ("tension = [20000,", "tension = [20.0,5,,"))
+    assert "decimal comma" in marked.text
 
 
 def test_a_text_among_the_lengths_of_spans_is_named_and_nothing_that_follows_from_it(tmp_path):

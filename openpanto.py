@@ -32,7 +32,7 @@ import argparse
 import importlib
 import re
 import shlex
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -445,6 +445,7 @@ def _new(options: argparse.Namespace) -> int:
     from models.library import definition_facts as facts
     from models.library.catalogue import line_path, load_line, load_pantograph
 
+    _tell_doubts([("lines", options.line), *(("pantographs", name) for name in options.pantograph)])
     projects.check_folder(options.folder)
     check_speed(options.speed / 3.6)
     name, speed = projects.project_name(options.folder), options.speed / 3.6
@@ -501,6 +502,7 @@ def _copy(options: argparse.Namespace) -> int:
     from models.library import search_path as places
     from models.library.catalogue import load_line, load_pantograph
 
+    _tell_doubts([(options.kind, options.like)])
     load = load_line if options.kind == "lines" else load_pantograph
     path, text, _ = _original(options.kind, options.like, load)
     name, text = _renamed(path, text, options.name)
@@ -545,8 +547,15 @@ def _original(kind: Any, given: str, load: Callable[[str], Any]) -> tuple[Path, 
         return path, path.read_text(encoding="utf-8"), definition
     except (catalogue.UnknownNameError, DefinitionError) as error:
         raise RequestError(str(error)) from error
-    except UnicodeDecodeError as error:
-        raise RequestError(f"{given} is not a text file in UTF-8") from error
+
+
+def _tell_doubts(names: Iterable[tuple[Any, str]]) -> None:
+    """Print what deserves a second look about the definitions that are called by these names."""
+    from models.library.catalogue import doubts
+
+    found = [text for kind, name in names if not name.lower().endswith(".fmu") for text in doubts(kind, name)]
+    for text in dict.fromkeys(found):
+        print(f"note: {text}", file=sys.stderr)
 
 
 def _renamed(path: Path, text: str, name: str) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from master.arrays import BoolArray, FloatArray
-from master.errors import MasterError, one_line, said
+from master.errors import MasterError, not_utf8, one_line, said
 from master.evaluation.contact_signals import Signals
 from master.evaluation.filters import low_pass
 
@@ -163,7 +163,7 @@ def _rows(path: Path) -> list[_Row]:
     except OSError as error:
         raise MasterError(f"{path} cannot be read ({said(error)})") from error
     except UnicodeDecodeError as error:
-        raise MasterError(f"{path} is not UTF-8 text (byte {error.start})") from error
+        raise MasterError(f"{path} {not_utf8(error)}") from error
     except csv.Error as error:
         raise MasterError(f"{path} is not a table of separated values ({error})") from error
 

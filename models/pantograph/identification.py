@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from models.arrays import ComplexArray, FloatArray
-from models.definition_files.message_text import hint, said
+from models.definition_files.message_text import hint, not_utf8, said
 from models.definition_files.toml_reader import LARGEST, SMALLEST, DefinitionError, Problem
 from models.pantograph.lumped.lumped_rig import chain_stiffness
 
@@ -123,7 +123,7 @@ def _read_lines(path: Path) -> list[list[str]]:
     except OSError as error:
         raise DefinitionError([Problem(str(path), "", f"cannot be read ({said(error)})")]) from error
     except UnicodeDecodeError as error:
-        raise DefinitionError([Problem(str(path), "", f"is not UTF-8 text (byte {error.start})")]) from error
+        raise DefinitionError([Problem(str(path), "", not_utf8(error))]) from error
     except csv.Error as error:
         raise DefinitionError([Problem(str(path), "", f"is not a table with commas ({error})")]) from error
 

@@ -451,6 +451,16 @@ def test_what_cannot_be_meant_is_said_in_a_sentence(ask, kind, said):
     assert "\n" not in str(caught.value)
 
 
+def test_a_name_that_two_definitions_have_is_told(tmp_path, monkeypatch):
+    (tmp_path / "pantographs").mkdir()
+    copy = shutil.copy(ROOT / "models" / "library" / "pantographs" / "CX.toml", tmp_path / "pantographs")
+    monkeypatch.setenv("OPENPANTO_LIBRARY", str(tmp_path))
+    with pytest.warns(UserWarning, match="two definitions are named 'CX'") as told:
+        models.open_pantograph("CX")
+    assert str(copy) in str(told[0].message)
+    assert told[0].filename == __file__
+
+
 def test_statics_follow_the_tension():
     pytest.importorskip("pandas")
     line = models.open_line("LN2")

@@ -208,7 +208,7 @@ def fingerprint(lookup: Lookup, tell: Callable[[str], None] = lambda _: None) ->
         except subprocess.TimeoutExpired:
             return None
         if said.returncode != 0:
-            raise ValueError(f"cannot be built: {_last_line(said)}")
+            raise ValueError(f"cannot be built: {_reasons(said)}")
         answer, watched = _understood(said)
         keep_answer(question, answer, watched, asked)
     for note in answer.notes:
@@ -267,7 +267,7 @@ def build(path: Path, lookup: Lookup) -> None:
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"could not be built: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0 or not path.is_file():
-        raise ValueError(f"could not be built: {_last_line(answer).removeprefix(f'{path.stem} cannot be built: ')}")
+        raise ValueError(f"could not be built: {_reasons(answer).removeprefix(f'{path.stem} cannot be built: ')}")
 
 
 def write_runtime(folder: Path) -> None:
@@ -285,12 +285,15 @@ def write_runtime(folder: Path) -> None:
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"it could not be made: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0:
-        raise ValueError(_last_line(answer))
+        raise ValueError(_reasons(answer))
 
 
-def _last_line(answer: subprocess.CompletedProcess[str]) -> str:
+def _reasons(answer: subprocess.CompletedProcess[str]) -> str:
+    """Return why it failed, a line for each mistake of a definition; of what is no such error, the last line."""
     said = (answer.stderr.strip() or answer.stdout.strip()).splitlines()
-    return said[-1].removeprefix("error: ") if said else "the builder gave no reason"
+    begins = [number for number, line in enumerate(said) if line.startswith("error: ")]
+    reasons = said[begins[-1] :] if begins else said[-1:]
+    return "\n".join(reasons).removeprefix("error: ") or "the builder gave no reason"
 
 
 def _matches(fingerprint: str, guid: str) -> bool:

@@ -176,20 +176,26 @@ def _fmus(
             by_path[path] = _provide(path, replace(provision, build=may_build))
         fmu = by_path[path]
         if isinstance(fmu, str):
-            problems.append(_unprovided(c.name, source, c.line, fmu))
+            problems += _unprovided(c.name, source, c.line, fmu)
         else:
             found[c.name] = fmu
     return found
 
 
-def _unprovided(name: str, source: str, line: int, why: str) -> Problem:
-    """Return why a component has no FMU; a mistake in a definition is told with its place there first."""
-    found = re.fullmatch(r"(?:could not|cannot) be built: (?P<file>[^\n]*?\.toml): (?P<text>[^\n]+)", why)
-    if found is None:
-        return Problem(SSD_NAME, line, "fmu", f"component '{name}': {source} {why}")
-    at = re.search(r"\(at line (\d+),", found["text"])
-    text = f"{found['text']}; so {source} of component '{name}' ({SSD_NAME}:{line}) cannot be built"
-    return Problem(found["file"], int(at[1]) if at else 0, "definition", text)
+def _unprovided(name: str, source: str, line: int, why: str) -> list[Problem]:
+    """Return why a component has no FMU; each mistake in a definition is told with its place there first."""
+    first, *others = why.split("\n")
+    lines = [re.sub("^(could not|cannot) be built: ", "", first), *others]
+    found = [re.fullmatch(r"(?P<file>.*?\.toml): (?P<text>.+)", text) for text in lines]
+    if lines[0] == first or found[0] is None:
+        return [Problem(SSD_NAME, line, "fmu", f"component '{name}': {source} {why.replace(chr(10), '; ')}")]
+    problems, file = [], found[0]["file"]
+    for text, mistake in zip(lines, found, strict=True):
+        at = re.search(r"\(at line (\d+),", text)
+        file, text = (file, text) if mistake is None else (mistake["file"], mistake["text"])
+        problems.append(Problem(file, int(at[1]) if at else 0, "definition", text))
+    last = f"{problems[-1].text}; so {source} of component '{name}' ({SSD_NAME}:{line}) cannot be built"
+    return [*problems[:-1], replace(problems[-1], text=last)]
 
 
 @dataclass(frozen=True)

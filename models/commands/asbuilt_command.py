@@ -65,10 +65,11 @@ def run(arguments: argparse.Namespace) -> int:
 def _print(line: str, found: AsBuiltOutcome) -> None:
     print_table(f"{line} as built", ("quantity", "value"), as_built_tables.summary(found))
     if rows := as_built_tables.worst_rows(found, _PRINTED):
-        columns, *lines = ([row[k] for k in as_built_tables.PRINTED] for row in (as_built_tables.COLUMNS, *rows))
+        columns, *found_rows = ([row[k] for k in as_built_tables.PRINTED] for row in (as_built_tables.COLUMNS, *rows))
+        lines = [[cell.removeprefix("failed, ") for cell in row] for row in found_rows]  # as all of them have
         count = int(found.is_beyond.sum())
         which = f", the worst {len(rows)} of {count} ({DROPPERS} has all)" if len(rows) < count else ""
-        print_table(f"Droppers beyond the tolerance{which}", columns, lines)
+        print_table(f"Droppers that failed, beyond the tolerance{which}", columns, lines)
 
 
 def write(folder: Path, found: AsBuiltOutcome, design_path: Path, source: str) -> None:

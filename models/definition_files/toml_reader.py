@@ -19,10 +19,11 @@ import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from models.definition_files.message_text import hint, nearest, one_line, said, shown_value
+from models.definition_files.message_text import hint, nearest, not_utf8, one_line, said, shown_value
 from models.definition_files.si_units import shown, to_si
 
 #: Largest number of problems listed.
@@ -135,7 +136,7 @@ class Table:
         except OSError as error:
             raise DefinitionError([Problem(name, "", f"cannot be read ({said(error)})")]) from error
         except UnicodeDecodeError as error:
-            raise DefinitionError([Problem(name, "", f"is not UTF-8 text (byte {error.start})")]) from error
+            raise DefinitionError([Problem(name, "", not_utf8(error))]) from error
         except RecursionError as error:
             raise _too_deep(name) from error
         except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
@@ -182,6 +183,15 @@ class Table:
         """Return those of some keys with which a problem has been recorded."""
         found = {p.key for p in self._log.problems}
         return {name for name in names if self.key(name) in found}
+
+    def comma_advice(self, name: str) -> str:
+        """Return advice if a list of numbers looks as if one had a decimal comma, ``[45.0, 45,5, 49.5]``."""
+        entry = self._data.get(name)
+        values = entry[0] if isinstance(entry, list) and entry and isinstance(entry[0], list) else []
+        for a, b in pairwise(values):
+            if type(a) is int and type(b) is int and 0 < b < 10 <= a:
+                return f"; has '{a},{b}' a decimal comma? write {a}.{b}"
+        return ""
 
     def names(self) -> tuple[str, ...]:
         """Return the keys, in the order of the file."""
@@ -367,8 +377,8 @@ class Table:
         if not source.strip():
             self.problem(name, "names no source; where none states the value, write 'choice: why'")
         values = raw if many and isinstance(raw, list) else [raw]
-        if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
-            self.problem(name, f"{shown_value(raw)} is not a number")
+        if wrong := [v for v in values if not isinstance(v, (int, float)) or isinstance(v, bool)]:
+            self.problem(name, f"{shown_value(wrong[0])} is not a number{_text_advice(wrong[0])}")
             return None
         if self._has_absurd(name, values):
             return None
@@ -427,6 +437,12 @@ def _once(problems: Iterable[Problem]) -> list[Problem]:
         first if not others else dataclasses.replace(first, text=f"{first.text} (and {len(others)} more like this)")
         for first, *others in alike.values()
     ]
+
+
+def _text_advice(value: Any) -> str:
+    """Return advice if a number is written as a text, ``"22,5"``."""
+    number = value.strip().replace(",", ".") if isinstance(value, str) else ""
+    return f"; write {number}, without quotation marks" if re.fullmatch(r"[-+]?\d+(\.\d*)?", number) else ""
 
 
 def _two_numbers_advice(entry: Any) -> str:

@@ -90,6 +90,6 @@ def penetration(share: float, height: float, rate: float, strip: Strip, gap: flo
     gap : float
         Between the axes of a wire and of a strip that touch [m].
     """
-    (*_, z_a), (*_, v_a) = strip[0]
-    (*_, z_b), (*_, v_b) = strip[1]
+    (a, a_rate), (b, b_rate) = strip
+    z_a, v_a, z_b, v_b = a[2], a_rate[2], b[2], b_rate[2]
     return z_a + share * (z_b - z_a) - (height - gap), v_a + share * (v_b - v_a) - rate

@@ -197,16 +197,9 @@ class LocalProblem:
 
     def _slackens(self, free_force: FloatArray, point: WirePoint, force: float) -> bool:
         """Return whether any dropper is slack under a force on one point."""
-        columns = point.response.columns
-        change = columns.dropper_force.dot(force * point.load)
-        near = free_force.take(columns.dropper_index) + change
-        if near.min(initial=0.0) < 0.0:
-            return True
-        if free_force.min(initial=0.0) >= 0.0:
-            return False
-        pull = free_force.copy()  # one that would be slack without the force may be near
-        pull[columns.dropper_index] = near
-        return bool(pull.min() < 0.0)
+        columns, pull = point.response.columns, free_force.copy()
+        pull[columns.dropper_index] += columns.dropper_force.dot(force * point.load)
+        return bool(pull.min(initial=0.0) < 0.0)
 
 
 class _Effects:

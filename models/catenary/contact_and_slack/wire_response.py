@@ -40,9 +40,8 @@ class IntervalResponse:
         """Return a point of an element of the wire; ``xi`` is the share of the way along the element."""
         row, height = self.interval.lift(element, xi)
         modal, ends = self.interval.split(row)
-        load = ends - modal.dot(self.yielding)
-        own = modal.dot(modal * self.inverse)
-        return WirePoint(self, row, height, load, float(load.dot(self.at_ends.dot(load)) + own))
+        load, give = ends - modal.dot(self.yielding), modal * self.inverse
+        return WirePoint(self, row, height, load, give, float(load.dot(self.at_ends.dot(load)) + modal.dot(give)))
 
     def advance(self, local: FloatArray, change: FloatArray, a1: float) -> FloatArray:
         """Let local coordinates follow their attachments to the end of a step; return them and their rates.
@@ -84,6 +83,8 @@ class WirePoint(NamedTuple):
         Static height [m].
     load : ndarray, shape (e,)
         What a unit vertical force on it does to the attachments, directly and through the modes.
+    give : ndarray, shape (n_span,)
+        How far it moves the modes within a step, the attachments held.
     compliance : float
         How far it gives way to such a force within a step [m/N].
     """
@@ -92,12 +93,8 @@ class WirePoint(NamedTuple):
     row: FloatArray
     height: float
     load: FloatArray
+    give: FloatArray
     compliance: float
-
-    @property
-    def modal(self) -> FloatArray:
-        """Return what a unit vertical force on it does to the modes of its interval, shape (n_span,)."""
-        return self.row[: self.response.interval.count]
 
     def moved_by(self, other: WirePoint) -> float:
         """Return how far the wire is moved here by a unit force at another point [m/N]."""
@@ -106,5 +103,5 @@ class WirePoint(NamedTuple):
         here, there = self.response, other.response
         moved = float(self.load @ (there.columns.at(here.interval.ends) @ other.load))
         if here.interval.modes == there.interval.modes:
-            moved += float(self.modal @ (other.modal * here.inverse))
+            moved += float(here.interval.split(self.row)[0] @ other.give)
         return moved

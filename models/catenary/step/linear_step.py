@@ -147,8 +147,7 @@ class LinearStep:
 
     def _press(self, point: WirePoint, force: float) -> None:
         """Add what a force does to the modes of its interval, the attachments held."""
-        response = point.response
-        self._modal[response.interval.modes] += force * point.modal * response.inverse
+        self._modal[point.response.interval.modes] += force * point.give
 
 
 _Chain = tuple[Multiplier, Multiplier]
@@ -171,20 +170,17 @@ def _products(modes: IntervalModes, coupling: sp.csr_matrix) -> tuple[_Chain, _C
 def _by_blocks(modes: IntervalModes, coupling: sp.csr_matrix) -> tuple[sp.bsr_matrix, sp.csr_matrix] | None:
     """Return mu G by dense blocks and the turn to its ends, renumbered; None if intervals are of several sizes.
 
-    Every end belongs to one block of modes; a block with more than six of them takes several columns of blocks.
+    Every end belongs to one block of modes. Behind the ends of each block zeros fill its last column of blocks up.
     """
-    sizes = {block.modes.shape[1] for block in modes.blocks}
-    if len(sizes) != 1:
+    if len(modes.blocks) != 1:
         return None
-    size = sizes.pop()
+    size = modes.blocks[0].modes.shape[1]
     entries = coupling.tocoo()
     owner = np.zeros(coupling.shape[1], dtype=np.int64)
-    owner[entries.col] = entries.row // size
-    order = np.argsort(owner, kind="stable")
-    count = np.bincount(owner, minlength=coupling.shape[0] // size)
-    begin = np.cumsum(np.concatenate([[0], -(-count // _ENDS_IN_PLANE) * _ENDS_IN_PLANE]))
-    place = np.empty_like(order)
-    place[order] = begin[owner[order]] + np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-    ones, before = np.ones(len(place)), np.arange(len(place))
-    renumbered = sp.csr_matrix((ones, (place, before)), shape=(int(begin[-1]), len(place)))
+    owner[entries.col] = entries.row // size  # ends are numbered block by block
+    gaps = -np.bincount(owner, minlength=coupling.shape[0] // size) % _ENDS_IN_PLANE
+    before = np.arange(len(owner))
+    place = before + (np.cumsum(gaps) - gaps)[owner]
+    shape = len(owner) + int(gaps.sum()), len(owner)
+    renumbered = sp.csr_matrix((np.ones(len(owner)), (place, before)), shape=shape)
     return (coupling @ renumbered.T).tobsr((size, _ENDS_IN_PLANE)), (renumbered @ modes.turn).tocsr()

@@ -19,8 +19,9 @@ from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.step.linear_step import LinearStep
 from models.catenary.step.step_engine import GivenForce, SteppedLine
 
-#: No forces on the contact wires; no strips.
-_NOWHERE, _NOTHING, _NO_STRIPS = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros(0)
+_NO_STRIPS = np.zeros(0)
+#: Where a force acts, its section, element and xi; the point of the wire there; the force at the end of the step [N].
+_Placed = tuple[tuple[int, int, float], WirePoint, float]
 
 
 class PlainStep:
@@ -63,8 +64,9 @@ class PlainStep:
         # One that was closed stays among the contacts: other forces of the step may keep it so.
         contacts = [c for c in candidates if c.penetration > 0.0 or c.impact_velocity > 0.0]
         found = self._local.solve(pull, contacts, motion.compliance, state.slack)
-        places = [(c.section, c.crossing.element, c.crossing.xi) for c in contacts]
-        self._finish(state, places, [c.point for c in contacts], found.contact, found)
+        acting = zip(contacts, found.contact, strict=True)
+        placed = [((c.section, c.crossing.element, c.crossing.xi), c.point, force) for c, force in acting]
+        self._finish(state, placed, found)
         result = empty_result(*state.element.shape)
         state.impact_velocity[...] = 0.0
         for contact, force, velocity, closed in zip(contacts, *found[:3], strict=True):
@@ -72,23 +74,22 @@ class PlainStep:
             result.force[p, s] = force
             if closed:
                 state.impact_velocity[p, s] = contact.impact_velocity or max(velocity, 1e-6)
-        for p, s, crossing, point, *_ in candidates:
-            interval = point.response.interval
-            local = interval.local(state.motion)[0]
-            result.point[p, s] = *interval.at(crossing, local), point.height + point.row.dot(local)
+        for candidate in candidates:
+            self._place(candidate, state, result)
         put_in_lap(self._line.wires, result.point, motion.strip)
         return result
 
     def push(self, state: CatenaryState, forces: Sequence[GivenForce]) -> None:
         """Advance the line by one step under forces that are given at its end; see `StepEngine`."""
         pull = self._begin(state)
-        places = [(s, *self._line.wires[s].locate(x)) for s, x, _ in forces]
-        points, values = [self._point(*place) for place in places], [force for _, _, force in forces]
-        for point, force in zip(points, values, strict=True):
+        placed: list[_Placed] = []
+        for s, x, force in forces:
+            place = s, *self._line.wires[s].locate(x)
+            point = self._point(*place)
             columns = point.response.columns
             pull[columns.dropper_index] += columns.dropper_force.dot(force * point.load)
-        found = self._local.solve(pull, (), _NO_STRIPS, state.slack)
-        self._finish(state, places, points, values, found)
+            placed.append((place, point, force))
+        self._finish(state, placed, self._local.solve(pull, (), _NO_STRIPS, state.slack))
 
     def _begin(self, state: CatenaryState) -> FloatArray:
         """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N]."""
@@ -126,32 +127,31 @@ class PlainStep:
                 self._responses.prepare(wire.next_interval(crossing.element))
         return candidates
 
-    def _finish(
-        self,
-        state: CatenaryState,
-        places: Sequence[tuple[int, int, float]],
-        points: Sequence[WirePoint],
-        forces: Sequence[float],
-        found: LocalForces,
-    ) -> None:
-        """Let forces on points of wires and those that slack droppers lack act in the step, and finish it.
+    def _finish(self, state: CatenaryState, placed: Sequence[_Placed], found: LocalForces) -> None:
+        """Let forces on wires, and those that slack droppers lack, act in the step; finish it.
 
-        All of them are recorded, at their places (section, element, xi): the next step begins with them.
+        All of them are recorded: the next step begins with them.
         """
-        for point, force in zip(points, forces, strict=True):
+        for _, point, force in placed:
             if force != 0.0:
                 self.linear.apply(point, force)
         for j, compensation in zip(found.slack.tolist(), found.compensation.tolist(), strict=True):
             column = self._local.dropper_columns[j]
             self.linear.attached[column.rows] -= compensation * column.values[:, 0]
         self.linear.finish(state.motion)
-        self._points = dict(zip(places, points, strict=True))
+        self._points = {place: point for place, point, _ in placed}
         state.slack, state.compensation = found.slack, found.compensation
-        state.loaded, state.load = _NOWHERE, _NOTHING
-        if places:
-            state.loaded = np.array([(s, element) for s, element, _ in places])
-            state.load = np.array([(xi, force) for (_, _, xi), force in zip(places, forces, strict=True)])
+        state.loaded = np.array([place[:2] for place, _, _ in placed], dtype=np.int64).reshape(-1, 2)
+        state.load = np.array([(xi, force) for (_, _, xi), _, force in placed]).reshape(-1, 2)
 
     def _point(self, section: int, element: int, xi: float) -> WirePoint:
         """Return a point of a wire."""
         return self._responses.of(self._line.wires[section].interval(element)).point(element, xi)
+
+    @staticmethod
+    def _place(candidate: ContactCandidate, state: CatenaryState, result: ContactResult) -> None:
+        """Write down where a strip meets a wire at the end of the step."""
+        p, s, crossing, point, *_ = candidate
+        interval = point.response.interval
+        local = interval.local(state.motion)[0]
+        result.point[p, s] = *interval.at(crossing, local), point.height + point.row.dot(local)

@@ -76,8 +76,8 @@ def test_a_changed_file_makes_its_fmu_stale(own, tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("none.toml", None, "cannot be read (there is no such file or folder: check the name)"),
-        ("broken.toml", "type = ", "is not a TOML file"),
+        ("none.toml", None, "there is no such file; a definition of the library is called by its name"),
+        ("broken.toml", "type = ", "is not TOML: "),
         ("other.toml", 'type = "boat"', "defines neither a line"),
         ("two words.toml", 'type = "lumped"', "may hold letters, digits and _ only"),
         ("b\u00fcgel.toml", 'type = "lumped"', "may hold letters, digits and _ only"),

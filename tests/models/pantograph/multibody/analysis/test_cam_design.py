@@ -280,7 +280,9 @@ def test_a_curve_holds_its_ends_and_goes_through_its_points():
 
 def test_a_force_from_outside_becomes_the_moment_that_carries_it():
     """With the arm at the same angle, a moment more by what 30 N on the strip need: it rises by 2.34 m per rad."""
-    part = MultibodyPantographPart(library("generic_multibody"))
+    data = library_data("generic_multibody")
+    data["force"]["arm_stops"] = library_data("generic_multibody_cam")["force"]["arm_stops"]
+    part = MultibodyPantographPart(mechanism_from(data))
     part.initialise(0.0, 157.5, np.zeros(3), np.zeros(2), Drive(uplift=30.0))
     mechanism, reference = part._built.mechanism, part._built.reference
     place = mechanism.forces.lift_place

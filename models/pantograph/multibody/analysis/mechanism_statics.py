@@ -10,9 +10,16 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.pantograph.multibody.analysis.linearisation import stiffness
-from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_assembly import assemble, check_strip, coordinate, null_space, project
+from models.pantograph.multibody.analysis.linearisation import balancing_multipliers, stiffness_under
+from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError, Placed
+from models.pantograph.multibody.mechanism_assembly import (
+    assemble,
+    check_strip,
+    coordinate,
+    free_motions,
+    null_space,
+    project,
+)
 
 _ITERATIONS: Final = 60
 #: Largest change of height from one solution to the next on the way to a distant one [m].
@@ -263,14 +270,17 @@ def _solve(
     """
     scale = float(np.abs(mechanism.mass).sum() * mechanism.definition.gravity) or 1.0
     for _ in range(_ITERATIONS):
-        basis = null_space(mechanism, y)
-        load = _reduced(mechanism, y, inputs_of(unknown), basis)
-        by_unknown = _reduced(mechanism, y, inputs_of(unknown + 1.0), basis) - load
+        placed = mechanism.placed(y)
+        basis = free_motions(mechanism, placed.scaled)
+        loads = _scaled_loads(mechanism, y, inputs_of(unknown), placed)
+        load = basis.T @ loads
         gap = condition(y)
         if np.abs(load).max() <= _BALANCED * scale and abs(gap) <= 1e-12:
             return y, unknown
+        by_unknown = basis.T @ _scaled_loads(mechanism, y, inputs_of(unknown + 1.0), placed) - load
         slope = _slope(mechanism, y, basis, condition)
-        K = stiffness(mechanism, y, inputs_of(unknown), basis)
+        multipliers = balancing_multipliers(placed.scaled, loads)
+        K = stiffness_under(mechanism, y, inputs_of(unknown), basis, multipliers)
         system = np.block([[K, -by_unknown[:, None]], [slope[None, :], np.zeros((1, 1))]])
         step = np.linalg.lstsq(system, np.append(load, -gap), rcond=1e-13)[0]
         shifts, turns = mechanism.unscaled(basis @ step[:-1])
@@ -284,12 +294,10 @@ def _solve(
     )
 
 
-def _reduced(mechanism: Mechanism, y: FloatArray, inputs: Inputs, basis: FloatArray) -> FloatArray:
-    """Return the loads' components along the basis, shape (d,)."""
-    kinematics = mechanism.kinematics(y)
-    loads = mechanism.loads(y, kinematics, inputs)
-    reduced: FloatArray = basis.T @ (loads[:, None, :] @ mechanism.roots(kinematics.frames)).ravel()
-    return reduced
+def _scaled_loads(mechanism: Mechanism, y: FloatArray, inputs: Inputs, placed: Placed) -> FloatArray:
+    """Return the applied loads in scaled coordinates, shape (6 n,)."""
+    loads = mechanism.loads(y, placed.kinematics, inputs, placed.vectors)
+    return (loads[:, None, :] @ placed.roots).ravel()
 
 
 def _slope(mechanism: Mechanism, y: FloatArray, basis: FloatArray, condition: Condition) -> FloatArray:

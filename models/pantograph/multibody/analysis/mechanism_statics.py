@@ -21,7 +21,8 @@ from models.pantograph.multibody.mechanism_assembly import (
     project,
 )
 
-_ITERATIONS: Final = 60
+#: Of Newton's method, after which there is held to be no equilibrium.
+ITERATIONS: Final = 60
 #: Largest change of height from one solution to the next on the way to a distant one [m].
 _STAGE: Final = 0.05
 #: Degrees of freedom of a pantograph that is one: raise, heave and roll of the head.
@@ -102,8 +103,9 @@ def equilibrium(
 
 
 def equilibrium_where(
-    mechanism: Mechanism, condition: Condition, start: FloatArray, *, contact_force: float = 0.0, lift: float = 0.0
-) -> Equilibrium:
+    mechanism: Mechanism, condition: Condition, start: FloatArray, *, contact_force: float = 0.0, lift: float = 0.0,
+    iterations: int = ITERATIONS,
+) -> Equilibrium:  # fmt: skip
     """Find the lifting value that balances the mechanism where a condition on its configuration holds.
 
     Parameters
@@ -114,12 +116,19 @@ def equilibrium_where(
         A state nearby.
     lift : float
         The lifting value to begin with [N or N.m].
+    iterations : int
+        After how many there is held to be none.
+
+    Raises
+    ------
+    MechanismError
+        If there is none.
     """
 
     def inputs(value: float) -> Inputs:
         return Inputs(lift=value, force=contact_force)
 
-    y, lift = _solve(mechanism, start, inputs, lift, condition)
+    y, lift = _solve(mechanism, start, inputs, lift, condition, iterations)
     return Equilibrium(y, inputs(lift), mechanism.strip_height(y))
 
 
@@ -263,13 +272,14 @@ def _solve(
     inputs_of: Callable[[float], Inputs],
     unknown: float,
     condition: Condition,
+    iterations: int = ITERATIONS,
 ) -> tuple[FloatArray, float]:
     """Solve by Newton's method for the configuration and one unknown input, in the motions that the joints allow.
 
     The loads are linear in the unknown; each step is limited so that bodies turn and move by little.
     """
     scale = float(np.abs(mechanism.mass).sum() * mechanism.definition.gravity) or 1.0
-    for _ in range(_ITERATIONS):
+    for _ in range(iterations):
         placed = mechanism.placed(y)
         basis = free_motions(mechanism, placed.scaled)
         loads = _scaled_loads(mechanism, y, inputs_of(unknown), placed)

@@ -51,6 +51,10 @@ class AttachmentLanes:
 
     Attributes
     ----------
+    slots : ndarray of int, shape (n,)
+        Where the displacements are in an array in lanes.
+    size : int
+        Of such an array.
     arrays, work : Lanes, LanesWork
         See `models.catenary.step.attachment_kernels`.
     """
@@ -75,29 +79,31 @@ class AttachmentLanes:
         self._before[: self._count] = (np.arange(self._count) - 1) % self._count
         widths, factor, middle, shifts = self._factorised(entries)
         rows, targets, values, beyond = self._products(*products)
-        slot = self._row * self._lanes + self._lane
-        order = np.argsort(slot)
-        whole = [order, slot[order], rows, targets]
+        self.slots = self._row * self._lanes + self._lane
         size = [self._inner, self._border, width, beyond]
         neighbours = self._before, np.argsort(self._before)
         self.arrays = kernels.Lanes(
-            *(part.astype(np.uint32) for part in whole),
+            *(part.astype(np.uint32) for part in (self.slots, rows, targets)),
             aligned(values),
             widths.astype(np.uint64),
             aligned(factor),
             aligned(middle),
             *(np.asarray(part, dtype=np.uint64) for part in (shifts, *neighbours, size)),
         )
-        rows_of_work = self._length + max(beyond, width)
-        self.work = kernels.LanesWork(
-            *(aligned(np.zeros(k * self._lanes)) for k in (*3 * [rows_of_work], 2 * self._border, self._border))
-        )
+        self.size = (self._length + max(beyond, width)) * self._lanes
+        self.work = kernels.LanesWork(*(aligned(np.zeros(k * self._border * self._lanes)) for k in (2, 1)))
+
+    def laid_out(self, values: FloatArray) -> FloatArray:
+        """Return values for the displacements, shape (n,), as an array in lanes."""
+        result = np.zeros(self.size)
+        result[self.slots] = values
+        return aligned(result)
 
     def solve(self, load: FloatArray) -> FloatArray:
         """Return the solution for a load of shape (n,)."""
-        change = np.empty(len(load))
-        self._kernels.respond(self.arrays, load, self.work, change)
-        return change
+        solution = self.laid_out(load)
+        self._kernels.solve(self.arrays, self.work, solution)
+        return solution[self.slots]
 
     def near(self, first: int, load: FloatArray) -> tuple[int, FloatArray]:
         """Return solutions for loads of shape (k, m) on the rows from ``first``, where they are not zero: see `Factor`.

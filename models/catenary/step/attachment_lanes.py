@@ -154,7 +154,7 @@ class AttachmentLanes:
             follow = dtbtrs(whole[:, :inner], coupling[k, :inner], uplo="L")[0] if inner else coupling[k, :0]
             factor[:, 0, k] = 1.0 / whole[0, :inner]
             factor[:, 1 : width + 1, k], factor[:, width + 1 :, k] = whole[1:, :inner].T, follow
-            own = _dense(whole, inner)
+            own = sp.dia_matrix((whole, -np.arange(width + 1)), shape=2 * (self._length,)).tocsr()[inner:].toarray()
             rest[k, :, k] += own[:, inner - self._length :] @ own[:, inner - self._length :].T
             rest[before, :, before] -= follow.T @ follow
             across = coupling[k, inner:] - own[:, :inner] @ follow
@@ -198,23 +198,10 @@ def _ends(entries: sp.coo_matrix, count: int, width: int, is_ring: bool) -> tupl
     near = np.abs(entries.row - entries.col) <= width
     reach = np.arange(n)
     np.maximum.at(reach, entries.row[near], entries.col[near])
-    first = np.arange(n + 1)
-    for row, last in enumerate(reach.tolist()):
-        first[row + 1 : last + 1] = np.minimum(first[row + 1 : last + 1], row)
-    needed = np.arange(n + 1) - first
+    needed = np.arange(n + 1) - np.searchsorted(np.maximum.accumulate(reach), np.arange(n + 1))
     ends, play = [], min(_PLAY, (n // count - width - 1) // 2)
     for k in range(1, count):
         share = k * n // count
         near_share = np.arange(share - play, share + play + 1)
         ends.append(int(near_share[np.lexsort((np.abs(near_share - share), needed[near_share]))[0]]))
     return np.array([*ends, n]), max([1, *needed[ends].tolist(), *([width] if is_ring else [])])
-
-
-def _dense(factor: FloatArray, first: int) -> FloatArray:
-    """Return the rows of a band factor from ``first`` on, shape (n - first, n)."""
-    size, width = factor.shape[1], factor.shape[0] - 1
-    result = np.zeros((size - first, size))
-    for row in range(first, size):
-        columns = np.arange(max(row - width, 0), row + 1)
-        result[row - first, columns] = factor[row - columns, columns]
-    return result

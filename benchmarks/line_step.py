@@ -65,7 +65,7 @@ def parts(model: CatenaryModel) -> Parts:
         return {**compiled, **pantograph, "rest of the line": (CatenaryModel, ("step",))}
     return {
         "products": (linear_step.LinearStep, ("begin", "finish")),
-        "band solution": (linear_step.LinearStep, ("solve",)),
+        "band solution": (type(engine.linear.matrices.factor), ("solve",)),
         "finding the contact": (PlainStep, ("_candidates",)),
         "contact force and slack droppers": (local_problem.LocalProblem, ("solve",)),
         **pantograph,

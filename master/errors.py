@@ -52,6 +52,21 @@ def said(error: OSError) -> str:
     return _SAID.get(error.errno or 0) or error.strerror or str(error)
 
 
+def not_utf8(error: UnicodeDecodeError) -> str:
+    r"""Return what is wrong with a file that is not text as it should be, and what to do.
+
+    Examples
+    --------
+    >>> try:
+    ...     b"Kettenwerk\nH\xf6he\n".decode()
+    ... except UnicodeDecodeError as error:
+    ...     print(not_utf8(error))
+    is not UTF-8 text (line 2): save it as UTF-8
+    """
+    line = error.object[: error.start].count(b"\n") + 1
+    return f"is not UTF-8 text (line {line}): save it as UTF-8"
+
+
 def hint(name: str, known: Iterable[str], most: int = 1) -> str:
     """Return the question whether a known name was meant, empty if none is near: one that is very near, or the nearest.
 

@@ -24,7 +24,7 @@ PACKAGES = ("models", "fmus", "master")
 #: The rooms (folders, or files that stand for one) of each folder that is laid out in tiers, from the ground up.
 TIERS: dict[str, list[set[str]]] = {
     "models": [
-        {"arrays"},
+        {"arrays", "scipy_start"},
         {"definition_files", "numerics", "contact_law"},
         {"catenary", "pantograph", "signals"},
         {"library", "coupled"},

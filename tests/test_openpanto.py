@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 
@@ -75,7 +74,7 @@ def test_examples_of_every_verb_are_in_its_help_and_understood(verb):
     parser = command_line([verb])
     text = parser._subparsers._group_actions[0].choices[verb].format_help()
     for example in VERBS[verb].examples:
-        assert f"\n  openpanto {example}\n" in text
+        assert f"\n  openpanto {example}\n" in text.replace(" \\\n      ", " ")
         assert example.startswith(verb)
         parser.parse_args(shlex.split(example))
 
@@ -95,7 +94,11 @@ def test_version_and_help_import_nothing_that_takes_time(asked):
     ("line", "said"),
     [
         (["rnu", "x"], "there is no verb 'rnu'; did you mean 'run'?"),
-        (["quux"], "there is no verb 'quux'"),
+        (["quux"], "there is no verb 'quux'; openpanto --help lists them"),
+        (["version"], "there is no verb 'version'; it is an option: openpanto --version"),
+        (["--verson"], "unrecognized arguments: --verson; did you mean '--version'?"),
+        (["-v"], "openpanto: error: unrecognized arguments: -v"),
+        (["new", "x", "--pantograf", "CX"], "unrecognized arguments: --pantograf; did you mean '--pantograph'?"),
         (["cx_ln2"], "there is no verb 'cx_ln2'; to run a scenario: openpanto run cx_ln2"),
         (["cx_ln2.ssp"], "there is no verb 'cx_ln2.ssp'; to run a scenario: openpanto run cx_ln2.ssp"),
         (["run", "x", "--sheme", "jacobi"], "unrecognized arguments: --sheme jacobi; did you mean '--scheme'?"),
@@ -107,6 +110,35 @@ def test_a_mistyped_word_is_told_with_what_it_may_have_been(line, said, capsys):
         openpanto._worked(line)
     assert end.value.code == 2
     assert capsys.readouterr().err.endswith(f"{said}\n")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_fits_a_terminal_of_80_columns(verb, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    text = openpanto._verbs(command_line([verb]))[verb].format_help()
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def started(tmp_path, **files):
+    """Return what the command says with files in a folder that PYTHONPATH names."""
+    for name, text in files.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    code = "import sys\nfrom openpanto import main\nsys.exit(main(['statics', 'NONE']))"
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    command = [sys.executable, "-P", "-c", code]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": path}
+    )
+    assert done.returncode == 1
+    (sentence,) = done.stderr.splitlines()
+    return sentence
+
+
+@pytest.mark.parametrize("name", ["models", "rich"])
+def test_a_foreign_package_by_pythonpath_is_one_sentence(tmp_path, name):
+    said = started(tmp_path, **{name: "x = 1"})
+    assert said.startswith(f"error: {tmp_path / name}.py ")
+    assert said.endswith(": take its folder out of PYTHONPATH")
 
 
 def test_the_packages_that_nothing_works_without_are_those_of_pyproject():
@@ -132,7 +164,7 @@ def test_doctor_names_versions_and_what_is_there(call):
     ids=lambda line: line[0],
 )
 def test_foreign_files_and_packages_in_the_working_folder_change_nothing(line, foreign, call):
-    done = call(*line)
+    done = call(*line, env={**os.environ, "OPENPANTO_KERNEL": "numpy"})
     assert (done.returncode, "FOREIGN" in done.stdout + done.stderr) == (0, False), done.stderr
 
 
@@ -211,16 +243,30 @@ def test_an_interrupt_that_an_import_makes_another_error_of_is_one_sentence(tmp_
     assert (done.returncode, done.stdout, done.stderr) == (1, "", "error: interrupted\n")
 
 
+#: Sends a signal to the command, as a terminal would, in its hundredth step.
+AT_STEP = """
+import os, signal, sys
+from models.catenary.line_model import CatenaryModel
+first, step, made = os.getpid(), CatenaryModel.step, []
+def stepped(*arguments):
+    made.append(None)
+    if len(made) == 100:
+        os.kill(first, signal.SIGINT)
+    return step(*arguments)
+CatenaryModel.step = stepped
+"""
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
-def test_an_interrupt_of_the_physics_is_one_sentence(script, tmp_path):
-    line = ["couple", "LN2", "CX", "--speed", "5", "--quiet"]  # takes minutes
-    process = subprocess.Popen(
-        [sys.executable, script, *line], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+def test_an_interrupt_of_the_physics_is_one_sentence(tmp_path):
+    path = tmp_path / "openpanto"
+    path.write_text(AT_STEP + SCRIPT)
+    line = ["couple", "EN50318_2002", "CX", "--speed", "5", "--quiet"]  # takes minutes
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENPANTO_KERNEL": "numpy"}
+    done = subprocess.run(
+        [sys.executable, "-P", path, *line], env=environment, capture_output=True, check=False, timeout=60
     )
-    time.sleep(2.0)
-    process.send_signal(signal.SIGINT)
-    out, said = process.communicate(timeout=60)
-    assert (process.returncode, out, said) == (1, b"", b"error: interrupted\n")
+    assert (done.returncode, done.stdout, done.stderr) == (1, b"", b"error: interrupted\n")
 
 
 #: The last word of a command line as bash completes it.

@@ -168,16 +168,20 @@ def test_statics_of_a_name_that_two_definitions_have_says_which_is_used(call, tm
     code, _, said = call("statics mine")
     assert code == 0
     assert "two definitions are named 'mine'" in said
+    for line in ("new demo --line mine --pantograph CX --speed 160", "new-line copy --like mine"):
+        assert "two definitions are named 'mine'" in call(line)[2]
 
 
 def test_a_definition_that_does_not_build_is_answered_once(call, tmp_path):
     call("new demo --line LN2 --pantograph CX --speed 200")
     path = tmp_path / "demo" / "lines" / "demo_LN2.toml"
-    path.write_text(path.read_text().replace('20000, "N"', '20000, "kN"'))
+    path.write_text(path.read_text().replace('20000, "N"', '20000, "kN"').replace("45.5, 45.0", "455, 45.0"))
     code, _, said = call("validate demo")
     assert code == 1
     assert f"error: {path}: contact_wire.tension" in said
-    assert re.search(r"contact_wire\.tension.*; so resources/Catenary_demo_LN2\.fmu of component 'catenary' ", said)
+    assert f"\n{path}: spans.lengths: 455 m is outside" in said
+    assert re.search(r"spans\.end: .*; so resources/Catenary_demo_LN2\.fmu of component 'catenary' ", said)
+    assert said.count("; so resources/") == 1
 
 
 def test_a_dc_project_is_judged_and_calibrated_by_its_limits(call, tmp_path):

@@ -255,7 +255,7 @@ def _description(root: Element) -> bytes:
 
 
 def _page(wanted: Recipe, sources: FmuSources, slave: Any) -> bytes:
-    definition = sources.definition.decode("utf-8")
+    definition = sources.definition.decode("utf-8-sig")
     said = About(wanted.name, wanted.title, sources.fingerprint, slave.models, slave.limits, definition)
     return page(said, slave.table, slave.parameters)
 

@@ -17,6 +17,7 @@ from fmus.loader.loader_build import sources
 from fmus.loader.pythonfmu_repair import repaired
 from models.catenary.definition.surface_reading import CARRIED, named_profile
 from models.definition_files.message_text import hint, said
+from models.definition_files.toml_reader import DefinitionError, Table
 from models.library import search_path
 from models.library.search_path import Kind, definition_files
 
@@ -236,11 +237,9 @@ def _pantograph_recipe(path: Path, title: str, adapter: tuple[str, str], is_own:
 def _own_recipe(path: Path, ports: int) -> Recipe:
     """Return how to make the FMU of a user's definition; its file name gives the FMU's."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BuildError(f"{path} cannot be read ({said(error)})") from error
-    except ValueError as error:
-        raise BuildError(f"{path} is not a TOML file ({error})") from error
+        data = Table.load(path).data
+    except DefinitionError as error:
+        raise BuildError(str(error)) from error
     if not (path.stem.isascii() and path.stem.replace("_", "a").isalnum()):
         raise BuildError(f"{path}: the FMU gets the file's name, which may hold letters, digits and _ only")
     title, kind = (text if isinstance(text := data.get(key), str) else "" for key in ("title", "type"))
@@ -271,7 +270,7 @@ def _definitions(folder: str) -> list[Path]:
 def _head(path: Path) -> dict[str, str]:
     """Return the plain texts of a definition; a file that cannot be read passes here, as the build says why."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return {"type": "lumped"}
     return {key: value for key, value in data.items() if isinstance(value, str)}

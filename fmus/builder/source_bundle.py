@@ -123,6 +123,8 @@ def _rewritten(module: Module, roots: frozenset[str]) -> str:
 
 def check_rewritten(source: str, where: str, roots: Collection[str]) -> None:
     """Raise ``BundleError`` if a source still imports from ``roots`` under their public names."""
+    if not _may_import(source, frozenset(roots)) and not any(name in source for name in _DYNAMIC_IMPORTS):
+        return
     tree = ast.parse(source)
     for node in statements(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -134,6 +136,17 @@ def check_rewritten(source: str, where: str, roots: Collection[str]) -> None:
     for call in ast.walk(tree):
         if isinstance(call, ast.Call) and _called(call) in _DYNAMIC_IMPORTS:
             raise BundleError(f"{where}, line {call.lineno}: {_called(call)} cannot be moved into an FMU")
+
+
+def _may_import(source: str, roots: frozenset[str]) -> bool:
+    """Return whether some statement may import from ``roots``; parsing all of it takes a sixth of a build."""
+    return "\\\n" in source or _imports_of(roots).search(source) is not None
+
+
+@functools.cache
+def _imports_of(roots: frozenset[str]) -> re.Pattern[str]:
+    names = "|".join(re.escape(root) for root in sorted(roots))
+    return re.compile(rf"\bfrom\s+(?:{names})\b|\bimport\b.*\b(?:{names})\b")
 
 
 def _with_parents(name: str) -> list[str]:

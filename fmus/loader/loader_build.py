@@ -1,7 +1,7 @@
 """The loader: the library of an FMU that its host loads (``loader.c``), compiled or taken from the installed package.
 
-It is compiled when the package is built (``setup.py``) or, where that was not done, when an FMU is. Its bytes depend
-on the compiler, so an FMU's GUID covers its sources and never the bytes.
+It is compiled when the package is built (``setup.py``) or, where that was not done, when an FMU is, once for each user.
+Its bytes depend on the compiler, so an FMU's GUID covers its sources and never the bytes.
 """
 
 from __future__ import annotations
@@ -129,10 +129,26 @@ def loader_library() -> bytes:
     ready = FOLDER / built_name()
     if ready.is_file():
         return ready.read_bytes()
+    import numpy as np  # neither is there where `setup.py` compiles the loader
+
+    from models.numerics.user_cache import keep_arrays, kept_arrays
+
+    key = f"loader-{source_hash()[:16]}-{_compiler_hash()}"
+    if (kept := kept_arrays(key)) is not None and "library" in kept:
+        return kept["library"].tobytes()
     with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
         library = Path(folder) / "loader.so"
         compile_loader(library)
-        return library.read_bytes()
+        made = library.read_bytes()
+    keep_arrays(key, {"library": np.frombuffer(made, np.uint8)})
+    return made
+
+
+def _compiler_hash() -> str:
+    """Return what changes with the compiler."""
+    compiler = Path(build_command(Path("loader.so"))[0]).resolve()
+    found = compiler.stat()
+    return hashlib.sha256(f"{compiler} {found.st_size} {found.st_mtime_ns}".encode()).hexdigest()[:16]
 
 
 def built_name() -> str:

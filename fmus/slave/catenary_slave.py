@@ -7,6 +7,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import ClassVar
 
+import models.scipy_start  # noqa: F401  before all that imports SciPy
 from fmus.slave.adapter import Adapter
 from fmus.slave.ports import Port, Ports, Signal, energy_ports, vector
 from models.arrays import FloatArray

@@ -13,8 +13,10 @@ from master.batch.optimisation.optimisation_session import (
     CSV,
     JSON,
     PAGE,
+    PLACE,
     OptimisationOutcome,
     PreparedOptimisation,
+    check_place,
     optimise,
 )
 from master.batch.sweep.engine_selection import engine_of
@@ -31,13 +33,15 @@ def optimise_verb(options: argparse.Namespace) -> int:
     note: Callable[[str], None] = (lambda _: None) if options.quiet else partial(say, console=console)
     overrides = overrides_of(options)
     request = _request(options)
+    if not options.dry_run:
+        check_place(options.out)
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedOptimisation.of(scenario.system, request, str(options.scenario), overrides.options)
         if options.dry_run:
             text = f"{prepared.outcome.goal.text}: can be looked for, in at most {request.max_runs} run(s)"
             Terminal(width=WIDTH).print(text, markup=False)
             return 0
-        folder = options.out or Path("results") / "optimise" / scenario.system.name
+        folder = options.out or PLACE / scenario.system.name
         keep_apart(folder, scenario.package)
         engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after)
         with progress_lines(console, options.quiet) as show:

@@ -17,10 +17,9 @@ from master.report.charts.measured_charts import comparison_rows
 from master.report.comparison_page import MOST_INPUTS, columns, comparison_page, run_names
 from master.report.film_file import FilmOptions, check_name, write_film
 from master.report.moving_picture import MOST_LAPS, make_movie
-from master.report.run_inputs import differing_inputs
+from master.report.run_inputs import unequal_inputs
 from master.report.terminal_summary import WIDTH, Terminal
 from master.results import parquet_export, results_folder, run_difference, run_results, run_summary
-from master.results.kept_definitions import differing_definitions
 from master.results.run_results import Results
 from master.safety import folder_lock
 from master.safety.safe_files import write_atomically
@@ -162,7 +161,7 @@ def _show(
 
 def _show_inputs(console: Terminal, runs: Sequence[Results]) -> None:
     """Print what differs in the inputs of runs."""
-    rows = [*differing_definitions(runs), *differing_inputs([run.summary for run in runs])]
+    rows = unequal_inputs(runs)
     if not rows:
         console.print("the inputs are the same")
         return
@@ -181,6 +180,5 @@ def _as_json(c: run_difference.RunDifference, first: Results, other: Results) ->
     notes = list(run_difference.setting_notes([first, other]))
     forces = {"rms": c.rms, "largest": c.largest, "apart": c.apart}
     known = {"notes": notes, "contact": one.contact, "difference": difference, **forces}
-    rows = [*differing_definitions([first, other]), *differing_inputs([first.summary, other.summary])]
-    inputs = {name: values for name, *values in rows}
+    inputs = {name: values for name, *values in unequal_inputs([first, other])}
     return {**known, "filters": filters, "same_filter": same, "inputs": inputs}

@@ -46,6 +46,8 @@ def run_verb(options: argparse.Namespace) -> int:
     if options.figures and options.no_report:
         raise UsageError("--figures says how charts are written, which --no-report leaves out: omit one of them")
     run_options = _run_options(options)
+    if options.out is not None:
+        results_folder.check_writable(options.out)  # before FMUs are built
     with open_scenario(options.scenario, _run_overrides(options), note, not options.no_build) as scenario:
         folder = _folder(options, scenario.system)
         keep_apart(folder, scenario.package)

@@ -15,9 +15,11 @@ from master.batch.sweep.sweep_session import (
     JSON,
     PAGE,
     PARQUET,
+    PLACE,
     SENSITIVITY_CSV,
     PreparedSweep,
     SweepOutcome,
+    check_place,
     sweep,
 )
 from master.commands.batch_progress import distinct, progress_lines
@@ -39,15 +41,17 @@ def sweep_verb(options: argparse.Namespace) -> int:
         faults=request.faults,
         faults_of=request.faults_of,
     )
+    if not options.dry_run:
+        check_place(options.out)
     with open_scenario(options.scenario, overrides, note, not options.no_build) as scenario:
         prepared = PreparedSweep.of(scenario.system, request)
         check_overridden(prepared.outcome.plan, (*overrides.parameters, *(["step"] if overrides.step else [])))
         if options.dry_run:
-            for text in filter(None, (prepared.announced, prepared.unseen)):
+            for text in prepared.notes:
                 note(text)
             Terminal(width=WIDTH).print(f"{len(prepared.outcome.runs)} run(s), all can be made", markup=False)
             return 0
-        folder = options.out or Path("results") / "sweep" / scenario.system.name
+        folder = options.out or PLACE / scenario.system.name
         keep_apart(folder, scenario.package)
         engine = engine_of(options.jobs, options.scheduler, note, options.memory_limit, options.renew_after, request)
         with progress_lines(console, options.quiet) as show:

@@ -48,7 +48,10 @@ _UNREADABLE: Final = (
 
 
 def provide_fmu(
-    path: Path, tell: Callable[[str], None], scratch: Path | None = None, library: Path | None = None
+    path: Path,
+    tell: Callable[[str], None],
+    scratch: Callable[[], Path] | None = None,
+    library: Path | None = None,
 ) -> Path:
     """Build the FMU at ``path`` if it is missing, or ours and older than the sources it is built from.
 
@@ -59,8 +62,9 @@ def provide_fmu(
     path : Path
     tell : callable
         Called with what takes time, and what is kept.
-    scratch : Path, optional
-        Folder to build into instead, where nothing may be written next to ``path``; what it holds is used if it fits.
+    scratch : callable, optional
+        Gives a folder to build into instead, where nothing may be written next to ``path``; what it holds is used if it
+        fits. Asked for where something is to be built.
     library : Path, optional
         Folder in which, and in whose parents up to the project, definitions are looked up first.
 
@@ -86,7 +90,7 @@ def provide_fmu(
     if path.exists() and (why := why_not_ours(path)):
         tell(f"{path.name} is used as it is: {why}; to have it rebuilt, remove it")
         return path
-    place = scratch / path.name if scratch else path
+    place = scratch() / path.name if scratch else path
     if place.is_file() and _matches(wanted, stored_guid(place)):
         return place
     tell(f"building {path.name}" + (" again: what it is made of has changed" if place.is_file() else ""))
@@ -204,7 +208,7 @@ def fingerprint(lookup: Lookup, tell: Callable[[str], None] = lambda _: None) ->
         except subprocess.TimeoutExpired:
             return None
         if said.returncode != 0:
-            raise ValueError(f"cannot be built: {_last_line(said)}")
+            raise ValueError(f"cannot be built: {_reasons(said)}")
         answer, watched = _understood(said)
         keep_answer(question, answer, watched, asked)
     for note in answer.notes:
@@ -263,7 +267,7 @@ def build(path: Path, lookup: Lookup) -> None:
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"could not be built: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0 or not path.is_file():
-        raise ValueError(f"could not be built: {_last_line(answer).removeprefix(f'{path.stem} cannot be built: ')}")
+        raise ValueError(f"could not be built: {_reasons(answer).removeprefix(f'{path.stem} cannot be built: ')}")
 
 
 def write_runtime(folder: Path) -> None:
@@ -281,12 +285,15 @@ def write_runtime(folder: Path) -> None:
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"it could not be made: no answer within {_BUILD_SECONDS} s") from error
     if answer.returncode != 0:
-        raise ValueError(_last_line(answer))
+        raise ValueError(_reasons(answer))
 
 
-def _last_line(answer: subprocess.CompletedProcess[str]) -> str:
+def _reasons(answer: subprocess.CompletedProcess[str]) -> str:
+    """Return why it failed, a line for each mistake of a definition; of what is no such error, the last line."""
     said = (answer.stderr.strip() or answer.stdout.strip()).splitlines()
-    return said[-1].removeprefix("error: ") if said else "the builder gave no reason"
+    begins = [number for number, line in enumerate(said) if line.startswith("error: ")]
+    reasons = said[begins[-1] :] if begins else said[-1:]
+    return "\n".join(reasons).removeprefix("error: ") or "the builder gave no reason"
 
 
 def _matches(fingerprint: str, guid: str) -> bool:

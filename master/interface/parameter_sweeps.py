@@ -12,13 +12,13 @@ from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sensitivity import SensitivityMethod
 from master.batch.sweep.sensitivity_table import sensitivity_heads, sensitivity_rows
 from master.batch.sweep.sweep_plan import Engine, Keep, SweepRequest, listed_faults
-from master.batch.sweep.sweep_session import PAGE, PreparedSweep, SweepOutcome
+from master.batch.sweep.sweep_session import PAGE, PLACE, PreparedSweep, SweepOutcome, check_place
 from master.batch.sweep.sweep_session import sweep as run_sweep
 from master.batch.sweep.sweep_table import typed_columns
 from master.errors import RequestError
 from master.interface.data_frames import columns_frame, table_frame
 from master.interface.results_view import Results, read_results
-from master.interface.scenario_runs import by_parameter, keep_apart, teller
+from master.interface.scenario_runs import by_parameter, check_out, keep_apart, teller
 from master.interface.scenario_view import Scenario, open_scenario
 from master.scenario import open_scenario as scenario_files
 
@@ -171,8 +171,10 @@ def sweep(
     request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
     tell = teller(progress)
     overrides = replace(chosen.overrides, faults=request.faults, faults_of=request.faults_of)
+    check_out(out)
+    check_place(None if out is None else Path(out))
     with scenario_files.open_scenario(chosen.path, overrides) as opened:
-        folder = Path(out) if out is not None else Path("results") / "sweep" / opened.system.name
+        folder = Path(out) if out is not None else PLACE / opened.system.name
         keep_apart(folder, opened.package)
         prepared = PreparedSweep.of(opened.system, request)
         return Sweep(

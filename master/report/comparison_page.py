@@ -19,11 +19,10 @@ from master.report.charts.chart import Axis, Bars, Chart, Curve, stroke
 from master.report.charts.line_charts import line_marks
 from master.report.charts.uplift_charts import support_bars
 from master.report.result_tables import figure_rows
-from master.report.run_inputs import differing_inputs, quality_rows
+from master.report.run_inputs import quality_rows, unequal_inputs
 from master.report.run_names import short_names
 from master.report.run_page import status_note
 from master.report.run_title import run_title
-from master.results.kept_definitions import differing_definitions
 from master.results.run_difference import setting_notes
 from master.results.run_results import Results
 
@@ -224,7 +223,7 @@ def _uplift(found: Sequence[Column]) -> Chart:
 def _input_section(runs: Sequence[Results]) -> list[str]:
     if len(runs) < 2:
         return []
-    rows = [*differing_definitions(runs), *differing_inputs([run.summary for run in runs])]
+    rows = unequal_inputs(runs)
     heads = ["input", *run_names([run.folder for run in runs])]
     shown = html_markup.table(heads, rows[:MOST_INPUTS], numbers=False) if rows else "<p>The inputs are the same.</p>"
     if rest := rows[MOST_INPUTS:]:

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from master.results.kept_definitions import differing_definitions
+from master.results.run_results import Results
 from master.ssp.run_settings import OPTIONS
 
 _SOURCE: Final = re.compile(r"\s*\[(?P<source>[^\[\]]*)\]\s*$")
@@ -79,6 +81,19 @@ def number(value: Any) -> str:
         return f"{float(value):.6g}"
     except (TypeError, ValueError):
         return str(value)
+
+
+def unequal_inputs(runs: Sequence[Results]) -> list[tuple[str, ...]]:
+    """Return what is not the same in all runs: name, then one value per run; definitions first, each value once.
+
+    A parameter that has the value of its definition is not listed beside the definition's key of that name.
+    """
+    summaries = [run.summary for run in runs]
+    definitions = differing_definitions(runs)
+    given = {name for s in summaries for name, i in _parameters(s).items() if i.changed}
+    told = {name.replace(": ", ".", 1) for name, *_ in definitions}
+    inputs = [row for row in differing_inputs(summaries) if row[0] in given or row[0].partition(" [")[0] not in told]
+    return [*definitions, *inputs]
 
 
 def differing_inputs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:

@@ -81,7 +81,7 @@ def _definition_of(run: Results, name: str) -> dict[str, str]:
     if not numbers:
         return {}
     try:
-        text = (run.folder / PATTERN.replace("*", str(numbers[0]))).read_text(encoding="utf-8")
+        text = (run.folder / PATTERN.replace("*", str(numbers[0]))).read_text(encoding="utf-8-sig")
         return dict(_values("", tomllib.loads(text)))
     except (OSError, ValueError, RecursionError):
         return {}

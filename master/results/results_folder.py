@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import os
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -148,7 +149,7 @@ def taken_over(folder: Path, marker: str, generator: str, kind: str, scenario: s
         If it exists and is no ``kind`` of this tool, or that of another scenario, or cannot be made.
     """
     check_free(folder, marker, generator, kind)
-    found = scenario if scenario is None else _contents(folder / marker).get("scenario", scenario)
+    found = scenario if scenario is None else contents_of(folder / marker).get("scenario", scenario)
     if found != scenario:
         a = "an" if kind[0] in "aeio" else "a"
         raise MasterError(
@@ -161,18 +162,60 @@ def taken_over(folder: Path, marker: str, generator: str, kind: str, scenario: s
 
 
 def check_free(folder: Path, marker: str, generator: str, kind: str) -> None:
-    """Refuse a folder that `taken_over` would, but for one that cannot be made.
+    """Refuse a folder that `taken_over` would, before long work is done for it; nothing is made.
 
     Raises
     ------
     MasterError
-        If it exists and is no ``kind`` of this tool.
+        If it exists and is no ``kind`` of this tool, or cannot be made or written.
     """
-    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not there.is_dir():
-        raise MasterError(f"the folder {folder} cannot be made: {there} is a file; choose another with --out")
+    check_writable(folder)
     if folder.is_dir() and not (made_by(folder / marker, generator) or _holds_nothing(folder)):
         raise MasterError(f"{folder} {_NOT_OURS.format(kind=f'no {kind}')}")
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder that cannot be made or written, before long work is done for it; nothing is made.
+
+    Raises
+    ------
+    MasterError
+    """
+    there = next(place for place in (folder, *folder.absolute().parents) if _exists(place))
+    if not there.is_dir():
+        raise MasterError(f"the folder {folder} cannot be made: {there} is a file; choose another with --out")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise MasterError(f"the folder {folder} cannot be written: no permission in {there}; choose another with --out")
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # nobody may look
+        return False
+
+
+def check_place(out: Path | None, default: Path, marker: str, generator: str, kind: str) -> None:
+    """Refuse a folder for results before the scenario is opened, whose FMUs may have to be built.
+
+    Parameters
+    ----------
+    out : Path, optional
+        As the user gave it.
+    default : Path
+        Where the folder, named after the scenario, lies without it.
+    marker, generator, kind : str
+        As `taken_over` has them.
+
+    Raises
+    ------
+    MasterError
+        As `check_free`.
+    """
+    if out is None:
+        check_writable(default)
+    else:
+        check_free(out, marker, generator, kind)
 
 
 @contextmanager
@@ -252,10 +295,10 @@ def identity(folder: Path) -> str:
 
 def made_by(path: Path, generator: str) -> bool:
     """Whether a JSON file names this ``generator``."""
-    return _contents(path).get("generator") == generator
+    return contents_of(path).get("generator") == generator
 
 
-def _contents(path: Path) -> dict[str, Any]:
+def contents_of(path: Path) -> dict[str, Any]:
     """Return what a JSON file holds; nothing if it cannot be read or holds something else."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

@@ -6,8 +6,9 @@ import math
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from master.errors import Problem, RequestError, ScenarioError
@@ -73,19 +74,24 @@ def open_scenario(
 
 
 @contextmanager
-def _scratch(package: Package, is_check: bool) -> Iterator[Path | None]:
-    """Yield the folder that FMUs are built into, None for their place in the scenario."""
-    if not is_check:
-        yield fmu_cache(package.root)
-        return
-    with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
-        yield Path(folder)
+def _scratch(package: Package, is_check: bool) -> Iterator[Callable[[], Path] | None]:
+    """Yield what gives the folder that FMUs are built into, made when one is; None for their place in the scenario."""
+    place = None if is_check else fmu_cache(package.root)
+    with ExitStack() as stack:
+        if is_check:
+            yield cache(lambda: Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="openpanto_"))))
+        else:
+            yield None if place is None else lambda: place
 
 
 def load_system(
-    package: Package, overrides: Overrides, tell: Callable[[str], None], build: bool, scratch: Path | None = None
+    package: Package,
+    overrides: Overrides,
+    tell: Callable[[str], None],
+    build: bool,
+    scratch: Callable[[], Path] | None = None,
 ) -> System:
-    """Read and check the files of ``package``; FMUs are built into ``scratch`` if there is one."""
+    """Read and check the files of ``package``; FMUs are built into what ``scratch`` gives if there is one."""
     reader = Reader(SSD_NAME)
     sources = Sources(package.root, overrides.outside, None if package.writable else package.origin)
     structure = read_structure(sources, reader)
@@ -170,20 +176,26 @@ def _fmus(
             by_path[path] = _provide(path, replace(provision, build=may_build))
         fmu = by_path[path]
         if isinstance(fmu, str):
-            problems.append(_unprovided(c.name, source, c.line, fmu))
+            problems += _unprovided(c.name, source, c.line, fmu)
         else:
             found[c.name] = fmu
     return found
 
 
-def _unprovided(name: str, source: str, line: int, why: str) -> Problem:
-    """Return why a component has no FMU; a mistake in a definition is told with its place there first."""
-    found = re.fullmatch(r"(?:could not|cannot) be built: (?P<file>[^\n]*?\.toml): (?P<text>[^\n]+)", why)
-    if found is None:
-        return Problem(SSD_NAME, line, "fmu", f"component '{name}': {source} {why}")
-    at = re.search(r"\(at line (\d+),", found["text"])
-    text = f"{found['text']}; so {source} of component '{name}' ({SSD_NAME}:{line}) cannot be built"
-    return Problem(found["file"], int(at[1]) if at else 0, "definition", text)
+def _unprovided(name: str, source: str, line: int, why: str) -> list[Problem]:
+    """Return why a component has no FMU; each mistake in a definition is told with its place there first."""
+    first, *others = why.split("\n")
+    lines = [re.sub("^(could not|cannot) be built: ", "", first), *others]
+    found = [re.fullmatch(r"(?P<file>.*?\.toml): (?P<text>.+)", text) for text in lines]
+    if lines[0] == first or found[0] is None:
+        return [Problem(SSD_NAME, line, "fmu", f"component '{name}': {source} {why.replace(chr(10), '; ')}")]
+    problems, file = [], found[0]["file"]
+    for text, mistake in zip(lines, found, strict=True):
+        at = re.search(r"\(at line (\d+),", text)
+        file, text = (file, text) if mistake is None else (mistake["file"], mistake["text"])
+        problems.append(Problem(file, int(at[1]) if at else 0, "definition", text))
+    last = f"{problems[-1].text}; so {source} of component '{name}' ({SSD_NAME}:{line}) cannot be built"
+    return [*problems[:-1], replace(problems[-1], text=last)]
 
 
 @dataclass(frozen=True)
@@ -195,7 +207,7 @@ class _Provision:
 
     build: bool
     tell: Callable[[str], None]
-    scratch: Path | None
+    scratch: Callable[[], Path] | None
     library: Path
 
 

@@ -9,11 +9,13 @@ from functools import partial
 
 from master.errors import Problem, hint
 from master.scenario.unit_checks import UnitChecks
+from master.scenario.value_checks import beyond_stops
 from master.ssp.ssd import Structure, parameter_names
 from master.ssp.ssd_elements import Binding, Component, Feed, Stop
 from master.ssp.ssp_enumerations import Items
 from master.ssp.ssp_units import Conversion
 from master.ssp.ssv import Parameter, ParameterSet, Value, fits_integer
+from master.system.components import Component as SystemComponent
 from master.system.components import Fmu, Variable
 
 #: Causalities of variables that take a value whatever their `initial` is.
@@ -61,14 +63,27 @@ class StartValues:
     def of(self, component: Component) -> dict[str, Value]:
         """Return the values of a component's variables, in the FMU's units."""
         values: dict[str, Value] = {}
+        written: dict[str, Parameter] = {}
         for binding in component.bindings:
-            self._apply(component, parameter_names(binding), binding, values)
+            self._apply(component, own := parameter_names(binding), binding, values)
+            written |= own
         for binding in self._structure.bindings:
-            self._apply(component, self._of_component(component, binding), binding, values)
+            self._apply(component, own := self._of_component(component, binding), binding, values)
+            written |= own
         for feed in self._structure.feeds:
             if feed.element == component.name:
                 self._follow(component, feed, values)
+        self._check_heights(component, values, written)
         return values
+
+    def _check_heights(
+        self, component: Component, values: Mapping[str, Value], written: Mapping[str, Parameter]
+    ) -> None:
+        """Report a height beyond a pantograph's stops where one of them is written; others are seen later."""
+        found = beyond_stops(SystemComponent(component.name, self._fmus[component.name], dict(values), (), ()))
+        names = (found[0], "lowest_height", "highest_height") if found else ()
+        if found and (place := next((written[n] for n in names if n in written), None)):
+            self._report(place, "range", found[1])
 
     def _of_connectors(self) -> dict[str, Given]:
         """Return what is bound to connectors of systems; the outermost binding counts."""

@@ -21,6 +21,9 @@ from master.system.step_rounding import ROUNDING
 AFTER_INTERVAL: Final = 0.5
 #: Parameters that lift a pantograph, in N or N.m.
 _LIFTS: Final = ("static_force", "static_moment")
+#: Heights of the strip, which lie between its stops; and these.
+_HEIGHTS: Final = ("start_height", "reference_height")
+_STOPS: Final = ("lowest_height", "highest_height")
 #: Parameters that say where a pantograph is at any time.
 _WAY: Final = ("start_position", "speed")
 
@@ -36,7 +39,37 @@ def problems(system: System, may_stop_early: bool = False) -> Iterator[str]:
     for pantograph in pantographs(system):
         yield from _idle(pantograph)
         if not may_stop_early:
-            yield from _uncovered(system, pantograph)
+            yield from filter(None, [_uncovered(system, pantograph)])
+        if found := beyond_stops(pantograph):
+            yield found[1]
+
+
+def beyond_stops(pantograph: Component) -> tuple[str, str] | None:
+    """Return which height of the strip lies beyond its stops, and a sentence on it; None if none does.
+
+    Of a pantograph whose FMU has no parameters ``lowest_height`` and ``highest_height`` nothing is said: how far the
+    arms of a mechanism reach follows from all that they are made of, which only its FMU knows.
+    """
+    low, high = (parameter_value(pantograph, name) for name in _STOPS)
+    for name in _HEIGHTS:
+        value = parameter_value(pantograph, name)
+        if value is None:
+            continue
+        given = f"{pantograph.name}.{name} = {value:g} m is"
+        if low is not None and value < low:
+            return name, f"{given} below the lowest_height of {low:g} m{_between(low, high)}"
+        if high is not None and value > high:
+            return name, f"{given} above the highest_height of {high:g} m{_between(low, high)}"
+    return None
+
+
+def _between(low: float | None, high: float | None) -> str:
+    return "" if low is None or high is None else f": between its stops the strip goes from {low:g} to {high:g} m"
+
+
+def uncovered(system: System) -> str:
+    """Return why a run will have no figures, empty if that is not known: it does not cover the interval of interest."""
+    return next(filter(None, (_uncovered(system, p, is_meant=True) for p in pantographs(system))), "")
 
 
 def empty_cells(system: System, names: Sequence[str]) -> str:
@@ -99,21 +132,24 @@ def _idle(pantograph: Component) -> Iterator[str]:
             yield f"{pantograph.name}.{name} = {value:g} {unit} never lifts the strip to the wire: give it more than 0"
 
 
-def _uncovered(system: System, pantograph: Component) -> Iterator[str]:
+def _uncovered(system: System, pantograph: Component, *, is_meant: bool = False) -> str:
+    """Return what of the interval of interest a pantograph does not pass, empty if nothing; and what to do."""
     interval, last = system.settings.interval, final_position(system, pantograph)
     start, speed = parameter_value(pantograph, "start_position"), constant_speed(pantograph)
     if last is None or start is None or speed is None:
-        return
+        return ""
     stride = speed * system.step
     if interval.start is not None and start > interval.start + stride:
-        yield (
+        return (
             f"'{pantograph.name}' starts at {start:g} m, beyond the start of the interval of interest, "
             f"{interval.start:g} m: give it an earlier start_position, or the interval a later start"
         )
-    elif interval.end is not None and last < interval.end - stride:
+    if interval.end is not None and last < interval.end - stride:
         where = f"'{pantograph.name}' at {last:.6g} m, before the end of the interval of interest, {interval.end:g} m"
         cure = _cure(system, start, speed, interval.end)
-        yield f"the run ends at {system.stop:g} s with {where}: {cure}, or run a part of it with --stop"
+        part = "" if is_meant else ", or run a part of it with --stop"
+        return f"the run ends at {system.stop:g} s with {where}: {cure}{part}"
+    return ""
 
 
 def _cure(system: System, start: float, speed: float, end: float) -> str:

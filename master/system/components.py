@@ -7,14 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from master.errors import RequestError
-from master.ssp.run_settings import RunSettings
 from master.ssp.ssp_units import Unit
 from master.ssp.ssv import Value
 from master.system.connections import Connection
 from master.system.contacts import Contact, find_contacts
+
+if TYPE_CHECKING:  # the processes of isolated FMUs do without pydantic, a third of what they import
+    from master.ssp.run_settings import RunSettings
 
 #: Share of a step by which the stop time may miss a whole number of steps by rounding.
 _ROUNDING: Final = 1e-6

@@ -72,8 +72,9 @@ class ContactResult:
 
 def empty_result(pantographs: int, sections: int) -> ContactResult:
     """Return the contacts of strips that meet nothing."""
-    shape = (pantographs, sections)
-    return ContactResult(np.zeros(shape), np.full((*shape, 3), np.nan))
+    point = np.empty((pantographs, sections, 3))
+    point.fill(np.nan)
+    return ContactResult(np.zeros((pantographs, sections)), point)
 
 
 @dataclass

@@ -20,16 +20,16 @@ _MOST_ROWS: Final = 24
 _BESIDE: Final = 20.0
 #: Heights that are drawn one by one; more of them are a picture.
 _MANY: Final = 4000
-_WITHIN, _LONG, _SHORT, _GREY = "#5b8f6b", "#b3261e", "#1f5fa8", "#9aa0a6"
+_PASSED, _LONG, _SHORT, _GREY = "#5b8f6b", "#b3261e", "#1f5fa8", "#9aa0a6"
 
 
 def errors(found: AsBuiltOutcome) -> Figure:
     """Error of every dropper as a bar, coloured by the tolerance."""
     b, mm = found.built, 1e3
     kinds = (
-        ("within the tolerance", _WITHIN, b.is_measured & ~found.is_beyond),
-        ("too long", _LONG, found.is_beyond & (b.error > 0.0)),
-        ("too short", _SHORT, found.is_beyond & (b.error < 0.0)),
+        ("passed", _PASSED, b.is_measured & ~found.is_beyond),
+        ("failed, too long", _LONG, found.is_beyond & (b.error > 0.0)),
+        ("failed, too short", _SHORT, found.is_beyond & (b.error < 0.0)),
     )
     width = 0.7 * float(np.median(np.diff(np.unique(b.x)))) if len(b.x) > 1 else 3.0
     figure, panels = _rows(b.x)
@@ -68,7 +68,7 @@ def heights(found: AsBuiltOutcome) -> Figure:
             own = here & (of == section)
             axes.plot(b.x[own], before[own], color=_LONG, linewidth=1.0, label="" if section else "as built")
             text = "" if section else "expected after changes"
-            axes.plot(b.x[own], after[own], color=_WITHIN, linewidth=1.4, label=text)
+            axes.plot(b.x[own], after[own], color=_PASSED, linewidth=1.4, label=text)
         for sign, marker, label in ((1.0, "v", "dropper to lengthen"), (-1.0, "^", "to shorten")):
             chosen = here & (sign * change > 0.0)
             axes.plot(b.x[chosen], np.full(chosen.sum(), bottom), marker, color="black", markersize=3.5, label=label)

@@ -45,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     _check_written(arguments.out, design_path, arguments.measured)
     warn(doubts("lines", arguments.line))
     measured = read_measured_run(arguments.measured)
+    warn(measured.notes)
     allowed = Allowed(1e-3 * arguments.step, arguments.only, support_limits().shortest_dropper)
     with _progress(quiet=arguments.quiet) as tell:
         found = judge_as_built(definition, measured, 1e-3 * arguments.tolerance, allowed, tell)
@@ -64,15 +65,16 @@ def run(arguments: argparse.Namespace) -> int:
 def _print(line: str, found: AsBuiltOutcome) -> None:
     print_table(f"{line} as built", ("quantity", "value"), as_built_tables.summary(found))
     if rows := as_built_tables.worst_rows(found, _PRINTED):
-        columns, *lines = ([row[k] for k in as_built_tables.PRINTED] for row in (as_built_tables.COLUMNS, *rows))
+        columns, *found_rows = ([row[k] for k in as_built_tables.PRINTED] for row in (as_built_tables.COLUMNS, *rows))
+        lines = [[cell.removeprefix("failed, ") for cell in row] for row in found_rows]  # as all of them have
         count = int(found.is_beyond.sum())
         which = f", the worst {len(rows)} of {count} ({DROPPERS} has all)" if len(rows) < count else ""
-        print_table(f"Droppers beyond the tolerance{which}", columns, lines)
+        print_table(f"Droppers that failed, beyond the tolerance{which}", columns, lines)
 
 
 def write(folder: Path, found: AsBuiltOutcome, design_path: Path, source: str) -> None:
     """Write the definitions as built and as corrected, the running surface and the table."""
-    text, built = design_path.read_text(encoding="utf-8"), found.built
+    text, built = design_path.read_text(encoding="utf-8-sig"), found.built
     surface = "" if found.surface.is_even else SURFACE
     designed = built.design.unstrained_length
     where = f"openpanto asbuilt, from {source}".replace("\\", "/").replace('"', "'")

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+import models.scipy_start  # noqa: F401  before all that imports SciPy
 from models.catenary.contact_and_slack.local_problem import LocalSolutionError
 from models.catenary.shape.form_finding import EquilibriumError
 from models.commands.physics_options import show_log

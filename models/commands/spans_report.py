@@ -11,6 +11,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.interface.line_spans import SpanTable
+from models.library.norm_tables import lateral_norm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,8 +20,14 @@ if TYPE_CHECKING:
 _TICKS: Final = (100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 7000, 10000, 20000, 50000)
 
 
-def warnings(definition: CatenaryDefinition) -> Iterator[str]:
+def warnings(definition: CatenaryDefinition, found: SpanTable) -> Iterator[str]:
     """Yield what the tables of a line leave out."""
+    cant = 0.0 if definition.track is None else max(map(abs, definition.track.cant), default=0.0)
+    if found.head and cant > (free := lateral_norm().free_cant):
+        yield (
+            f"the limits of the head are those of curves with up to {1e3 * free:g} mm of cant; this line's track has "
+            f"{1e3 * cant:g} mm, where less is permissible: see what 'statics --wind --head' finds, or give --limit"
+        )
     if definition.auxiliary_wire is not None:
         yield (
             "the contact wire of a compound line goes with its auxiliary wire, which the string of these tables knows "
@@ -54,7 +61,24 @@ def figure(found: SpanTable) -> Figure:
 
 def heading(found: SpanTable) -> str:
     """Return for what the tables hold."""
-    return f"{found.pressure:.2f} Pa, {found.force:.3f} N/m on {found.tension:g} N, limit {found.limit:g} m"
+    return f"{found.pressure:.2f} Pa, {found.force:.3f} N/m on {found.tension:g} N, limit {permissible(found)}"
+
+
+def permissible(found: SpanTable) -> str:
+    """Return how far the wire may be from the middle of the track, as text."""
+    return f"{found.limit:.3f} m on straight track" if found.head else f"{found.limit:g} m"
+
+
+def span_heads(found: SpanTable, before: str = "") -> tuple[str, ...]:
+    """Return the heads of the table of largest spans; of a head's limit, which the curve lowers, the last."""
+    return "radius [m]", *(before + name for name in found.names), *(["limit [m]"] if found.head else [])
+
+
+def span_rows(found: SpanTable) -> list[Sequence[str]]:
+    """Return the rows of the table of largest spans."""
+    limits = [f"{limit:.3f}" for limit in found.limits]
+    lines = rows(found.radii, found.largest_span, 2)
+    return [(*row, limit) for row, limit in zip(lines, limits, strict=True)] if found.head else lines
 
 
 def rows(first: Sequence[float], columns: FloatArray, digits: int) -> list[Sequence[str]]:

@@ -24,16 +24,18 @@ if TYPE_CHECKING:  # they are compiled from copies, see `kernel_cache`
     from models.coupled import lanes_linear_kernels as _l  # noqa: F401
     from models.coupled import lanes_train_kernels as _t  # noqa: F401
 
-_STEP: Final = Path(__file__).parents[1] / "catenary" / "step"
+_HERE: Final = Path(__file__).parent
+_STEP: Final = _HERE.parent / "catenary" / "step"
 #: Their files by name, each after those that it imports.
 _KERNEL_FILES: Final = {
-    "linear": (_STEP / "vector_kernels.py", Path(__file__).with_name("lanes_linear_kernels.py")),
+    "linear": (_STEP / "vector_kernels.py", _HERE / "lane_forms_kernels.py", _HERE / "lanes_linear_kernels.py"),
     "contact": (
         _STEP / "vector_kernels.py",
         _STEP / "law_kernels.py",
-        Path(__file__).with_name("lanes_contact_kernels.py"),
+        _HERE / "lane_forms_kernels.py",
+        _HERE / "lanes_contact_kernels.py",
     ),
-    "train": (Path(__file__).with_name("lanes_train_kernels.py"),),
+    "train": (_HERE / "lane_forms_kernels.py", _HERE / "lanes_train_kernels.py"),
 }
 #: Texts for what the kernels return for a lane.
 _FAILURES: Final = {
@@ -322,4 +324,5 @@ class LaneBlock:
             strip=np.zeros((K, P, 4)),
             received=np.zeros((K, P, train.RECEIVED)),
             forces=np.zeros((K, P, train.FORCES)),
+            work=np.zeros((2, masses)),
         )

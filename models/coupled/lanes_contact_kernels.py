@@ -11,7 +11,7 @@ from collections import namedtuple
 import numpy as np
 
 from models.catenary.step.law_kernels import SLOWEST_IMPACT, eliminate, law_of
-from models.catenary.step.vector_kernels import compiled, part
+from models.coupled.lane_forms_kernels import inner, outer
 
 #: How the local problem of a lane ended.
 SOLVED, UNSETTLED, SINGULAR = 0, 1, 2
@@ -58,14 +58,14 @@ Work = namedtuple(
 ) = range(16)  # fmt: skip
 
 
-@part
+@inner
 def of_lane(lane, memory):
     """Return the places of a lane's pantographs and wires."""
     count = memory.interval.size // memory.active.size
     return range(lane * count, (lane + 1) * count)
 
 
-@part
+@inner
 def interval_of(wires, index):
     """Return the numbers of an interval; in its record whole numbers are held as what they are."""
     numbers = wires.numbers[index]
@@ -86,7 +86,7 @@ def interval_of(wires, index):
     )  # fmt: skip
 
 
-@part
+@inner
 def local_motion(interval, index, lane, records, memory, motion, local):
     """Put local coordinates of an interval and their rates at the end of the step into ``local``, shape (2, m)."""
     a1, n, e = motion.a1[0], interval.modes, interval.ends
@@ -114,7 +114,7 @@ def local_motion(interval, index, lane, records, memory, motion, local):
         local[1, n + j] = a1 * change - motion.attached[place, 1, lane]
 
 
-@part
+@inner
 def standing(interval, lane, records, motion, local):
     """Put local coordinates of an interval as they are into ``local``."""
     for i in range(interval.modes):
@@ -123,7 +123,7 @@ def standing(interval, lane, records, motion, local):
         local[0, interval.modes + j] = motion.attached[np.int64(records[interval.places + j]), 0, lane]
 
 
-@part
+@inner
 def start_element(wires, wire, guess, x):
     """Return where to begin walking; see `ContactWire.start`."""
     first, last = wires.first[wire], wires.first[wire + 1] - 1
@@ -133,7 +133,7 @@ def start_element(wires, wire, guess, x):
     return min(max(np.searchsorted(wires.starts[first : last + 1], x) - 1, 0), count - 1)
 
 
-@part
+@inner
 def meet(wires, wire, lane, q, strip, guess, memory, motion, work):
     """Find where a strip (x, y of its ends, z, vz) crosses a wire at the end of the step; see `ContactWire.find`."""
     met, local = work.met[q], work.local
@@ -191,7 +191,7 @@ def meet(wires, wire, lane, q, strip, guess, memory, motion, work):
     met[RISE], met[RATE] = rise, rate
 
 
-@part
+@inner
 def place_nodes(interval, own, records, local, place):
     """Put the positions in plan of both ends of an element into ``place``."""
     count = interval.modes + interval.ends
@@ -203,7 +203,7 @@ def place_nodes(interval, own, records, local, place):
         place[k] = value
 
 
-@part
+@inner
 def lift_and_give(interval, own, xi, records, modes, row, load):
     """Put what a unit force on a point does to the local coordinates into ``row`` and to the attachments into ``load``.
 
@@ -234,7 +234,7 @@ def lift_and_give(interval, own, xi, records, modes, row, load):
     return height, gives
 
 
-@part
+@inner
 def single_contact(met, compliance, law, a1):
     """Return force, velocity and penetration of one contact alone, and whether they were found."""
     force = 0.0
@@ -249,7 +249,7 @@ def single_contact(met, compliance, law, a1):
     return force, 0.0, 0.0, False
 
 
-@part
+@inner
 def column_at(values, at, reached, begin, rows, place):
     """Return a response, which reaches some rows of all from ``begin`` on, at a row."""
     offset = place - begin
@@ -258,7 +258,7 @@ def column_at(values, at, reached, begin, rows, place):
     return values[at + offset] if offset < reached else 0.0
 
 
-@part
+@inner
 def add_columns(records, at, rows, count, load, result):
     """Put the sum of the rows of a matrix, each times its load, into ``result``; they have ``count`` entries."""
     result[:count] = 0.0
@@ -270,7 +270,7 @@ def add_columns(records, at, rows, count, load, result):
                 result[k] += row[k] * share
 
 
-@part
+@inner
 def find_contacts(lane, wires, strips, law, memory, motion, work):
     """Find which strips of a lane cross wires, and put those that may press into ``work.contacts``; return how many."""
     n, sections = 0, wires.period.size
@@ -291,7 +291,7 @@ def find_contacts(lane, wires, strips, law, memory, motion, work):
     return n
 
 
-@part
+@inner
 def couple(contacts, wires, motion, work):
     """Find what the contacts' forces do to droppers and to one another."""
     rows, records = motion.change.shape[0], wires.records
@@ -324,13 +324,13 @@ def couple(contacts, wires, motion, work):
             work.compliance[a, b] = total
 
 
-@part
+@inner
 def pressed_interval(q, wires, work):
     """Return the interval on which a candidate is."""
     return wires.interval[wires.first[q % wires.period.size] + np.int64(work.met[q, ELEMENT])]
 
 
-@part
+@inner
 def couple_slack(k, j, contacts, wires, motion, work):
     """Find what a force of dropper ``j``, the ``k``-th slack one, does to droppers and contacts."""
     numbers = wires.slack_numbers[j]
@@ -349,7 +349,7 @@ def couple_slack(k, j, contacts, wires, motion, work):
         work.on_contacts[a, k] = total
 
 
-@part
+@inner
 def penetrate(contacts, slack, a1, work):
     """Find penetrations and their velocities under the present forces."""
     for a in range(contacts):
@@ -362,7 +362,7 @@ def penetrate(contacts, slack, a1, work):
         work.velocity[a] = work.met[work.contacts[a], SPEED] + a1 * change
 
 
-@part
+@inner
 def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
     """Solve for contact forces and slack droppers of a lane; see `LocalProblem.solve`.
 
@@ -425,7 +425,7 @@ def settle(lane, contacts, wires, law, unilateral, memory, motion, work):
     return -UNSETTLED
 
 
-@part
+@inner
 def find_slack(contacts, slack, work):
     """Put the droppers that would push under the present forces into ``work.found``; return how many."""
     now = 0
@@ -441,7 +441,7 @@ def find_slack(contacts, slack, work):
     return now
 
 
-@part
+@inner
 def take_over(now, before, contacts, wires, motion, work):
     """Take the droppers of ``work.found`` for the slack ones, with the forces of those that were so before."""
     for i in range(before):
@@ -457,7 +457,7 @@ def take_over(now, before, contacts, wires, motion, work):
     return now
 
 
-@part
+@inner
 def newton_step(contacts, slack, law, unilateral, a1, work):
     """Solve the local problem linearised at the present forces into ``work.change``; return whether it could be.
 
@@ -487,7 +487,7 @@ def newton_step(contacts, slack, law, unilateral, a1, work):
     return eliminate(system, right, contacts + slack)
 
 
-@part
+@inner
 def add_along(change, lane, begin, factor, values, at, count):
     """Add a multiple of some values to the rows from ``begin`` on, round the end of a line that closes on itself."""
     before = min(change.shape[0] - begin, count)
@@ -498,7 +498,7 @@ def add_along(change, lane, begin, factor, values, at, count):
         change[k - before, lane] += factor * shown[k]
 
 
-@part
+@inner
 def react(lane, contacts, slack, wires, motion, work):
     """Add what the forces found in the step change to the attachments."""
     for a in range(contacts):
@@ -513,7 +513,7 @@ def react(lane, contacts, slack, wires, motion, work):
         add_along(motion.change, lane, numbers[1], -lacking, wires.slack_records, numbers[3], numbers[0])
 
 
-@part
+@inner
 def keep(lane, contacts, slack, memory, work):
     """Note what was found for a lane in the step, until it has moved."""
     memory.slack_count[lane] = slack
@@ -529,7 +529,7 @@ def keep(lane, contacts, slack, memory, work):
             met[CLOSED] = met[IMPACT] if met[IMPACT] else max(work.velocity[a], SLOWEST_IMPACT)
 
 
-@part
+@inner
 def remember(lane, wires, memory, work):
     """Take the forces at the end of the step for those with which the next one begins."""
     for q in of_lane(lane, memory):
@@ -544,7 +544,7 @@ def remember(lane, wires, memory, work):
                 memory.load[q, e] = work.load[q, e]
 
 
-@part
+@inner
 def press(lane, wires, memory, motion):
     """Add what the remembered forces do to the modes of their intervals in a step, and so to the ends of these."""
     a1, modes = motion.a1[0], motion.modes
@@ -568,7 +568,7 @@ def press(lane, wires, memory, motion):
                     motion.pull[end + j, lane] += modes[slot, OWN + j] * value
 
 
-@part
+@inner
 def know(lane, droppers, wires, memory, motion):
     """Add what is known of the forces on the attachments in the next step to ``motion.known``."""
     rows, columns, stretch, _ = droppers
@@ -584,7 +584,7 @@ def know(lane, droppers, wires, memory, motion):
             motion.known[columns[at], lane] -= memory.lacking[lane, k] * stretch[at]
 
 
-@part
+@inner
 def publish(lane, p, strip, wires, memory, motion, work, output):
     """Put the resultant on a strip and its point of application into ``output``, then the force on every wire."""
     sections = wires.period.size
@@ -614,7 +614,7 @@ def publish(lane, p, strip, wires, memory, motion, work, output):
             output[k] /= total
 
 
-@part
+@inner
 def crossed_at(q, wire, along, wires, motion, work):
     """Return where a wire is crossed as it stands, in the lap of a strip at ``along``; ``work.local`` is replaced."""
     met, place = work.met[q], work.place
@@ -629,7 +629,7 @@ def crossed_at(q, wire, along, wires, motion, work):
     return x, y, z
 
 
-@compiled
+@outer
 def meet_all(strips, law, unilateral, wires, memory, motion, work):
     """Find contacts and slack droppers of every lane at the end of a step, and add what they change in it.
 
@@ -650,7 +650,7 @@ def meet_all(strips, law, unilateral, wires, memory, motion, work):
         keep(lane, contacts, slack, memory, work)
 
 
-@compiled
+@outer
 def conclude(strips, droppers, wires, memory, motion, work, outputs):
     """Add what forces on the wires did to modes in the step that was made, and prepare the next one.
 
@@ -673,7 +673,7 @@ def conclude(strips, droppers, wires, memory, motion, work, outputs):
             publish(lane, p, strips[lane, p], wires, memory, motion, work, outputs[lane, p])
 
 
-@compiled
+@outer
 def stand(lane, strips, law, droppers, wires, memory, motion, work, outputs):
     """Find the contacts of a lane as it stands, see `CatenaryModel.contact_at_rest`; nothing is advanced."""
     for q in of_lane(lane, memory):

@@ -9,7 +9,8 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.vector_kernels import compiled, get, inlined, nothing, part, put
+from models.catenary.step.vector_kernels import get, nothing, put
+from models.coupled.lane_forms_kernels import inner, merged, outer
 
 #: Lanes of a block, two vectors; ends that most modes move with.
 BLOCK, ENDS = 16, 6
@@ -33,7 +34,7 @@ _H, _K, _K2, _K3, _K4, _K5 = _8, *(_U(i * BLOCK) for i in range(1, 6))
 _BACK = _U(2**64 - BLOCK)
 
 
-@compiled
+@outer
 def load(linear, motion):
     """Find the forces on the attachments that their change balances, before what is found inside the step."""
     own, back, known, attached, pull = linear.own, linear.back, motion.known, motion.attached, motion.pull
@@ -56,21 +57,21 @@ def load(linear, motion):
         put(right, at + _H, other + heavy_other)
 
 
-@part
+@merged
 def middle(linear, change):
     """Return the part of an array that stands between the rows of zeros that the band needs."""
     margin = (linear.lower.shape[1] - 1) * BLOCK
     return change[margin : change.size - margin]
 
 
-@compiled
+@outer
 def begin(linear, motion):
     """Find the change of the attachments without what is found inside the step."""
     load(linear, motion)
     solve(linear.lower, linear.upper, motion.change)
 
 
-@compiled
+@outer
 def pull_droppers(linear, droppers, motion):
     """Find what droppers would pull at the end of the step if they could push, as `begin` left it."""
     rows, columns, values, rest = droppers
@@ -90,7 +91,7 @@ def pull_droppers(linear, droppers, motion):
         put(pulls, j * _K + _H, other)
 
 
-@compiled
+@outer
 def finish(linear, motion):
     """Replace the motion by that at the end of the step; forces on intervals are added afterwards."""
     change = middle(linear, motion.change)
@@ -104,7 +105,7 @@ def finish(linear, motion):
             attached[at + _K + i] = a1 * change[of + i] - attached[at + _K + i]
 
 
-@part
+@inner
 def multiply(matrix, vector, result):
     """Put a matrix times a vector of every lane into ``result``."""
     rows, columns, values = matrix
@@ -118,7 +119,7 @@ def multiply(matrix, vector, result):
         put(result, row * _K + _H, other)
 
 
-@part
+@inner
 def solve(lower, upper, x):
     """Solve a band for all lanes; ``x`` holds the loads, then the solution, between rows of zeros.
 
@@ -135,7 +136,7 @@ def solve(lower, upper, x):
         last, last_other = eliminate(upper, row, (row + width) * _K, _K, x, last, last_other)
 
 
-@inlined
+@merged
 def eliminate(matrix, row, at, on, x, last, last_other):
     """Solve a row of a band, given the solutions of the one before it; ``on`` leads from there to those before that."""
     value, other = get(x, at) * matrix[row, _0], get(x, at + _H) * matrix[row, _0]
@@ -150,7 +151,7 @@ def eliminate(matrix, row, at, on, x, last, last_other):
     return value, other
 
 
-@part
+@inner
 def follow(linear, motion):
     """Let all modes follow their ends, and find what they do to these in the next step.
 
@@ -184,7 +185,7 @@ def follow(linear, motion):
     follow_wide(linear, first[first.size - 1], table, ends, pull)
 
 
-@part
+@inner
 def advance(rates, modes, m, moved, a1, table, at):
     """Let a mode make the step in which its ends have moved; return what it does to these in the next one."""
     stiff, from_momentum = modes[m, _1], modes[m, _2]
@@ -198,7 +199,7 @@ def advance(rates, modes, m, moved, a1, table, at):
     return rate * rates[m, _1] - amplitude * stiff - momentum * from_momentum
 
 
-@part
+@inner
 def follow_wide(linear, begin, table, ends, pull):
     """Do as `follow` does for modes that move with more ends, one by one."""
     rates, modes, slot_end, a1 = linear.rates, linear.modes, linear.slot_end, linear.a1

@@ -3,15 +3,13 @@
 The arithmetic is that of `models.pantograph.lumped`, `models.numerics.extrapolation` and `models.catenary.line_part`; a
 lane is one run.
 
-This module imports nothing of the project: it is compiled from a copy in the user's cache
-(`models.numerics.kernel_cache`), which cannot see other files.
+This module is compiled from a copy in the user's cache (`models.numerics.kernel_cache`), to which the file that it
+imports is joined.
 """
 
 from collections import namedtuple
-from typing import Any
 
-import numpy as np
-from numba import njit
+from models.coupled.lane_forms_kernels import inner, outer
 
 #: Of `models.numerics.extrapolation`.
 _STAMP_TOLERANCE, _LEAST_TRAVEL, _SAME_TIME = 0.25, 1e-9, 1e-12
@@ -26,19 +24,15 @@ X, Z, VX, VZ, AZ, TIME, RECEIVED = range(7)
 KNOWN, FORCES = 6, 7
 #: Pantographs of all lanes, arrays (lanes, P, ...): masses, loads of the air on them, inverse of K_hat and damping
 #: matrix; number of masses and of inner steps; length of such a step; displacement, velocity, acceleration of the
-#: masses; see above for the rest.
+#: masses; see above for the rest; and work space (2, masses).
 Trains = namedtuple(
     "Trains",
     ("mass", "air", "inverse", "damping", "masses", "steps", "length", "motion", "setting", "strip", "received",
-     "forces"),
+     "forces", "work"),
 )  # fmt: skip
-_OPTIONS: Any = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
-#: Functions that are called from outside, and those that are not: what leads into these from Python is not compiled.
-_compiled = njit(cache=True, **_OPTIONS)
-_inner = njit(**(_OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}))
 
 
-@_inner
+@inner
 def lead_of(position, expected, speed, step):
     """Return how long after the beginning of the step a received position is valid."""
     travel = speed * step
@@ -47,7 +41,7 @@ def lead_of(position, expected, speed, step):
     return step if abs((position - expected) / travel - 1.0) < _STAMP_TOLERANCE else 0.0
 
 
-@_inner
+@inner
 def place_strip(trains, lane, p, elapsed):
     """Put the strip where the pantograph is, so long after its start."""
     setting, strip, top = trains.setting[lane, p], trains.strip[lane, p], trains.masses[lane, p] - 1
@@ -57,7 +51,7 @@ def place_strip(trains, lane, p, elapsed):
     strip[VZ] = trains.motion[lane, p, 1, top]
 
 
-@_inner
+@inner
 def raised(setting, time):
     """Return the share of the uplift that acts at a time after the start."""
     if time < setting[RAISE_START]:
@@ -67,7 +61,7 @@ def raised(setting, time):
     return min(1.0, (time - setting[RAISE_START]) / setting[RAISE_DURATION])
 
 
-@_compiled
+@outer
 def start(trains, lane, time, contact):
     """Set the pantographs of a lane to rest at its start, under contact forces, shape (P,)."""
     for p in range(contact.size):
@@ -86,7 +80,7 @@ def start(trains, lane, time, contact):
         forces[0], forces[3], forces[KNOWN] = time, contact[p], 1.0
 
 
-@_compiled
+@outer
 def receive(trains, active, times, step, order):
     """Let the line receive the strips for a macro step that begins at ``times``, shape (lanes,)."""
     for lane in range(active.size):
@@ -104,7 +98,7 @@ def receive(trains, active, times, step, order):
             held[TIME] = valid
 
 
-@_compiled
+@outer
 def continue_strips(trains, active, times, later, order, strips):
     """Put the strips as the line continues them to ``later`` after ``times`` into ``strips``: x, ends' y, z, vz."""
     for lane in range(active.size):
@@ -120,7 +114,7 @@ def continue_strips(trains, active, times, later, order, strips):
             strips[lane, p, 4] = held[VZ] + tau * held[AZ]
 
 
-@_inner
+@inner
 def take_force(forces, time, force):
     """Take a force valid at ``time``; see `ForceExtrapolation.receive`."""
     if forces[KNOWN] and time <= forces[0] + _SAME_TIME:
@@ -132,7 +126,7 @@ def take_force(forces, time, force):
     forces[KNOWN] = min(forces[KNOWN] + 1.0, 3.0)
 
 
-@_inner
+@inner
 def force_at(forces, wanted, time):
     """Return the force at ``time``; see `ForceExtrapolation.at`."""
     if forces[3] == 0.0 and time > forces[0]:
@@ -148,7 +142,7 @@ def force_at(forces, wanted, time):
     return max(0.0, result)
 
 
-@_compiled
+@outer
 def step_trains(trains, active, times, began, step, contact):
     """Let all pantographs make a macro step under the forces that they receive for its beginning.
 
@@ -178,13 +172,15 @@ def step_trains(trains, active, times, began, step, contact):
             place_strip(trains, lane, p, time + step - began)
 
 
-@_inner
+@inner
 def step_masses(trains, lane, p, uplift, contact):
     """Let the masses of a pantograph make one inner step by the trapezoidal rule; see `LumpedModel`."""
     n, h, mass, damping = trains.masses[lane, p], trains.length[lane, p], trains.mass[lane, p], trains.damping[lane, p]
     motion, inverse = trains.motion[lane, p], trains.inverse[lane, p]
     a0, a1, a2 = 4.0 / h**2, 2.0 / h, 4.0 / h
-    load, new = np.zeros(n), np.zeros(n)
+    load, new = trains.work[0], trains.work[1]
+    for i in range(n):
+        load[i] = new[i] = 0.0
     load[0] += uplift
     load[n - 1] -= contact
     for i in range(n):

@@ -19,10 +19,11 @@ import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from models.definition_files.message_text import hint, nearest, one_line, said, shown_value
+from models.definition_files.message_text import hint, nearest, not_utf8, one_line, said, shown_value
 from models.definition_files.si_units import shown, to_si
 
 #: Largest number of problems listed.
@@ -128,14 +129,14 @@ class Table:
         """
         name = str(path)
         try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
+            data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         except FileNotFoundError as error:
             text = "there is no such file; a definition of the library is called by its name, without .toml"
             raise DefinitionError([Problem(name, "", text)]) from error
         except OSError as error:
             raise DefinitionError([Problem(name, "", f"cannot be read ({said(error)})")]) from error
         except UnicodeDecodeError as error:
-            raise DefinitionError([Problem(name, "", f"is not UTF-8 text (byte {error.start})")]) from error
+            raise DefinitionError([Problem(name, "", not_utf8(error))]) from error
         except RecursionError as error:
             raise _too_deep(name) from error
         except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
@@ -182,6 +183,15 @@ class Table:
         """Return those of some keys with which a problem has been recorded."""
         found = {p.key for p in self._log.problems}
         return {name for name in names if self.key(name) in found}
+
+    def comma_advice(self, name: str) -> str:
+        """Return advice if a list of numbers looks as if one had a decimal comma, ``[45.0, 45,5, 49.5]``."""
+        entry = self._data.get(name)
+        values = entry[0] if isinstance(entry, list) and entry and isinstance(entry[0], list) else []
+        for a, b in pairwise(values):
+            if type(a) is int and type(b) is int and 0 < b < 10 <= a:
+                return f"; has '{a},{b}' a decimal comma? write {a}.{b}"
+        return ""
 
     def names(self) -> tuple[str, ...]:
         """Return the keys, in the order of the file."""
@@ -367,8 +377,8 @@ class Table:
         if not source.strip():
             self.problem(name, "names no source; where none states the value, write 'choice: why'")
         values = raw if many and isinstance(raw, list) else [raw]
-        if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
-            self.problem(name, f"{shown_value(raw)} is not a number")
+        if wrong := [v for v in values if not isinstance(v, (int, float)) or isinstance(v, bool)]:
+            self.problem(name, f"{shown_value(wrong[0])} is not a number{_text_advice(wrong[0])}")
             return None
         if self._has_absurd(name, values):
             return None
@@ -429,6 +439,12 @@ def _once(problems: Iterable[Problem]) -> list[Problem]:
     ]
 
 
+def _text_advice(value: Any) -> str:
+    """Return advice if a number is written as a text, ``"22,5"``."""
+    number = value.strip().replace(",", ".") if isinstance(value, str) else ""
+    return f"; write {number}, without quotation marks" if re.fullmatch(r"[-+]?\d+(\.\d*)?", number) else ""
+
+
 def _two_numbers_advice(entry: Any) -> str:
     """Return advice if an entry is ``[20,5, "kN", "source"]``, which is read as two numbers."""
     commas = isinstance(entry, list) and len(entry) == 4 and all(type(e) is int for e in entry[:2])
@@ -436,12 +452,9 @@ def _two_numbers_advice(entry: Any) -> str:
 
 
 def _toml_advice(path: Path, error: str) -> str:
-    """Return advice if the file has a byte order mark, or the line with the mistake what looks like a decimal comma."""
-    text = path.read_text(encoding="utf-8")
-    if text.startswith("\ufeff"):
-        return "; the file begins with a byte order mark: save it as UTF-8 without one"
+    """Return advice if the line with the mistake has what looks like a decimal comma."""
     number = re.search(r"at line (\d+)", error)
-    line = text.splitlines()[int(number[1]) - 1] if number else ""
+    line = path.read_text(encoding="utf-8-sig").splitlines()[int(number[1]) - 1] if number else ""
     return f"; does '{line.strip()}' have a decimal comma? write a point" if re.search(r"\d,\d", line) else ""
 
 

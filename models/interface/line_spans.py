@@ -20,7 +20,7 @@ from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh, contact_wire_height
 from models.catenary.shape.support_places import SupportPlaces
 from models.catenary.statics.found_tension import found_tension
-from models.catenary.statics.span_table import LENGTHS, String, radii
+from models.catenary.statics.span_table import LENGTHS, Limit, String, radii
 from models.definition_files.given_value import quantity
 from models.definition_files.parameter import ParameterError
 from models.interface.column_frames import Table, Tabled
@@ -44,7 +44,8 @@ class SpanTable(Tabled):
     Attributes
     ----------
     pressure, force, tension, limit : float
-        Of the wind [Pa], its force on the contact wire [N/m], the wire's tension [N], the permissible offset [m].
+        Of the wind [Pa], its force on the contact wire [N/m], the wire's tension [N], the permissible offset, of a head
+        that on straight track [m].
     staggers : tuple of (float, float)
         At both ends of a span, positive to the outside of the curve [m].
     lengths : tuple of float
@@ -55,6 +56,10 @@ class SpanTable(Tabled):
         [m]; infinite for straight track.
     largest_span : ndarray, shape (n_staggers, n_radii)
         [m]; NaN where the staggers alone are beyond the limit, infinite where no wind moves the wire.
+    limits : tuple of float
+        Permissible offset at every radius [m].
+    head : str
+        Of which pantograph head the limit is, empty if it was given.
     """
 
     is_indexed = True
@@ -68,6 +73,8 @@ class SpanTable(Tabled):
     smallest_radius: FloatArray
     radii: tuple[float, ...]
     largest_span: FloatArray
+    limits: tuple[float, ...]
+    head: str = ""
 
     def __repr__(self) -> str:
         return f"<SpanTable at {self.pressure:.0f} Pa, limit {self.limit:g} m>"
@@ -79,10 +86,13 @@ class SpanTable(Tabled):
 
     @property
     def tables(self) -> dict[str, Table]:
-        """Columns by name: ``radii`` (smallest radius by span) and ``spans`` (largest span by radius)."""
+        """Columns by name: ``radii`` (smallest radius by span) and ``spans`` (largest span and a head's limit)."""
         return {
             "radii": (("span [m]", *self.names), (np.array(self.lengths), *self.smallest_radius)),
-            "spans": (("radius [m]", *self.names), (np.array(self.radii), *self.largest_span)),
+            "spans": (
+                ("radius [m]", *self.names, *(["limit [m]"] if self.head else [])),
+                (np.array(self.radii), *self.largest_span, *([np.array(self.limits)] if self.head else [])),
+            ),
         }
 
 
@@ -107,7 +117,8 @@ def span_table(
     limit : float or str, optional
         How far the wire may be from the middle of the track, in m or with a unit; it or a head is needed.
     head : {1600, 1950}, optional
-        In place of the limit: the permissible deviation on straight track for a pantograph head of so many mm.
+        In place of the limit: the permissible deviation for a pantograph head of so many mm, by the curve; of more
+        cant than 66 mm it takes no account.
     radii : sequence of float or str, optional
         For the largest span, in m or with a unit.
     staggers : sequence of pairs, optional
@@ -133,7 +144,8 @@ def span_table(
         definition,
         None if speed is None else given("speed", speed, "m/s", fastest=math.inf),
         None if pressure is None else given("pressure", pressure, "Pa"),
-        own if own is not None else straight_limit(definition, str(chosen)),
+        own,
+        chosen or "",
         [given("radius", R, "m") for R in listed("radii", radii, "[800, 1200]")],
         [_pair(pair) for pair in listed("staggers", staggers, "[(0.2, -0.2)]")],
         ("speed", "pressure"),
@@ -144,19 +156,22 @@ def tabulated(
     definition: CatenaryDefinition,
     speed: float | None,
     pressure: float | None,
-    limit: float,
+    limit: float | None,
+    head: str,
     wanted: Sequence[float],
     staggers: Sequence[Staggers],
     names: tuple[str, str],
 ) -> SpanTable:
-    """Return the tables of a line, all in SI; `names` are what speed and pressure are called.
+    """Return the tables of a line for a limit or a head, all in SI; `names` are what speed and pressure are called.
 
     Raises
     ------
     ParameterError
         If wind, limit, a radius or a stagger cannot be meant.
     """
-    check_limit(limit)
+    if limit is not None:
+        check_limit(limit)
+    permissible = head_limit(definition, head) if limit is None else lambda curvature: limit
     _check(wanted, staggers)
     wind, found = asked_wind(definition, speed, pressure, names)
     string = String(_tension(definition), wind.force(definition.contact_wire.width, found))
@@ -165,17 +180,23 @@ def tabulated(
         pressure=found,
         force=string.wind,
         tension=string.tension,
-        limit=limit,
+        limit=permissible(0.0),
         staggers=pairs,
         lengths=LENGTHS,
-        smallest_radius=np.array([radii(string, limit, *pair) for pair in pairs]),
+        smallest_radius=np.array([radii(string, permissible, *pair) for pair in pairs]),
         radii=asked,
-        largest_span=np.array([[string.largest_span(limit, 1.0 / R, *pair) for R in asked] for pair in pairs]),
+        largest_span=np.array(
+            [[string.largest_span(permissible(1.0 / R), 1.0 / R, *pair) for R in asked] for pair in pairs]
+        ),
+        limits=tuple(permissible(1.0 / R) for R in asked),
+        head=head,
     )
 
 
-def straight_limit(definition: CatenaryDefinition, head: str) -> float:
-    """Return the permissible offset of a head on straight track at the line's largest height [m].
+def head_limit(definition: CatenaryDefinition, head: str) -> Limit:
+    """Return the permissible offset of a head by the curvature of the track, at the line's largest height.
+
+    The cant of a curve that is only a row of a table is not known: the limit holds for as much as needs no allowance.
 
     Raises
     ------
@@ -183,7 +204,8 @@ def straight_limit(definition: CatenaryDefinition, head: str) -> float:
         If the height is outside the range of the permissible deviations.
     """
     height = max(_heights(definition), default=definition.profile.contact_wire_height)
-    return lateral_norm().permissible(head, height, 0.0, 0.0).permissible
+    norm = lateral_norm()
+    return lambda curvature: norm.permissible(head, height, curvature, 0.0).permissible
 
 
 def _heights(definition: CatenaryDefinition) -> Iterator[float]:

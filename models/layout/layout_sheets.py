@@ -128,7 +128,7 @@ class Layout:
     sheets : mapping of str to SheetTable
         By name.
     notes : tuple of str
-        Sheets that are none of a layout's.
+        Sheets that were not read: hidden ones, and those that are none of a layout's.
     """
 
     name: str
@@ -158,11 +158,14 @@ def read_layout(path: Path, problems: SheetProblems) -> Layout:
     for name in REQUIRED:
         if name not in known and not problems.has(name):
             near = hint(name, [other for other in grids if other not in SHEETS])
-            problems.add(Place(name), f"the sheet is missing{near}")
+            is_hidden = name in [title.strip().casefold() for title in problems.hidden]
+            problems.add(Place(name), "the sheet is hidden: show it" if is_hidden else f"the sheet is missing{near}")
     tables = {name: read_table(grid, SHEETS[name].columns, problems) for name, grid in known.items()}
     others = sorted(set(grids) - set(SHEETS))
     notes = tuple(f"{path}: the sheet {shown_value(n)} is none of a layout's and was not read" for n in others)
-    return Layout(path.name or str(path), {name: t for name, t in tables.items() if t is not None}, notes)
+    return Layout(
+        path.name or str(path), {name: t for name, t in tables.items() if t is not None}, (*problems.notes, *notes)
+    )
 
 
 def _grids(path: Path, problems: SheetProblems) -> dict[str, SheetGrid]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
+from models.definition_files.message_text import shown_value
 from models.definition_files.toml_reader import DefinitionError, Problem
 
 #: Most problems listed; more of them have one cause.
@@ -43,10 +44,21 @@ class Place:
 
 @dataclass
 class SheetProblems:
-    """The problems of a file, or of a folder of files, as they are found."""
+    """The problems of a file, or of a folder of files, as they are found; and the hidden sheets that were not read."""
 
     file: str
     found: list[Problem] = field(default_factory=list)
+    hidden: list[str] = field(default_factory=list)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what was left out, in a line; none if nothing was."""
+        if not self.hidden:
+            return ()
+        *others, last = map(shown_value, self.hidden)
+        if not others:
+            return (f"{self.file}: {last} is hidden and was not read",)
+        return (f"{self.file}: {', '.join(others)} and {last} are hidden and were not read",)
 
     def add(self, place: Place, text: str) -> None:
         """Record what is wrong at a place, once."""

@@ -29,7 +29,7 @@ _NO_RESULT: Final = (
 
 
 def read_xlsx(path: Path, problems: SheetProblems) -> dict[str, SheetGrid]:
-    """Return the sheets of a workbook by their names in lower case; if it cannot be read, tell why, return none."""
+    """Return the visible sheets of a workbook by their names in lower case; if it cannot be read, tell why."""
     try:
         from openpyxl import load_workbook
     except ImportError:
@@ -52,6 +52,9 @@ def read_xlsx(path: Path, problems: SheetProblems) -> dict[str, SheetGrid]:
     sheets = {}
     titles: dict[str, str] = {}
     for sheet in stored.worksheets:
+        if sheet.sheet_state != "visible":
+            problems.hidden.append(sheet.title)
+            continue
         name = sheet.title.strip().casefold()
         if (other := titles.setdefault(name, sheet.title)) != sheet.title:
             text = f"stands in two sheets, '{other}' and '{sheet.title}': remove one, or give it another name"

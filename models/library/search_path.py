@@ -9,7 +9,7 @@ import os
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 from models.definition_files.message_text import one_line
 
@@ -74,7 +74,7 @@ def doubts(kind: Kind, name: str, folders: Iterable[Path]) -> list[str]:
     """Return what deserves a second look when a definition is called by its name, a sentence each.
 
     That are several definitions of the name, one whose ``name`` is another than its file's, and folders named in
-    ``OPENPANTO_LIBRARY`` that are not there.
+    ``OPENPANTO_LIBRARY`` that are not there, or have none of the folders that definitions lie in.
     """
     found = definition_files(kind, name, folders)
     return [text for text in (doubles(found), *map(named_otherwise, found[:1]), absent_folders()) if text]
@@ -83,7 +83,7 @@ def doubts(kind: Kind, name: str, folders: Iterable[Path]) -> list[str]:
 def named_otherwise(path: Path) -> str:
     """Return that a definition is named otherwise than its file, empty if not or if it cannot be read."""
     try:
-        name = tomllib.loads(path.read_text(encoding="utf-8")).get("name")
+        name = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("name")
     except (OSError, ValueError):
         return ""  # reading the definition says why
     if not isinstance(name, str) or name == path.stem:
@@ -92,9 +92,13 @@ def named_otherwise(path: Path) -> str:
 
 
 def absent_folders() -> str:
-    """Return which folders in ``OPENPANTO_LIBRARY`` are not there, empty if all are."""
-    absent = [name for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name and not Path(name).is_dir()]
-    return f"{VARIABLE} names no folder with {', '.join(map(repr, absent))}: correct it" if absent else ""
+    """Return which folders in ``OPENPANTO_LIBRARY`` are not there, or hold no definitions; empty if all do."""
+    named = [name for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name]
+    if absent := [name for name in named if not Path(name).is_dir()]:
+        return f"{VARIABLE} names no folder with {', '.join(map(repr, absent))}: correct it"
+    if bare := [name for name in named if not any(Path(name, kind).is_dir() for kind in get_args(Kind))]:
+        return f"{VARIABLE} names {', '.join(map(repr, bare))}, with no folder lines or pantographs in it: correct it"
+    return ""
 
 
 def _files(folder: Path) -> list[Path]:

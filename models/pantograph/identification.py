@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from models.arrays import ComplexArray, FloatArray
-from models.definition_files.message_text import hint, said
+from models.definition_files.message_text import hint, not_utf8, said
 from models.definition_files.toml_reader import LARGEST, SMALLEST, DefinitionError, Problem
 from models.pantograph.lumped.lumped_rig import chain_stiffness
 
@@ -34,6 +34,8 @@ MAX_STAGES: Final = 6
 _HIGHEST_FREQUENCY: Final = 1e5
 _KINDS: Final = {"m": "mass", "c": "damping", "k": "stiffness", "T": "time constant"}
 _STARTS: Final = 40
+#: Relative step of differences: the root of the machine precision.
+_DIFFERENCE: Final = float(np.finfo(np.float64).eps) ** 0.5
 _SEED: Final = 20120
 #: Name of the time constant of a lowest spring that hangs on a reference following the height.
 _TIME: Final = "T"
@@ -121,7 +123,7 @@ def _read_lines(path: Path) -> list[list[str]]:
     except OSError as error:
         raise DefinitionError([Problem(str(path), "", f"cannot be read ({said(error)})")]) from error
     except UnicodeDecodeError as error:
-        raise DefinitionError([Problem(str(path), "", f"is not UTF-8 text (byte {error.start})")]) from error
+        raise DefinitionError([Problem(str(path), "", not_utf8(error))]) from error
     except csv.Error as error:
         raise DefinitionError([Problem(str(path), "", f"is not a table with commas ({error})")]) from error
 
@@ -202,35 +204,48 @@ class _Fit:
         high = np.log([_RANGES[name[0]][1] for name in self._free])
         return [low + random.random(len(low)) * (high - low) for _ in range(_STARTS)]
 
-    def values(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-        """Return masses, dampings, stiffnesses, and the time constant of the reference."""
-        known = self._given | dict(zip(self._free, np.exp(x).tolist(), strict=True))
-        flat = np.array([known[name] for name in self._names])
-        m, c, k = flat.reshape(3, -1)
-        return m, c, k, float(known[_TIME]) if self._follows else math.inf
+    def values(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return masses, dampings and stiffnesses, shape (n, ...), and the time constant of the reference, shape (...).
+
+        Parameters
+        ----------
+        x : ndarray, shape (..., free)
+        """
+        found = dict(zip(self._free, np.moveaxis(np.exp(x), -1, 0), strict=True))
+        shape = x.shape[:-1]
+        known = {name: np.full(shape, value) for name, value in self._given.items()} | found
+        m, c, k = np.array([known[name] for name in self._names]).reshape(3, -1, *shape)
+        return m, c, k, known[_TIME] if self._follows else np.full(shape, math.inf)
 
     def deviation(self, x: FloatArray) -> FloatArray:
-        """Return the relative deviation, real and imaginary part, shape (2 f,)."""
+        """Return the relative deviation, real and imaginary part, shape (..., 2 f), for x of shape (..., free)."""
         wanted = self._response.stiffness
-        relative = chain_stiffness(self._response.frequency, *self.values(x)) / wanted - 1.0
-        return np.concatenate([relative.real, relative.imag])
+        m, c, k, time = (value[..., None] for value in self.values(x))
+        relative = chain_stiffness(self._response.frequency, m, c, k, time) / wanted - 1.0
+        return np.concatenate([relative.real, relative.imag], axis=-1)
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of the deviation, shape (2 f, free): differences, all at once."""
+        step = _DIFFERENCE * np.where(x < 0.0, -1.0, 1.0) * np.maximum(1.0, np.abs(x))
+        step = np.where((x + step < self._low) | (x + step > self._high), -step, step)
+        there = self.deviation(np.concatenate([x[None, :], x + np.diag(step)]))
+        return ((there[1:] - there[0]) / ((x + step) - x)[:, None]).T
 
     def search(self, start: FloatArray) -> tuple[float, FloatArray]:
         """Return the cost and place of the minimum found from a start."""
-        result = least_squares(self.deviation, start, bounds=(self._low, self._high), max_nfev=200)
+        result = least_squares(self.deviation, start, self.slope, bounds=(self._low, self._high), max_nfev=200)
         return float(result.cost), result.x
 
     def model(self, x: FloatArray) -> IdentifiedModel:
         """Polish a minimum and say how certain its values are."""
-        result = least_squares(
-            self.deviation, x, bounds=(self._low, self._high), xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=500
-        )
+        limits, tight = (self._low, self._high), {"xtol": 1e-13, "ftol": 1e-13, "gtol": 1e-13}
+        result = least_squares(self.deviation, x, self.slope, bounds=limits, **tight, max_nfev=500)
         m, c, k, time = self.values(result.x)
         points = len(self._response.frequency)
         variance = 2.0 * result.cost / max(2 * points - len(x), 1)
         spread = np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(result.jac.T @ result.jac)), 0.0))
         deviations = dict(zip(self._free, (spread * np.exp(result.x)).tolist(), strict=True))
-        return IdentifiedModel(m, c, k, deviations, math.sqrt(2.0 * result.cost / points), time)
+        return IdentifiedModel(m, c, k, deviations, math.sqrt(2.0 * result.cost / points), float(time))
 
 
 def _check_fixed(name: str, value: float) -> None:

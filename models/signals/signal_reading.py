@@ -14,7 +14,7 @@ from typing import Final, NoReturn
 import numpy as np
 
 from models.arrays import FloatArray
-from models.definition_files.message_text import hint, said
+from models.definition_files.message_text import hint, not_utf8, said
 from models.definition_files.si_units import SI
 
 _HEAD: Final = re.compile(r"\s*(.*?)\s*\[\s*(.*?)\s*\]\s*")
@@ -75,7 +75,7 @@ def read_signals(path: Path, time: str | None = None) -> SignalTable:
     except OSError as error:
         raise SignalFileError(f"{path} cannot be read ({said(error)})") from error
     except UnicodeDecodeError as error:
-        raise SignalFileError(f"{path} is not a text file in UTF-8") from error
+        raise SignalFileError(f"{path} {not_utf8(error)}") from error
     head, _, body = text.partition("\n")
     columns = _columns(path, head)
     clock = _clock(path, columns, time)

@@ -77,7 +77,7 @@ static Status deed(Text name)
     if (strcmp(kind, "crash") == 0) raise(SIGSEGV);
     if (strcmp(kind, "exit") == 0) exit(0);
     if (strcmp(kind, "_exit") == 0) _exit(0);
-    if (strcmp(kind, "hang") == 0) { mark(); for (;;) {} }
+    if (strcmp(kind, "hang") == 0) { mark(); for (;;) pause(); }
     if (strcmp(kind, "fork") == 0) leave_a_child(0);
     if (strcmp(kind, "daemon") == 0) leave_a_child(1);
     if (strcmp(kind, "orphan") == 0) { leave_a_child(0); raise(SIGSEGV); }

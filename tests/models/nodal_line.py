@@ -5,23 +5,26 @@ import scipy.sparse as sp
 
 from models.catenary.contact_and_slack.contact_wire import height_polynomials
 from models.catenary.shape.beam_elements import NODE_DOFS
-from models.catenary.shape.line_matrices import element_dofs
+from models.catenary.shape.element_pattern import element_dofs
 
 
-def pendulum_stiffness(model):
+def pendulum_stiffness(mesh, static):
     """Return N/L (I - e e') of every dropper and steady arm, bar by bar, shape (6 n, 6 n)."""
-    mesh, static = model.mesh, model.static
     bars = [*zip(mesh.droppers.tolist(), static.dropper_force.tolist(), strict=True)]
     bars += zip(mesh.arms.tolist(), static.arm_force.tolist(), strict=True)
-    result = sp.lil_matrix((mesh.fixed.size, mesh.fixed.size))
+    entries = []
     for (a, b), tension in bars:
         along = static.positions[b] - static.positions[a]
         length = np.linalg.norm(along)
         across = max(tension, 0.0) / length * (np.eye(3) - np.outer(along, along) / length**2)
-        first, second = (slice(NODE_DOFS * node, NODE_DOFS * node + 3) for node in (a, b))
-        for i, j, sign in ((first, first, 1.0), (second, second, 1.0), (first, second, -1.0), (second, first, -1.0)):
-            result[i, j] += sign * across
-    return result.tocsr()
+        for i, j, sign in ((a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)):
+            entries += [
+                (NODE_DOFS * i + row, NODE_DOFS * j + column, sign * across[row, column])
+                for row in range(3)
+                for column in range(3)
+            ]
+    rows, columns, values = (np.array(part) for part in zip(*entries, strict=True))
+    return sp.csr_matrix((values, (rows.astype(int), columns.astype(int))), shape=(mesh.fixed.size, mesh.fixed.size))
 
 
 def pulls(model, elongation, rate):
@@ -45,7 +48,7 @@ class NodalLine:
         index[self.free] = np.arange(len(self.free))
         self.B = static.droppers.rows[:, self.free].tocsr()
         droppers = self.B.T @ sp.diags(model.dropper_law.stiffness) @ self.B
-        pendulums = model.definition.dynamics.geometric_stiffness * pendulum_stiffness(model)
+        pendulums = model.definition.dynamics.geometric_stiffness * pendulum_stiffness(mesh, static)
         matrices = (static.shape.matrices.K + pendulums, static.shape.matrices.M, static.shape.matrices.C)
         K, M, C = (matrix.tocsr()[self.free][:, self.free] for matrix in matrices)
         self.K, self.M = (K + droppers).tocsc(), M.tocsc()

@@ -185,8 +185,10 @@ def test_radii_of_wire_and_strip_keep_their_axes_apart(short_line):
     assert round_one == pytest.approx(bare, rel=1e-6)
 
 
-def test_a_contact_keeps_the_velocity_of_its_impact_until_it_opens(short_line):
+@pytest.mark.parametrize("kernel", ["numpy", "auto"])
+def test_a_contact_keeps_the_velocity_of_its_impact_until_it_opens(short_line, kernel, monkeypatch):
     """Two strokes against the wire, the second twice as fast; each is lossy by its own first velocity [2.47]."""
+    monkeypatch.setenv("OPENPANTO_KERNEL", kernel)
     lossy = CatenaryModel(short_line.with_values({"contact.restitution": 0.6}))
     law, state, dt = lossy.definition.contact, lossy.initial_state(), 1e-3
     z0 = float(lossy.contact_at_rest(state, _strip(120.0, 6.0)[None]).point[0, 0, 2])

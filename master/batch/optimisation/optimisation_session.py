@@ -39,6 +39,9 @@ JSON: Final = "optimise.json"
 CSV: Final = "optimise.csv"
 PARQUET: Final = "optimise.parquet"
 PAGE: Final = "optimise.html"
+GENERATOR: Final = "openpanto optimise"
+#: Where optimisations lie unless another folder is given, each in one named after its scenario.
+PLACE: Final = Path("results") / "optimise"
 #: Version of ``optimise.json``.
 FORMAT: Final = 1
 #: Parameters up to which every corner of the bounds is checked before the first run.
@@ -176,7 +179,7 @@ class OptimisationFiles(PacedFiles[OptimisationOutcome]):
 
     def __init__(self, page: Callable[[OptimisationOutcome], str]) -> None:
         texts = {CSV: lambda outcome: as_csv(outcome.rows), PAGE: page}
-        super().__init__("optimisation", "openpanto optimise", JSON, as_data, texts)
+        super().__init__("optimisation", GENERATOR, JSON, as_data, texts)
 
     def write_now(self, state: OptimisationOutcome, folder: Path) -> None:
         """Write the files of a state."""
@@ -233,6 +236,16 @@ class PreparedOptimisation:
             base.name, request, goal, bounds, place=place or base.name, changes=base.changes, options=options
         )
         return cls(base, asked, begun)
+
+
+def check_place(out: Path | None) -> None:
+    """Refuse a folder, or that of all optimisations, in which none can be kept, before FMUs are built for one.
+
+    Raises
+    ------
+    MasterError
+    """
+    results_folder.check_place(out, PLACE, JSON, GENERATOR, "optimisation")
 
 
 def optimise(

@@ -178,7 +178,7 @@ def store_values(family: Family, variant: str, values: dict[str, float]) -> None
 
 def _read_settings(path: Path) -> Settings:
     try:
-        return Settings.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return Settings.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
     except ValidationError as error:
         raise ScenarioError(_problems(path, 0, error)) from error
     except RecursionError as error:
@@ -189,7 +189,7 @@ def _read_settings(path: Path) -> Settings:
 
 def _table(path: Path) -> list[list[str]]:
     try:
-        return list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
+        return list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ScenarioError([Problem(str(path), 0, "variants", f"cannot be read: {error}")]) from error
 

@@ -152,7 +152,7 @@ def _pairs(contact: Contact) -> Iterator[tuple[str, str]]:
 def _check_component(component: Component, *, is_pantograph: bool) -> None:
     if why := why_not_ours(component.fmu.path):
         raise RequestError(f"--engine lanes cannot look into the FMU of '{component.name}': {why}; {_INSTEAD}")
-    found = tomllib.loads(_definition(component.fmu).decode("utf-8")).get("type")
+    found = tomllib.loads(_definition(component.fmu).decode("utf-8-sig")).get("type")
     if is_pantograph and found != "lumped":
         text = f"steps lumped pantographs, and '{component.name}' is of type {found}"
         raise RequestError(f"--engine lanes {text}; {_INSTEAD}")

@@ -23,7 +23,7 @@ from master.batch.sweep.distributions import Distribution, Method, draw, read_di
 from master.batch.sweep.seed_samples import seed_samples
 from master.batch.sweep.sensitivity import LEAST_BLOCKS, SensitivityMethod, block_size, designed
 from master.batch.sweep.swept_parameter import OF_THE_RUN, ParameterReader, SweptParameter, SweptValue
-from master.errors import MasterError, RequestError, hint, said
+from master.errors import MasterError, RequestError, hint, not_utf8, said
 from master.scenario.overrides import FaultsOf
 from master.system.components import System
 from master.system.pantograph_motion import STATIC_FORCE
@@ -152,7 +152,7 @@ def stored_request(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8")).get("sweep", {})
+        found = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("sweep", {})
     except (OSError, ValueError, RecursionError) as error:
         raise RequestError(f"{path} cannot be read: {error}") from error
     if not isinstance(found, dict):
@@ -225,7 +225,8 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     parts = [part for part in (table, *grid) if part is not None]
     parts += [_sample(distributions, request)] if distributions else []
     if not parts:
-        raise RequestError("nothing is varied: give --over, --vary with --samples, or --from-csv")
+        text = "--over, --vary with --samples, or --from-csv; in Python over, vary with samples, or table"
+        raise RequestError(f"nothing is varied: give {text}")
     parameters = tuple(p for part in parts for p in part.parameters)
     check_distinct(parameters)
     _check_used(request, parameters)
@@ -357,7 +358,7 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
         reader = csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")))
         return [(reader.line_num, row) for row in reader if any(row)]
     except UnicodeDecodeError as error:
-        raise RequestError(f"{path} is not text in UTF-8 (byte {error.start}); save it as CSV in UTF-8") from error
+        raise RequestError(f"{path} {not_utf8(error)}") from error
     except (OSError, csv.Error) as error:
         why = said(error) if isinstance(error, OSError) else error
         raise MasterError(f"{path} cannot be read: {why}") from error

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from master.batch.batch_session import PacedFiles, run_tasks
+from master.batch.sweep.earlier_sweep import check_earlier, run_settings
 from master.batch.sweep.held_fmus import held_fmus
 from master.batch.sweep.pages import sweep_page
 from master.batch.sweep.pages.criticality import unseen_note
@@ -22,11 +23,12 @@ from master.batch.sweep.sweep_engines import HereEngine, MakeRuns, SweepEngine
 from master.batch.sweep.sweep_journal import SweepJournal
 from master.batch.sweep.sweep_plan import SweepPlan, SweepRequest, make_plan
 from master.batch.sweep.sweep_run import RunPlace, SweepResult
-from master.batch.sweep.sweep_table import MadeRuns, as_csv, has_parquet, unjudged_note, write_parquet
+from master.batch.sweep.sweep_table import MadeRuns, as_csv, has_parquet, no_figures, unjudged_note, write_parquet
 from master.batch.sweep.swept_systems import SweepRun, make_runs, scenario_setting
 from master.errors import InterruptedRunError
 from master.report.report_files import write_charts
 from master.results import results_folder
+from master.scenario.value_checks import uncovered
 from master.system.components import System
 
 JSON: Final = "sweep.json"
@@ -37,6 +39,8 @@ GENERATOR: Final = "openpanto sweep"
 SENSITIVITY_CSV: Final = "sensitivity.csv"
 SENSITIVITY_JSON: Final = "sensitivity.json"
 RUNS: Final = "runs"
+#: Where sweeps lie unless another folder is given, each in one named after its scenario.
+PLACE: Final = Path("results") / "sweep"
 #: Version of ``sweep.json`` and of the table.
 FORMAT: Final = 1
 #: Files of a run that was kept whole, and of none that was thinned.
@@ -84,6 +88,8 @@ class SweepOutcome(MadeRuns):
         What has become of runs, by key.
     setting : dict
         What the page needs to know of the scenario, as in ``sweep.json``.
+    settings : dict
+        What all runs have in common besides values, as in ``sweep.json``.
     checks : sequence of dict
         Runs that were made in two ways, and by how much these differ; see `SweepEngine`.
     """
@@ -92,6 +98,7 @@ class SweepOutcome(MadeRuns):
     request: SweepRequest
     plan: SweepPlan
     setting: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
     checks: Sequence[Mapping[str, Any]] = ()
 
     @cached_property
@@ -109,6 +116,7 @@ def as_data(outcome: SweepOutcome) -> dict[str, Any]:
         "status": outcome.status,
         "date": outcome.date,
         "versions": dict(outcome.versions),
+        "settings": dict(outcome.settings),
         "setting": dict(outcome.setting),
         "request": outcome.request.model_dump(mode="json", exclude_none=True),
         "parameters": [
@@ -165,7 +173,8 @@ class PreparedSweep:
         """
         plan = make_plan(base, request)
         runs = make_runs(base, plan, request)
-        return cls(base, SweepOutcome(base.name, request, plan, runs=runs, setting=scenario_setting(base, plan)))
+        setting, settings = scenario_setting(base, plan), run_settings(base, plan)
+        return cls(base, SweepOutcome(base.name, request, plan, runs=runs, setting=setting, settings=settings))
 
     @property
     def announced(self) -> str:
@@ -175,11 +184,34 @@ class PreparedSweep:
             return ""
         return described(request.sensitivity, len(plan.parameters), request.samples or 0)
 
+    @cached_property
+    def unjudged(self) -> Mapping[int, str]:
+        """Why runs will have no figures, by their numbers, as far as that is known: they end too soon."""
+        if not self.base.may_stop_early:  # such runs are refused
+            return {}
+        found = ((run.number, uncovered(run.system(self.base))) for run in self.outcome.runs)
+        return {number: why for number, why in found if why}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user is to be told before the first run."""
+        return tuple(filter(None, (self.announced, self.unseen, no_figures(self.unjudged, "will have"))))
+
     @property
     def unseen(self) -> str:
         """Which faults lie where no run is judged, empty if none does."""
         setting = self.outcome.setting
         return unseen_note(setting.get("places", {}), setting.get("interval", (None, None)))
+
+
+def check_place(out: Path | None) -> None:
+    """Refuse a folder, or that of all sweeps, in which no sweep can be kept, before FMUs are built for one.
+
+    Raises
+    ------
+    MasterError
+    """
+    results_folder.check_place(out, PLACE, JSON, GENERATOR, "sweep")
 
 
 def sweep(
@@ -213,7 +245,7 @@ def sweep(
     InterruptedRunError
         If the user stops it; the table then has the finished runs.
     MasterError
-        If the folder holds something else, the sweep of another scenario included, or the engine ends.
+        If the folder holds something else, another sweep or that of another scenario included, or the engine ends.
     """
     state, chosen = prepared.outcome, engine or HereEngine()
     place = RunPlace(folder / RUNS, state.request.keep)
@@ -221,6 +253,7 @@ def sweep(
     found: dict[str, SweepResult] = {}
     try:
         with results_folder.taken_over(folder, JSON, files.generator, files.kind, state.scenario):
+            check_earlier(folder / JSON, prepared.base, state.request, state.plan, state.runs)
             _remove_leftovers(folder)
             with closing(SweepJournal(folder)) as journal:
                 old = {k: r for k, r in journal.found.items() if not (again and r.failed) and _is_there(r, place)}
@@ -233,16 +266,14 @@ def sweep(
                     found[result.key] = result  # a copy each time would be long for many runs
                     return so_far
 
-                if why := prepared.announced:
-                    tell(why)
-                if unseen := prepared.unseen:
-                    tell(unseen)
+                for text in prepared.notes:
+                    tell(text)
                 with held_fmus(prepared.base, folder) as held, chosen.opened(held, place) as make_runs_of:
                     tell(_announcement(make_runs_of, prepared.base.start, missing, state, chosen))
                     results = _shown(make_runs_of, missing, state, chosen, show)
                     ended = run_tasks(state, results, finish, files, folder)
                 _write_sensitivity(ended, folder, tell)
-                if note := unjudged_note(ended.rows):
+                if note := unjudged_note(row for row in ended.rows if row["run"] not in prepared.unjudged):
                     tell(note)
                 return ended
     except (InterruptedRunError, KeyboardInterrupt) as error:

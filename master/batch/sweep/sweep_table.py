@@ -81,11 +81,15 @@ def unjudged_note(rows: Iterable[Row]) -> str:
         for row in rows
         if row.get("status") == "complete" and row.get("verdict") and not row.get("pantograph")
     }
-    if not found:
+    return no_figures(found, "has" if len(found) == 1 else "have")
+
+
+def no_figures(reasons: Mapping[Any, str], verb: str) -> str:
+    """Return a sentence on runs without figures, the reasons given by their numbers; empty if there are none."""
+    if not reasons:
         return ""
-    first, reason = next(iter(found.items()))
-    runs = "1 run has" if len(found) == 1 else f"{len(found)} runs have"
-    return f"{runs} no figures; run {first:g}: {reason}"
+    first, reason = next(iter(reasons.items()))
+    return f"{len(reasons)} run{'' if len(reasons) == 1 else 's'} {verb} no figures; run {first:g}: {reason}"
 
 
 def as_csv(rows: Sequence[Row]) -> str:

@@ -281,7 +281,7 @@ def load_case(path: Path) -> Case:
         With every mistake in it, by file and key.
     """
     try:
-        data = _CaseData.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        data = _CaseData.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
     except ValidationError as error:
         raise ScenarioError([Problem(path.name, 0, "case", _sentence(item)) for item in error.errors()]) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -46,6 +46,8 @@ _FOLLOWS: Final = "the force is the same at every height, as real pantographs ho
 _BELOW: Final = 0.01
 #: Parameters of a pantograph that `--map` may name.
 PARAMETERS: Final = ("speed", "start_position", "reference_height", "static_force")
+#: Those that the README of a project speaks of, in words.
+_SET: Final = {"speed": "speed", "start_position": "start", "static_force": "lifting force"}
 _ALLOWED: Final = re.compile(r"[^A-Za-z0-9_]+")
 _PORT: Final = re.compile(r"pantograph\[(\d{1,2})\]\.")
 
@@ -140,9 +142,9 @@ class _Part:
         return variable.name if variable is not None and not settable(variable, "Real") else None
 
     @property
-    def is_placed(self) -> bool:
-        """Whether a pantograph can be set to where it starts, and how fast it is."""
-        return self.variable("start_position") is not None and self.variable("speed") is not None
+    def lacking(self) -> list[str]:
+        """What a pantograph cannot be set to: where it starts, or how fast it is."""
+        return [_SET[name] for name in ("start_position", "speed") if self.variable(name) is None]
 
 
 def project_name(folder: Path) -> str:
@@ -156,7 +158,8 @@ def project_name(folder: Path) -> str:
     plain = unicodedata.normalize("NFKD", folder.resolve().name)
     name = _ALLOWED.sub("_", "".join(c for c in plain if not unicodedata.combining(c))).strip("_")
     if not name:
-        raise RequestError(f"'{folder}' gives the project no name: take a folder with letters or digits in its name")
+        text = "take a folder with letters (A to Z, with accents or without) or digits in its name"
+        raise RequestError(f"'{folder}' gives the project no name: {text}")
     return name[:30]
 
 
@@ -221,7 +224,9 @@ def project_files(request: Request) -> dict[str, bytes]:
         way=way,
         supply=request.supply[1],
         overlap=contained(request.wire, way),
-        own_start=tuple(p.name for p in train if not p.is_placed),
+        values={p.name: text for p in train if (text := ", ".join(w for n, w in _SET.items() if p.variable(n)))},
+        own_start={p.name: " and its ".join(lacking) for p in train if (lacking := p.lacking)},
+        has_own_lift=any(p.foreign is None for p in train),
     )
     return {**files, PROJECT_FILE: project_text(name).encode(), "README.md": said.text().encode()}
 
@@ -259,7 +264,7 @@ def _parts(request: Request) -> list[_Part]:
             and places.setdefault(part.fmu, part.source).resolve() != part.source.resolve()
         ):
             raise RequestError(f"{part.source} and {places[part.fmu]} have one name: rename one of these FMUs")
-        if count > 1 and part.name != LINE and not part.is_placed:
+        if count > 1 and part.name != LINE and part.lacking:
             text = "start_position and speed cannot be set, as a train needs: name the parameters by --map"
             raise RequestError(f"{part.fmu}: {text} start_position=NAME, --map speed=NAME")
     return found

@@ -54,8 +54,12 @@ class ProjectPage:
         Supply system whose limits apply.
     overlap : (float, float) or None
         Overlap of the line that lies in the interval [m].
-    own_start : sequence of str
-        Pantographs that cannot be set to where they start.
+    values : mapping
+        What the scenario sets of each pantograph, in words; those that it sets nothing of are left out.
+    own_start : mapping
+        Pantographs that cannot be set to where they start or how fast they are, and which of these it is.
+    has_own_lift : bool
+        Whether a pantograph is made from a definition, so that it is known how it is lifted.
     """
 
     name: str
@@ -69,7 +73,9 @@ class ProjectPage:
     way: Stretch
     supply: str
     overlap: tuple[float, float] | None
-    own_start: Sequence[str]
+    values: Mapping[str, str]
+    own_start: Mapping[str, str]
+    has_own_lift: bool
 
     def text(self) -> str:
         """Return the page, in Markdown."""
@@ -109,8 +115,8 @@ class ProjectPage:
             f"{scenario}/SystemStructure.ssd",
             "the scenario: what is coupled, interval of interest, settings of the run",
         )
-        for name in self.train:
-            yield f"{scenario}/{name}.ssv", f"values of `{name}`: speed, start, lifting force"
+        for name, values in self.values.items():
+            yield f"{scenario}/{name}.ssv", f"values of `{name}`: {values}"
         yield f"{scenario}/resources/", "the FMUs; those of definitions are built when they are needed"
         for file in self.foreign:
             yield f"{scenario}/resources/{file}", "an FMU from elsewhere, used as it is"
@@ -132,9 +138,10 @@ class ProjectPage:
             yield f"Nothing is calibrated, as no lifting force of `{self.train[0]}` is known; compare with {target}."
         if self.calibrated and len(self.train) > 1:
             yield "The other pantographs are calibrated by `--parameter`, as in `--parameter trailing.static_force`."
-        for name in self.own_start:
+        for name, lacking in self.own_start.items():
             yield (
-                f"`{name}` has no parameters that set its start and its speed: both must be these by themselves. The "
+                f"`{name}` has no parameter that sets its {lacking}, which must be as said above by itself. The "
                 f"run ends at {self.way.stop:g} s."
             )
-        yield _LIFT
+        if self.has_own_lift:
+            yield _LIFT

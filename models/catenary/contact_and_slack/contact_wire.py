@@ -15,12 +15,12 @@ import numpy as np
 
 from models.arrays import FloatArray, IntArray
 from models.catenary.condition.running_surface import RunningSurface
-from models.catenary.contact_and_slack.crossing import Crossing, crossing, engagement, penetration
+from models.catenary.contact_and_slack.crossing import Crossing, Strip, crossing, engagement, penetration
 from models.catenary.linear_motion.interval_modes import IntervalModes, IntervalMotion
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.shape.beam_elements import NODE_DOFS, frames, hermite_rows
+from models.catenary.shape.element_pattern import element_dofs
 from models.catenary.shape.form_finding import StaticState
-from models.catenary.shape.line_matrices import element_dofs
 from models.catenary.shape.line_mesh import Chain
 from models.catenary.shape.wire_intervals import Interval, turns
 
@@ -149,15 +149,14 @@ class ContactWire:
         """Return the number of its elements."""
         return len(self._of_element)
 
-    def is_near(self, strip: FloatArray) -> bool:
+    def is_near(self, strip: Strip) -> bool:
         """Return whether a strip could meet the wire, which may end before it.
 
         Parameters
         ----------
-        strip : ndarray, shape (2, 2, 3)
-            Ends A and B; position and velocity.
+        strip : Strip
         """
-        a, b = float(strip[0, 0, 0]), float(strip[1, 0, 0])
+        a, b = strip[0][0][0], strip[1][0][0]
         return self.period > 0.0 or (max(a, b) > self.starts[0] - _FAR and min(a, b) < self.starts[-1] + _FAR)
 
     def locate(self, x: float) -> tuple[int, float]:
@@ -176,13 +175,12 @@ class ContactWire:
         after, count = self._of_element[element].first + len(self._of_element[element].height), self.elements
         return self._of_element[after % count if self.period else min(after, count - 1)]
 
-    def find(self, strip: FloatArray, positions: Positions, guess: int) -> Crossing | None:
+    def find(self, strip: Strip, positions: Positions, guess: int) -> Crossing | None:
         """Find where a strip crosses the wire, walking from the element ``guess``.
 
         Parameters
         ----------
-        strip : ndarray, shape (2, 2, 3)
-            Ends A and B; position and velocity.
+        strip : Strip
         positions : callable
             Interval -> positions in plan of its nodes, x and y in turn [m].
 
@@ -191,7 +189,7 @@ class ContactWire:
         Crossing or None
             None beyond the wire's ends, or where the wire passes beside the strip.
         """
-        a, b = strip[:, 0].tolist()
+        a, b = list(strip[0][0]), list(strip[1][0])
         if self.period:
             self._shift(a, b, -self._laps((a[0] + b[0]) / 2.0))
         element = self.start(guess, (a[0] + b[0]) / 2.0)
@@ -220,17 +218,15 @@ class ContactWire:
                 element %= last + 1
                 self._shift(a, b, -step)
 
-    def crossing(self, strip: FloatArray, element: int, xi: float, share: float) -> Crossing:
+    def crossing(self, strip: Strip, element: int, xi: float, share: float) -> Crossing:
         """Return a crossing from its place on an element and on the strip."""
-        a, b = strip[:, 0, :2].tolist()
+        a, b = strip[0][0][:2], strip[1][0][:2]
         start, end = self.starts[element : element + 2]
         x = start + xi * (end - start)
         from_wire_end = math.inf if self.period else min(x - self.starts[0], self.starts[-1] - x)
         return Crossing(element, xi, share, engagement(min(share, 1.0 - share) * math.dist(a, b), from_wire_end))
 
-    def penetration(
-        self, share: float, height: float, rate: float, strip: FloatArray, gap: float
-    ) -> tuple[float, float]:
+    def penetration(self, share: float, height: float, rate: float, strip: Strip, gap: float) -> tuple[float, float]:
         """Return penetration and its velocity of a strip that crosses the wire [m, m/s]; see `crossing.penetration`.
 
         A running surface r that stands up leaves less of them, by r and by v dr/dx with the speed v of the strip.
@@ -238,7 +234,7 @@ class ContactWire:
         delta, velocity = penetration(share, height, rate, strip, gap)
         if self.surface is None:
             return delta, velocity
-        (x, v), (x_b, v_b) = strip[:, :, 0].tolist()
+        (x, v), (x_b, v_b) = ((position[0], velocity[0]) for position, velocity in strip)
         r, slope = self.surface.at(x + share * (x_b - x))
         return delta - r, velocity - (v + share * (v_b - v)) * slope
 
@@ -248,21 +244,6 @@ class ContactWire:
             return guess
         found = bisect_left(self.starts, x) - 1
         return min(max(found, 0), len(self._of_element) - 1)
-
-    def in_lap(self, strip: FloatArray) -> FloatArray:
-        """Return a strip in the lap of the elements of a wire that closes on itself; on one that ends, the strip.
-
-        Parameters
-        ----------
-        strip : ndarray, shape (2, 2, 3)
-            Ends A and B; position and velocity.
-        """
-        laps = self._laps(0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
-        if not laps:
-            return strip
-        moved = strip.copy()
-        moved[:, 0, 0] -= laps * self.period
-        return moved
 
     def alongside(self, x: FloatArray, place: FloatArray) -> FloatArray:
         """Return places along the track of a wire that closes on itself in the lap of strips near them.

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from models.arrays import FloatArray
-
 #: Widths over which a contact sets in and fades [m]: of the strip, from its ends, as its horns bend down there; of the
 #: wire, from its ends. They keep the force continuous where a wire slides off a strip or ends under it.
 STRIP_EDGE = 0.05
 WIRE_EDGE = 1.0
+
+#: A strip: ends A and B; position and velocity of each; x, y, z. Plain numbers are faster than short arrays.
+Strip = Sequence[Sequence[Sequence[float]]]
 
 
 class Crossing(NamedTuple):
@@ -76,7 +77,7 @@ def engagement(from_strip_end: float, from_wire_end: float) -> float:
     return min(1.0, from_strip_end / STRIP_EDGE) * min(1.0, from_wire_end / WIRE_EDGE)
 
 
-def penetration(share: float, height: float, rate: float, strip: FloatArray, gap: float) -> tuple[float, float]:
+def penetration(share: float, height: float, rate: float, strip: Strip, gap: float) -> tuple[float, float]:
     """Return penetration and its velocity of a strip, where a wire of some height crosses it [m, m/s].
 
     Parameters
@@ -85,10 +86,10 @@ def penetration(share: float, height: float, rate: float, strip: FloatArray, gap
         Of the way along the strip.
     height, rate : float
         Of the wire's axis, and how fast that rises [m, m/s].
-    strip : ndarray, shape (2, 2, 3)
-        Ends A and B; position and velocity.
+    strip : Strip
     gap : float
         Between the axes of a wire and of a strip that touch [m].
     """
-    (z_a, v_a), (z_b, v_b) = strip[:, :, 2].tolist()
+    (a, a_rate), (b, b_rate) = strip
+    z_a, v_a, z_b, v_b = a[2], a_rate[2], b[2], b_rate[2]
     return z_a + share * (z_b - z_a) - (height - gap), v_a + share * (v_b - v_a) - rate

@@ -137,8 +137,8 @@ class LocalProblem:
         free_force : ndarray, shape (n_droppers,)
             Pulls T of the droppers in the free solution [N].
         contacts : sequence of ContactCandidate
-        strip_compliance : ndarray, shape (n_contacts, n_contacts)
-            Retreat of the strips per contact force within the step [m/N]; zero for prescribed strips.
+        strip_compliance : ndarray, shape (n_pantographs,)
+            Retreat of a strip per force on it within the step [m/N]; zero for prescribed strips.
         slack : ndarray of int
             Droppers that were slack at the last step, as a start.
 
@@ -150,33 +150,24 @@ class LocalProblem:
         if not contacts and not slack.size and free_force.min(initial=0.0) >= 0.0:
             return LocalForces([], [], [], _NONE, _NOTHING)
         if len(contacts) == 1 and not slack.size:
-            found = self._single_contact(free_force, contacts[0], float(strip_compliance[0, 0]))
+            found = self._single_contact(free_force, contacts[0], strip_compliance.item(contacts[0].pantograph))
             if found is not None:
                 return found
-        coupling = _Coupling(self, contacts, strip_compliance)
-        forces = np.array([_estimate(self, c) for c in contacts])
-        compensation = np.zeros(slack.size)
-        # Without contacts one iteration is exact for its set, and the set to begin with may well be the one.
-        previous = None if contacts else (slack.tobytes(), b"")
+        n = len(contacts)
+        effects, forces = _Effects(self, contacts, strip_compliance, slack), np.zeros(n + slack.size)
         for _ in range(_MAX_ITERATIONS):
-            laws = coupling.laws(forces, slack, compensation)
-            new_forces, compensation = coupling.newton_step(free_force, laws, forces, slack, compensation)
-            change = np.abs(new_forces - forces).max(initial=0.0)
-            forces = new_forces
-            pull = coupling.dropper_force(free_force, forces, slack, compensation)
-            penetration, velocity = coupling.penetration(forces, slack, compensation)
-            now_slack = np.flatnonzero(pull < 0.0)
-            signature = (now_slack.tobytes(), (penetration > 0.0).tobytes())
-            settled = change <= _TOLERANCE * (1.0 + forces.max(initial=0.0))
-            same = np.array_equal(now_slack, slack)
-            if settled and signature == previous and same:
-                closed = (penetration > 0.0).tolist()
-                return LocalForces(forces.tolist(), velocity.tolist(), closed, slack, compensation)
-            previous = signature
-            if not same:
-                compensation = _carried(now_slack, slack, compensation)
+            before, forces = forces, effects.newton_step(free_force, forces)
+            now_slack = (free_force + effects.pulled.dot(forces) < 0.0).nonzero()[0]
+            if now_slack.tobytes() != slack.tobytes():
+                forces = np.concatenate((forces[:n], _carried(now_slack, slack, forces[n:])))
                 slack = now_slack
-        raise not_settled(slack.size, len(contacts))
+                effects = _Effects(self, contacts, strip_compliance, slack)
+            # Without contacts one iteration is exact for its set.
+            elif not n or abs(forces - before).max() <= _TOLERANCE * (1.0 + forces.max()):
+                penetration, velocity = effects.at_contacts(forces)
+                closed = [delta > 0.0 for delta in penetration]
+                return LocalForces(forces[:n].tolist(), velocity, closed, slack, forces[n:])
+        raise not_settled(slack.size, n)
 
     def law_of(self, contact: ContactCandidate, penetration: float, velocity: float) -> NormalForce:
         """Return the contact law of one contact; its first closed instant is its impact."""
@@ -206,118 +197,72 @@ class LocalProblem:
 
     def _slackens(self, free_force: FloatArray, point: WirePoint, force: float) -> bool:
         """Return whether any dropper is slack under a force on one point."""
-        columns = point.response.columns
-        change = columns.dropper_force.dot(force * point.load)
-        near = free_force.take(columns.dropper_index) + change
-        if near.min(initial=0.0) < 0.0:
-            return True
-        if free_force.min(initial=0.0) >= 0.0:
-            return False
-        pull = free_force.copy()  # one that would be slack without the force may be near
-        pull[columns.dropper_index] = near
-        return bool(pull.min() < 0.0)
+        columns, pull = point.response.columns, free_force.copy()
+        pull[columns.dropper_index] += columns.dropper_force.dot(force * point.load)
+        return bool(pull.min(initial=0.0) < 0.0)
 
 
-class _Coupling:
-    """Compliances between the contacts and the droppers of one step."""
+class _Effects:
+    """What unit forces do: first those of the contacts F, then those that slack droppers lack, f.
+
+    Attributes
+    ----------
+    moved : ndarray, shape (n_contacts, n_forces)
+        Of the penetrations [m/N].
+    pulled : ndarray, shape (n_droppers, n_forces)
+        Of the droppers' pulls [N/N].
+    """
 
     def __init__(
-        self, problem: LocalProblem, contacts: Sequence[ContactCandidate], strip_compliance: FloatArray
-    ) -> None:
-        self.problem, self.contacts = problem, contacts
-        self._penetration = np.array([c.penetration for c in contacts])
-        self._velocity = np.array([c.velocity for c in contacts])
-        self._slack: IntArray | None = None
-        n = len(contacts)
-        self.contact_contact = strip_compliance.copy()
-        self.dropper_contact = np.zeros((problem.unilateral.size, n))
-        for j, source in enumerate(contacts):
-            point = source.point
-            columns = point.response.columns
-            self.dropper_contact[columns.dropper_index, j] = columns.dropper_force @ point.load
-            for i, target in enumerate(contacts):
-                self.contact_contact[i, j] += target.point.moved_by(point)
-
-    def by_slack(self, slack: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what forces of slack droppers do to the pulls of all droppers and to the penetrations.
-
-        Returns
-        -------
-        d(-T)/df : ndarray, shape (n_droppers, n_slack)
-        d(delta)/df : ndarray, shape (n_contacts, n_slack)
-        """
-        if slack is not self._slack:  # the set rarely changes
-            self._slack = slack
-            on_droppers = np.zeros((self.problem.unilateral.size, slack.size))
-            on_contacts = np.zeros((len(self.contacts), slack.size))
-            self._by_slack = on_droppers, on_contacts
-            for k, j in enumerate(slack.tolist()):
-                column = self.problem.dropper_columns[j]
-                on_droppers[column.dropper_index, k] = column.dropper_force[:, 0]
-                for i, contact in enumerate(self.contacts):
-                    point = contact.point
-                    on_contacts[i, k] = point.load.dot(column.at(point.response.interval.ends)[:, 0])
-        return self._by_slack
-
-    def penetration(
-        self, forces: FloatArray, slack: IntArray, compensation: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return penetrations and their velocities under given forces."""
-        change = self.by_slack(slack)[1] @ compensation - self.contact_contact @ forces
-        return self._penetration + change, self._velocity + self.problem.velocity_factor * change
-
-    def dropper_force(
-        self, free: FloatArray, forces: FloatArray, slack: IntArray, compensation: FloatArray
-    ) -> FloatArray:
-        """Return the droppers' pulls under given forces."""
-        return free + self.dropper_contact @ forces - self.by_slack(slack)[0] @ compensation
-
-    def laws(self, forces: FloatArray, slack: IntArray, compensation: FloatArray) -> list[NormalForce]:
-        """Return the contact law and its slopes at the present penetrations."""
-        penetration, velocity = self.penetration(forces, slack, compensation)
-        return [
-            self.problem.law_of(c, float(d), float(v))
-            for d, v, c in zip(penetration, velocity, self.contacts, strict=True)
-        ]
-
-    def newton_step(
         self,
-        free: FloatArray,
-        laws: Sequence[NormalForce],
-        forces: FloatArray,
+        problem: LocalProblem,
+        contacts: Sequence[ContactCandidate],
+        strip_compliance: FloatArray,
         slack: IntArray,
-        compensation: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Solve the problem linearised at the present forces, for the present set of slack droppers.
+    ) -> None:
+        self._problem, self._contacts, self._slack = problem, contacts, slack
+        n, size = len(contacts), len(contacts) + slack.size
+        self.moved, self.pulled = np.zeros((n, size)), np.zeros((problem.unilateral.size, size))
+        for k, source in enumerate(contacts):
+            columns = source.point.response.columns
+            self.pulled[columns.dropper_index, k] = columns.dropper_force.dot(source.point.load)
+            for i, target in enumerate(contacts):
+                self.moved[i, k] = -target.point.moved_by(source.point)
+                if target.pantograph == source.pantograph:  # two contacts of one strip share its retreat
+                    self.moved[i, k] -= strip_compliance[source.pantograph]
+        for k, j in enumerate(slack.tolist(), n):
+            column = problem.dropper_columns[j]
+            self.pulled[column.dropper_index, k] = -column.dropper_force[:, 0]
+            for i, target in enumerate(contacts):
+                ends = target.point.response.interval.ends
+                self.moved[i, k] = target.point.load.dot(column.at(ends)[:, 0])
+        #: Of what the forces follow, the penetrations and the pulls of slack droppers.
+        self._felt = np.concatenate((self.moved, self.pulled[slack]))
+        self._unilateral, self._one = problem.unilateral[slack], np.eye(size)
 
-        Contacts: F - slope (delta(F, f) - delta) = law; droppers of the set: f + (1 - r) T(F, f) = 0.
+    def newton_step(self, free_force: FloatArray, forces: FloatArray) -> FloatArray:
+        """Return the forces of the problem linearised at the present ones, for the present set of slack droppers.
+
+        Contacts: F = law + slope (delta(F, f) - delta); droppers of the set: f = -(1 - r) T(F, f).
         """
-        n, m = len(forces), slack.size
-        system = np.eye(n + m)
-        right = np.zeros(n + m)
-        slope = np.array([a.by_penetration + self.problem.velocity_factor * a.by_velocity for a in laws])
-        if n:
-            by_contact, by_slack = -self.contact_contact, self.by_slack(slack)[1]
-            system[:n, :n] -= slope[:, None] * by_contact
-            system[:n, n:] -= slope[:, None] * by_slack
-            value = np.array([a.force for a in laws])
-            right[:n] = value - slope * (by_contact @ forces + by_slack @ compensation)
-        if m:
-            share = self.problem.unilateral[slack]
-            system[n:, :n] += share[:, None] * self.dropper_contact[slack]
-            system[n:, n:] -= share[:, None] * self.by_slack(slack)[0][slack]
-            right[n:] = -share * free[slack]
-        if n + m:
-            _, _, right, failed = dgesv(system, right, overwrite_a=1, overwrite_b=1)
-            if failed:
-                raise LocalSolutionError("slack and contact forces have no solution: their compliances are singular")
-        return right[:n], right[n:]
+        if not forces.size:
+            return forces
+        laws = [self._problem.law_of(*touch) for touch in zip(self._contacts, *self.at_contacts(forces), strict=True)]
+        slope = np.array([law.by_penetration + self._problem.velocity_factor * law.by_velocity for law in laws])
+        known = np.array([law.force for law in laws]) - slope * self.moved.dot(forces)
+        follow = np.concatenate((slope, -self._unilateral))
+        right = np.concatenate((known, -self._unilateral * free_force[self._slack]))
+        system = self._one - follow[:, None] * self._felt
+        _, _, found, failed = dgesv(system, right, overwrite_a=1, overwrite_b=1)
+        if failed:
+            raise LocalSolutionError("slack and contact forces have no solution: their compliances are singular")
+        return found
 
-
-def _estimate(problem: LocalProblem, contact: ContactCandidate) -> float:
-    """Return a first guess of a contact force: the law's secant over the free penetration."""
-    law = problem.law_of(contact, contact.penetration, contact.velocity)
-    return law.force / (1.0 + law.by_penetration * contact.point.compliance)
+    def at_contacts(self, forces: FloatArray) -> tuple[list[float], list[float]]:
+        """Return the penetrations under given forces [m], and their velocities [m/s]."""
+        changes = list(zip(self._contacts, self.moved.dot(forces).tolist(), strict=True))
+        velocity = [c.velocity + self._problem.velocity_factor * change for c, change in changes]
+        return [c.penetration + change for c, change in changes], velocity
 
 
 def _carried(now: IntArray, before: IntArray, compensation: FloatArray) -> FloatArray:

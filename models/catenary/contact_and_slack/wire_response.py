@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
-from models.catenary.contact_and_slack.crossing import Crossing
+from models.catenary.contact_and_slack.contact_wire import WireInterval
 from models.catenary.linear_motion.compliance import Columns
 from models.catenary.linear_motion.step_matrices import StepMatrices
 
@@ -42,9 +40,8 @@ class IntervalResponse:
         """Return a point of an element of the wire; ``xi`` is the share of the way along the element."""
         row, height = self.interval.lift(element, xi)
         modal, ends = self.interval.split(row)
-        load = ends - modal.dot(self.yielding)
-        own = modal.dot(modal * self.inverse)
-        return WirePoint(self, row, height, load, float(load.dot(self.at_ends.dot(load)) + own))
+        load, give = ends - modal.dot(self.yielding), modal * self.inverse
+        return WirePoint(self, row, height, load, give, float(load.dot(self.at_ends.dot(load)) + modal.dot(give)))
 
     def advance(self, local: FloatArray, change: FloatArray, a1: float) -> FloatArray:
         """Let local coordinates follow their attachments to the end of a step; return them and their rates.
@@ -60,10 +57,9 @@ class IntervalResponse:
         """
         count = self.interval.count
         change[:count] -= self.yielding.dot(change[count:])
-        displacement, velocity = local
-        displacement += change
+        local[0] += change
         change *= a1
-        np.subtract(change, velocity, out=velocity)
+        np.subtract(change, local[1], out=local[1])
         return local
 
 
@@ -87,6 +83,8 @@ class WirePoint(NamedTuple):
         Static height [m].
     load : ndarray, shape (e,)
         What a unit vertical force on it does to the attachments, directly and through the modes.
+    give : ndarray, shape (n_span,)
+        How far it moves the modes within a step, the attachments held.
     compliance : float
         How far it gives way to such a force within a step [m/N].
     """
@@ -95,48 +93,15 @@ class WirePoint(NamedTuple):
     row: FloatArray
     height: float
     load: FloatArray
+    give: FloatArray
     compliance: float
-
-    @property
-    def modal(self) -> FloatArray:
-        """Return what a unit vertical force on it does to the modes of its interval, shape (n_span,)."""
-        return self.row[: self.response.interval.count]
 
     def moved_by(self, other: WirePoint) -> float:
         """Return how far the wire is moved here by a unit force at another point [m/N]."""
+        if other is self:
+            return self.compliance
         here, there = self.response, other.response
         moved = float(self.load @ (there.columns.at(here.interval.ends) @ other.load))
         if here.interval.modes == there.interval.modes:
-            moved += float(self.modal @ (other.modal * here.inverse))
+            moved += float(here.interval.split(self.row)[0] @ other.give)
         return moved
-
-
-#: A crossing, the point of the wire there, and how far it stands above its static height and the rate of that [m, m/s].
-Met = tuple[Crossing, WirePoint, float, float]
-#: How a wire gives way to forces on an interval.
-ResponseOf = Callable[[WireInterval], IntervalResponse]
-
-
-def walk(
-    wire: ContactWire,
-    response_of: ResponseOf,
-    motion_of: Callable[[WireInterval], FloatArray],
-    strip: FloatArray,
-    guess: int,
-) -> Met | None:
-    """Return where a strip crosses a wire, walking from the element ``guess``; None if it does not.
-
-    Parameters
-    ----------
-    motion_of : callable
-        Interval -> its local coordinates and their rates, shape (2, m).
-    strip : ndarray, shape (2, 2, 3)
-        Ends A and B; position and velocity.
-    """
-    found = wire.find(strip, lambda interval: interval.positions(motion_of(interval)[0]), guess)
-    if found is None:
-        return None
-    interval = wire.interval(found.element)
-    point = response_of(interval).point(found.element, found.xi)
-    rise, rate = motion_of(interval).dot(point.row).tolist()
-    return found, point, rise, rate

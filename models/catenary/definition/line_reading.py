@@ -156,7 +156,7 @@ def _check_tensioning(table: Table, definition: CatenaryDefinition) -> None:
         return
     start, end = sections[0].spans[0].start, sections[0].spans[-1].end
     if len(sections) > 1:
-        text = "of several sections each has its own: leave it out, it is the middle of each"
+        text = "is of one section, and the line has several: leave it out, and each is fixed in its middle"
         table.problem("tensioning.fixed_point", text)
     elif not start <= fixed <= end:
         table.problem("tensioning.fixed_point", f"{fixed:g} m lies outside the line, {start:g} ... {end:g} m")

@@ -75,7 +75,7 @@ def _read_boundaries(table: Table) -> list[float]:
         lengths = [length] * table.integer("count", minimum=1, maximum=MAX_SPANS)
     else:
         lengths = list(table.quantities("lengths", "m", minimum=1.0, maximum=200.0))
-        if table.has("lengths") and not 1 <= len(lengths) <= MAX_SPANS:
+        if table.has("lengths") and not table.mistaken(["lengths"]) and not 1 <= len(lengths) <= MAX_SPANS:
             table.problem("lengths", f"gives {len(lengths)} spans, not 1 ... {MAX_SPANS}")
     boundaries = [start]
     for length in lengths or [math.nan]:
@@ -84,7 +84,8 @@ def _read_boundaries(table: Table) -> list[float]:
         end = table.quantity("end", "m")
         if abs(end - boundaries[-1]) > 1e-6:
             sums = f"they end at {boundaries[-1]:g} m, not at {end:g} m"
-            table.problem("end", f"the spans do not add up: {sums}; correct their lengths or this end")
+            advice = table.comma_advice("lengths")
+            table.problem("end", f"the spans do not add up: {sums}; correct their lengths or this end{advice}")
     return boundaries
 
 
@@ -172,7 +173,8 @@ def _check_droppers(table: Table, index: int, length: float, offsets: Sequence[f
     if outside:
         table.problem(key, f"dropper at {', '.join(outside)} m lies outside its span, number {index} of {length:g} m")
     elif any(b - a < 1e-3 for a, b in pairwise(offsets)):
-        table.problem(key, f"span {index}: droppers are not in rising order")
+        advice = table.comma_advice("positions")
+        table.problem(key, f"span {index}: droppers are not in rising order{advice}")
 
 
 @dataclass(frozen=True)
@@ -194,9 +196,10 @@ def _read_ends(table: Table, boundaries: Sequence[float]) -> tuple[tuple[int, in
 
 def _read_end(table: Table, boundaries: Sequence[float]) -> _End:
     """Read one end; ``boundaries`` are in order from that end."""
-    free = table.integer("spans", default=0, minimum=0, maximum=max(0, (len(boundaries) - 2) // 2))
+    most = max(0, (len(boundaries) - 2) // 2) if all(map(math.isfinite, boundaries)) else MAX_SPANS
+    free = table.integer("spans", default=0, minimum=0, maximum=most)
     rise = table.quantity("rise", "m", default=0.0, minimum=0.0, maximum=5.0)
-    working = boundaries[free]
+    working = boundaries[min(free, len(boundaries) - 1)]  # fewer only if the lengths could not be read
     if table.has("length"):
         whole = boundaries[-1] - boundaries[0]
         length = table.quantity("length", "m", positive=True, maximum=max(1e-3, 0.5 * abs(whole)))

@@ -14,7 +14,7 @@ from typing import Final
 
 from models.catenary.definition.section_definition import Section
 from models.catenary.definition.surface_definition import LARGEST_HEIGHT, RunningSurface
-from models.definition_files.message_text import said
+from models.definition_files.message_text import not_utf8, said
 from models.definition_files.si_units import shown, to_si
 from models.definition_files.toml_reader import Table, beyond_all
 
@@ -34,7 +34,7 @@ _Point = tuple[float, float]
 def named_profile(path: Path) -> Path | None:
     """Return the file that a line's definition has its running surface from; None if it names none, or is no TOML."""
     try:
-        surface = tomllib.loads(path.read_text(encoding="utf-8")).get("running_surface")
+        surface = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("running_surface")
     except (OSError, ValueError):
         return None
     name = surface.get("profile") if isinstance(surface, dict) else None
@@ -89,7 +89,7 @@ def _read(path: Path) -> tuple[list[_Point], list[str]]:
     except OSError as error:
         return [], [f": cannot be read ({said(error)})"]
     except UnicodeDecodeError as error:
-        return [], [f": is not UTF-8 text (byte {error.start})"]
+        return [], [f": {not_utf8(error)}"]
     lines = text.splitlines()
     separator = next((s for s in (";", "\t") if lines and s in lines[0]), ",")
     head = next(csv.reader(lines[:1], delimiter=separator), [])

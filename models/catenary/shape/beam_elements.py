@@ -68,6 +68,27 @@ def beam_geometric_stiffness(tension: FloatArray, length: FloatArray) -> FloatAr
     return K
 
 
+def bar_stiffness(direction: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Return the stiffness of bars along their axes, k [[e e', -e e'], [-e e', e e']] on the translations of both ends.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (n, 3)
+        Unit vectors e along the bars.
+    stiffness : ndarray, shape (n,)
+        Axial stiffness k = EA/L [N/m].
+
+    Returns
+    -------
+    ndarray, shape (n, 6, 6)
+    """
+    block = (stiffness[:, None] * direction)[:, :, None] * direction[:, None, :]
+    result = np.empty((len(block), 6, 6))
+    result[:, :3, :3] = result[:, 3:, 3:] = block
+    result[:, :3, 3:] = result[:, 3:, :3] = -block
+    return result
+
+
 def bar_geometric_stiffness(direction: FloatArray, tension: FloatArray, length: FloatArray) -> FloatArray:
     """Return the stiffness N/L across bars under tension, the one that makes a pendulum swing back.
 

@@ -23,6 +23,7 @@ from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.dropper_conditions import DropperConditions, dropper_conditions
 from models.catenary.shape.dropper_set import DropperSet, dropper_lengths, dropper_set, turned_over
 from models.catenary.shape.line_matrices import (
+    LineAssembly,
     Matrices,
     arm_load,
     axial_stiffness,
@@ -31,7 +32,7 @@ from models.catenary.shape.line_matrices import (
     steady_arm_tension,
 )
 from models.catenary.shape.line_mesh import CatenaryMesh
-from models.catenary.shape.line_shape import LineShape, line_shape
+from models.catenary.shape.line_shape import LineShape, shape_about
 from models.catenary.shape.steady_arms import arms_without_side, carry_arms, pushing_arms, with_arms_turned
 from models.catenary.shape.wire_intervals import attachments
 
@@ -155,7 +156,7 @@ def rest_stiffness(static: StaticState) -> sp.csc_matrix:
     shape, mesh, droppers = static.shape, static.shape.mesh, static.droppers
     moves = np.zeros(mesh.fixed.shape)
     moves[:, :3] = _movable(mesh, carries_arms=False)
-    stretch = axial_stiffness(shape.definition, mesh, shape.points, arms=False) @ sp.diags(moves.ravel())
+    stretch = _of_moves(axial_stiffness(shape.definition, mesh, shape.points, arms=False), moves)
     taut = np.where(static.is_slack, droppers.compression_ratio, 1.0) * droppers.stiffness
     springs = droppers.rows.T @ sp.diags(taut) @ droppers.rows
     return (shape.matrices.K - stretch + springs + static.pendulum_stiffness()).tocsc()
@@ -173,13 +174,14 @@ def _settled(
     # What a design keeps as displacements (of the wire at its arms, their stretch) is no move of the reference.
     kept = np.zeros(mesh.fixed.shape) if design is None else unstretched * design.displacement.reshape(-1, NODE_DOFS)
     slack, first = np.zeros(len(mesh.droppers), dtype=bool), points
+    assembly = LineAssembly(definition, mesh)
     for iteration in range(_MAX_ITERATIONS):
-        shape = _shape(definition, mesh, points, design)
+        shape = _shape(assembly, points, design, damped=False)
         matrices = shape.matrices
         # Moving a reference point redefines the length of the wire, so it does not stretch the wire.
-        stretch = axial_stiffness(definition, mesh, points, arms=design is None) @ sp.diags(unstretched.ravel())
+        stretch = _of_moves(assembly.axial_stiffness(points, arms=design is None), unstretched)
         # Likewise the guides act on moves of the reference only, and vanish from the result with them.
-        guides = _swing(shape, force, design) @ sp.diags(unstretched.ravel())
+        guides = _of_moves(_swing(shape, force, design), unstretched)
         conditions = dropper_conditions(shape, slack)
         load = matrices.load if design is None else matrices.load + (guides - stretch) @ kept.ravel()
         displacement, force = _solve(shape, matrices.K - stretch + guides, conditions, load)
@@ -190,7 +192,8 @@ def _settled(
         now_slack = _slack(mesh, _displaced(points, displacement))
         if np.abs(move).max() < _TOLERANCE and np.array_equal(slack, now_slack):
             # Solve once more without the guides, to remove what the tolerance of the iteration leaves of them.
-            return _static_state(shape, *_solve(shape, matrices.K, conditions, matrices.load), slack, design)
+            solution = _solve(shape, matrices.K, conditions, matrices.load)
+            return _static_state(_shape(assembly, points, design), *solution, slack, design)
         _straighten(mesh, points, move)
         points = points + move
         if design is None:
@@ -204,15 +207,20 @@ def _settled(
     )
 
 
-def _shape(
-    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, design: StaticState | None
-) -> LineShape:
+def _shape(assembly: LineAssembly, points: FloatArray, design: StaticState | None, *, damped: bool = True) -> LineShape:
     """Return the line about reference points; the arms of a design keep their lengths."""
-    shape = line_shape(definition, mesh, points)
-    if design is None or definition.steady_arm is None:
+    shape = shape_about(assembly, points, damped=damped)
+    if design is None or assembly.definition.steady_arm is None:
         return shape
-    load = shape.matrices.load + arm_load(definition, mesh, points, design.shape.points)
+    load = shape.matrices.load + arm_load(assembly.definition, assembly.mesh, points, design.shape.points)
     return replace(shape, matrices=replace(shape.matrices, load=load))
+
+
+def _of_moves(matrix: sp.csc_matrix, moves: FloatArray) -> sp.csc_matrix:
+    """Return a matrix whose columns are weighted by what moves, shape (n, 6)."""
+    result = matrix.copy()
+    result.data *= np.repeat(moves.ravel(), np.diff(matrix.indptr))
+    return result
 
 
 def _displaced(points: FloatArray, displacement: FloatArray) -> FloatArray:

@@ -83,17 +83,30 @@ def _numbers(kept: Snapshot | None, mesh: CatenaryMesh) -> dict[str, FloatArray]
     return numbers if {name: array.shape for name, array in numbers.items()} == shapes else None
 
 
-def _key(definition: CatenaryDefinition, mesh: CatenaryMesh) -> str:
-    """Return a hash of definition, mesh, code, libraries and processor; empty where the code cannot be read."""
+def _source(module: ModuleType) -> Path:
+    return Path(str(module.__file__))
+
+
+def _code() -> bytes:
+    """Return a hash of the code that finds a form, nothing where it cannot be read."""
     whole = hashlib.sha256()
     try:
-        for path in (
-            *sorted(Path(__file__).parent.glob("*.py")),
-            *map(_source, (line_definition, section_definition, track_definition)),
-        ):
+        for path in (*sorted(Path(__file__).parent.glob("*.py")), *map(_source, _DEFINING)):
             whole.update(path.read_bytes())
     except OSError:
+        return b""
+    return whole.digest()
+
+
+#: Read now: an FMU's folder may be gone when a second instance asks for the form.
+_CODE: Final = _code()
+
+
+def _key(definition: CatenaryDefinition, mesh: CatenaryMesh) -> str:
+    """Return a hash of definition, mesh, code, libraries and processor; empty where the code cannot be read."""
+    if not _CODE:
         return ""
+    whole = hashlib.sha256(_CODE)
     whole.update("\0".join((sys.version, np.__version__, scipy.__version__, *_processor())).encode())
     # Errors and faults come after the form: all samples of them share one.
     whole.update(repr(replace(definition, irregularity=Irregularity(), fault=())).encode())
@@ -102,10 +115,6 @@ def _key(definition: CatenaryDefinition, mesh: CatenaryMesh) -> str:
         for array in (value,) if isinstance(value, np.ndarray) else (chain.nodes for chain in value):
             whole.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
     return whole.hexdigest()
-
-
-def _source(module: ModuleType) -> Path:
-    return Path(str(module.__file__))
 
 
 def _processor() -> tuple[str, ...]:

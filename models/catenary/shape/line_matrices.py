@@ -13,12 +13,14 @@ from models.catenary.definition.track_definition import Track
 from models.catenary.shape.beam_elements import (
     NODE_DOFS,
     bar_geometric_stiffness,
+    bar_stiffness,
     beam_geometric_stiffness,
     beam_mass,
     beam_stiffness,
     frames,
     to_global,
 )
+from models.catenary.shape.element_pattern import ElementPattern, element_dofs, translation_dofs
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.track import acceleration, curve_load
 
@@ -75,70 +77,90 @@ def beam_properties(definition: CatenaryDefinition, mesh: CatenaryMesh) -> BeamP
     return properties
 
 
-def assemble(
-    definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, dropper_mass: FloatArray
-) -> Matrices:
-    """Assemble the matrices and the static load of a line about reference positions.
+class LineAssembly:
+    """Assembles a line about one set of points after another: what does not depend on these is made once.
 
     Parameters
     ----------
-    points : ndarray, shape (n, 3)
-        Reference positions [m].
-    dropper_mass : ndarray, shape (n_droppers,)
-        [kg].
+    definition : CatenaryDefinition
+    mesh : CatenaryMesh
+        Its points are not looked at.
     """
-    properties = beam_properties(definition, mesh)
-    start, end = mesh.beams.T
-    axes, length = frames(points[start], points[end])
-    K_local = beam_stiffness(properties.EA, properties.GJ, properties.EI, length)
-    K_local += beam_geometric_stiffness(properties.tension, length)
-    K_e = to_global(K_local, axes)
-    M_e = to_global(beam_mass(properties.mass, properties.gyration, length), axes)
-    C_e = properties.alpha[:, None, None] * K_e + properties.beta[:, None, None] * M_e
-    dofs = element_dofs(mesh.owner[mesh.beams])
-    size = NODE_DOFS * len(points)
-    lumped = _clamp_mass(mesh, size) + _dropper_mass(mesh, dropper_mass, size)
-    M = _assembled(M_e, dofs, size) + lumped
-    load = _gravity(M, definition.track, points) + _tensioning(mesh, axes, properties.tension, size)
-    if definition.track is not None:
-        load += _curve(definition.track, mesh, points, axes, properties.tension)
-    load += _kinks(K_e, axes, dofs, properties.tension > 0.0, size)
-    # The part of the droppers' damping that is proportional to their stiffness is added together with it.
-    C = _assembled(C_e, dofs, size) + definition.damping.of("dropper").beta * lumped
-    support = definition.messenger_support
-    K = _assembled(K_e, dofs, size)
-    if len(mesh.adrift):
-        K += ANCHORAGE * _on_nodes(mesh.adrift, 0, size)
-    if support is not None:
-        load[mesh.sprung * NODE_DOFS + 2] += support.stiffness * (mesh.seat - points[mesh.sprung, 2])
-        K += support.stiffness * _on_nodes(mesh.sprung, 2, size)
-        C += support.damping * _on_nodes(mesh.sprung, 2, size)
-    return Matrices(K, M, C, load)
 
+    def __init__(self, definition: CatenaryDefinition, mesh: CatenaryMesh) -> None:
+        self.definition, self.mesh = definition, mesh
+        self._size = mesh.fixed.size
+        self._properties = beam_properties(definition, mesh)
+        self._dofs = element_dofs(mesh.owner[mesh.beams])
+        self._beams = ElementPattern.of(self._dofs, self._size)
+        self._bars = self._beams.among(translation_dofs(np.array([[0, 1]]))[0])
+        self._droppers = ElementPattern.of(translation_dofs(mesh.droppers), self._size)
+        self._clamps = _clamp_mass(mesh, self._size)
 
-def _on_nodes(nodes: IntArray, axis: int, size: int) -> sp.csc_matrix:
-    """Return a matrix with 1 on the diagonal at the displacements of some nodes along an axis."""
-    dofs = nodes * NODE_DOFS + axis
-    return sp.csc_matrix((np.ones(len(dofs)), (dofs, dofs)), shape=(size, size))
+    def matrices(self, points: FloatArray, dropper_mass: FloatArray, *, damped: bool = True) -> Matrices:
+        """Return the matrices and the static load of the line about reference positions.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            [m].
+        dropper_mass : ndarray, shape (n_droppers,)
+            [kg].
+        damped : bool
+            C is zero unless this is set: at rest nobody asks for it.
+        """
+        definition, mesh, properties, size = self.definition, self.mesh, self._properties, self._size
+        start, end = mesh.beams.T
+        axes, length = frames(points[start], points[end])
+        K_local = beam_stiffness(properties.EA, properties.GJ, properties.EI, length)
+        K_local += beam_geometric_stiffness(properties.tension, length)
+        K_e = to_global(K_local, axes)
+        M_e = to_global(beam_mass(properties.mass, properties.gyration, length), axes)
+        lumped = self._clamps + self._droppers.assembled(_dropper_mass(mesh, dropper_mass))
+        M = self._beams.assembled(M_e) + lumped
+        load = _gravity(M, definition.track, points) + _tensioning(mesh, axes, properties.tension, size)
+        if definition.track is not None:
+            load += _curve(definition.track, mesh, points, axes, properties.tension)
+        load += _kinks(K_e, axes, self._dofs, properties.tension > 0.0, size)
+        K = self._beams.assembled(K_e)
+        if len(mesh.adrift):
+            K += ANCHORAGE * _on_nodes(mesh.adrift, 0, size)
+        support = definition.messenger_support
+        if support is not None:
+            load[mesh.sprung * NODE_DOFS + 2] += support.stiffness * (mesh.seat - points[mesh.sprung, 2])
+            K += support.stiffness * _on_nodes(mesh.sprung, 2, size)
+        return Matrices(K, M, self._damping(K_e, M_e, lumped) if damped else sp.csc_matrix(K.shape), load)
+
+    def axial_stiffness(self, points: FloatArray, *, arms: bool) -> sp.csc_matrix:
+        """Return the part of K that comes from the axial stiffness of the wires, EA/l, and of the arms if asked for."""
+        start, end = self.mesh.beams.T
+        axes, length = frames(points[start], points[end])
+        EA = self._properties.EA
+        if not arms:
+            EA = np.where(self.mesh.component == COMPONENTS.index("steady_arm"), 0.0, EA)
+        return self._bars.assembled(bar_stiffness(axes[:, 0, :], EA / length))
+
+    def _damping(self, K_e: FloatArray, M_e: FloatArray, lumped: sp.csc_matrix) -> sp.csc_matrix:
+        alpha, beta = self._properties.alpha[:, None, None], self._properties.beta[:, None, None]
+        # The part of the droppers' damping that is proportional to their stiffness is added together with it.
+        C = self._beams.assembled(alpha * K_e + beta * M_e) + self.definition.damping.of("dropper").beta * lumped
+        support = self.definition.messenger_support
+        if support is not None:
+            C += support.damping * _on_nodes(self.mesh.sprung, 2, self._size)
+        return C
 
 
 def axial_stiffness(
     definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, *, arms: bool
 ) -> sp.csc_matrix:
     """Return the part of K that comes from the axial stiffness of the wires, EA/l, and of the arms if asked for."""
-    start, end = mesh.beams.T
-    axes, length = frames(points[start], points[end])
-    EA = beam_properties(definition, mesh).EA
-    if not arms:
-        EA[mesh.component == COMPONENTS.index("steady_arm")] = 0.0
-    none = np.zeros_like(EA)
-    K_e = to_global(beam_stiffness(EA, none, none, length), axes)
-    return _assembled(K_e, element_dofs(mesh.owner[mesh.beams]), NODE_DOFS * len(points))
+    return LineAssembly(definition, mesh).axial_stiffness(points, arms=arms)
 
 
-def element_dofs(nodes: IntArray) -> IntArray:
-    """Return the degrees of freedom of elements of two nodes, shape (n, 12)."""
-    return (nodes[:, :, None] * NODE_DOFS + np.arange(NODE_DOFS)).reshape(len(nodes), 2 * NODE_DOFS)
+def _on_nodes(nodes: IntArray, axis: int, size: int) -> sp.csc_matrix:
+    """Return a matrix with 1 on the diagonal at the displacements of some nodes along an axis."""
+    dofs = nodes * NODE_DOFS + axis
+    return sp.csc_matrix((np.ones(len(dofs)), (dofs, dofs)), shape=(size, size))
 
 
 def pendulum_stiffness(bars: IntArray, tension: FloatArray, points: FloatArray) -> sp.csc_matrix:
@@ -159,16 +181,8 @@ def pendulum_stiffness(bars: IntArray, tension: FloatArray, points: FloatArray) 
     """
     along = points[bars[:, 1]] - points[bars[:, 0]]
     length = np.linalg.norm(along, axis=1)
-    return _assembled(
-        bar_geometric_stiffness(along / length[:, None], tension, length),
-        _translations(bars),
-        NODE_DOFS * len(points),
-    )
-
-
-def _translations(bars: IntArray) -> IntArray:
-    """Return the degrees of freedom that are translations of the ends of bars, shape (n, 6)."""
-    return (bars[:, :, None] * NODE_DOFS + np.arange(3)).reshape(len(bars), 6)
+    stiffness = bar_geometric_stiffness(along / length[:, None], tension, length)
+    return ElementPattern.of(translation_dofs(bars), NODE_DOFS * len(points)).assembled(stiffness)
 
 
 def arm_load(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray, design: FloatArray) -> FloatArray:
@@ -241,12 +255,6 @@ def _component(definition: CatenaryDefinition, name: str) -> list[float]:
     return [EA, EI, GJ, item.mass, 2.0 * inertia / item.area, tension, rayleigh.alpha, rayleigh.beta]
 
 
-def _assembled(matrices: FloatArray, dofs: IntArray, size: int) -> sp.csc_matrix:
-    rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
-    columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-    return sp.csc_matrix((matrices.ravel(), (rows, columns)), shape=(size, size))
-
-
 def _clamp_mass(mesh: CatenaryMesh, size: int) -> sp.csc_matrix:
     """Return the mass of the clamps, on the translations."""
     diagonal = np.zeros((size // NODE_DOFS, NODE_DOFS))
@@ -254,14 +262,13 @@ def _clamp_mass(mesh: CatenaryMesh, size: int) -> sp.csc_matrix:
     return sp.diags(diagonal.ravel(), format="csc")
 
 
-def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray, size: int) -> sp.csc_matrix:
-    """Return the consistent mass of the droppers as bars: 1/3, 1/6 of their mass, in all three directions.
+def _dropper_mass(mesh: CatenaryMesh, mass: FloatArray) -> FloatArray:
+    """Return the consistent mass of the droppers as bars, shape (n, 6, 6): 1/3, 1/6 of theirs, in all three directions.
 
     Of a broken one a half swings with each wire.
     """
     bar = np.kron(np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]]), np.eye(3))
-    pattern = np.where(mesh.broken[:, None, None], 0.5 * np.eye(6), bar)
-    return _assembled(mass[:, None, None] * pattern, _translations(mesh.droppers), size)
+    return mass[:, None, None] * np.where(mesh.broken[:, None, None], 0.5 * np.eye(6), bar)
 
 
 def _gravity(M: sp.csc_matrix, track: Track | None, points: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from models.arrays import FloatArray
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.shape.dropper_set import DropperSet, dropper_set
-from models.catenary.shape.line_matrices import Matrices, assemble
+from models.catenary.shape.line_matrices import LineAssembly, Matrices
 from models.catenary.shape.line_mesh import CatenaryMesh
 
 
@@ -36,5 +36,12 @@ class LineShape:
 
 def line_shape(definition: CatenaryDefinition, mesh: CatenaryMesh, points: FloatArray) -> LineShape:
     """Assemble a line about reference points, shape (n, 3) [m]."""
+    return shape_about(LineAssembly(definition, mesh), points)
+
+
+def shape_about(assembly: LineAssembly, points: FloatArray, *, damped: bool = True) -> LineShape:
+    """Assemble a line about reference points, shape (n, 3) [m], without its damping unless ``damped``."""
+    definition, mesh = assembly.definition, assembly.mesh
     droppers = dropper_set(definition, mesh, points)
-    return LineShape(definition, mesh, points, droppers, assemble(definition, mesh, points, droppers.mass))
+    matrices = assembly.matrices(points, droppers.mass, damped=damped)
+    return LineShape(definition, mesh, points, droppers, matrices)

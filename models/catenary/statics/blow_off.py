@@ -14,8 +14,9 @@ from models.catenary.definition.line_definition import COMPONENTS, CatenaryDefin
 from models.catenary.definition.wind_definition import Wind
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS, beam_mass, frames, to_global
+from models.catenary.shape.element_pattern import element_dofs
 from models.catenary.shape.form_finding import StaticState
-from models.catenary.shape.line_matrices import axial_stiffness, element_dofs
+from models.catenary.shape.line_matrices import axial_stiffness
 from models.catenary.shape.line_mesh import CatenaryMesh
 from models.catenary.shape.track import mean_curvature
 from models.catenary.statics.found_tension import found_tension

@@ -151,7 +151,7 @@ class _StaticResponse:
         load[interval.ends] += force * ends
         displacement = self._solve(load)
         elastic = model.static.elastic_force + model.dropper_law.stiffness * (model.dropper_law.B @ displacement)
-        found = self._local.solve(elastic, (), np.zeros((0, 0)), np.flatnonzero(elastic < 0.0))
+        found = self._local.solve(elastic, (), np.zeros(0), np.flatnonzero(elastic < 0.0))
         for j, compensation in zip(found.slack, found.compensation, strict=True):
             column = self._columns[int(j)]
             displacement[column.rows] -= compensation * column.values[:, 0]

@@ -12,6 +12,7 @@ References
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,6 +25,8 @@ RADIUS_STEP: Final = 5.0
 _LARGEST_RADIUS: Final = 50_000.0
 #: Span lengths of the table [m].
 LENGTHS: Final = tuple(float(L) for L in range(25, 66))
+#: Curvature of the track [1/m] -> how far the wire may be from its middle [m]; it never rises with the curvature.
+Limit = Callable[[float], float]
 
 
 @dataclass(frozen=True)
@@ -81,8 +84,8 @@ class String:
                 found = min(found, math.sqrt(2.0 * self.tension / w * (both + root)))
         return found
 
-    def smallest_radius(self, limit: float, length: float, start: float, end: float) -> float:
-        """Return the smallest radius, on a grid of 5 m, in which a span keeps within a limit [m].
+    def smallest_radius(self, limit: Limit, length: float, start: float, end: float) -> float:
+        """Return the smallest radius, on a grid of 5 m, in which a span keeps within the limit there [m].
 
         A span that is staggered to the outside may keep within it in a curve and not on straight track.
 
@@ -92,16 +95,18 @@ class String:
             NaN if there is none.
         """
         low, high = 0, round(_LARGEST_RADIUS / RADIUS_STEP)
-        if self._inside(length, high, start, end) > limit:
-            return math.nan
-        while high - low > 1:  # to the inside the offset falls with the radius
-            middle = (low + high) // 2
-            low, high = (low, middle) if self._inside(length, middle, start, end) <= limit else (middle, high)
-        radius = high * RADIUS_STEP
-        return radius if self.offset(length, 1.0 / radius, start, end) <= limit else math.nan
 
-    def _inside(self, length: float, steps: int, start: float, end: float) -> float:
-        return self._offsets(length, 1.0 / (steps * RADIUS_STEP), start, end)[1]
+        def is_kept_inside(steps: int) -> bool:
+            curvature = 1.0 / (steps * RADIUS_STEP)
+            return self._offsets(length, curvature, start, end)[1] <= limit(curvature)
+
+        if not is_kept_inside(high):
+            return math.nan
+        while high - low > 1:  # to the inside the offset falls with the radius, and the limit does not
+            middle = (low + high) // 2
+            low, high = (low, middle) if is_kept_inside(middle) else (middle, high)
+        radius = high * RADIUS_STEP
+        return radius if self.offset(length, 1.0 / radius, start, end) <= limit(1.0 / radius) else math.nan
 
 
 def _largest(bend: float, length: float, start: float, end: float) -> float:
@@ -114,6 +119,6 @@ def _largest(bend: float, length: float, start: float, end: float) -> float:
     return found
 
 
-def radii(string: String, limit: float, start: float, end: float) -> FloatArray:
+def radii(string: String, limit: Limit, start: float, end: float) -> FloatArray:
     """Return the smallest radius for every span length of the table [m], shape (41,)."""
     return np.array([string.smallest_radius(limit, L, start, end) for L in LENGTHS])

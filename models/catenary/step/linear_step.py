@@ -22,9 +22,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import FloatArray
-from models.catenary.contact_and_slack.contact_wire import ContactWire, WireInterval
-from models.catenary.contact_and_slack.crossing import Crossing
-from models.catenary.contact_and_slack.wire_response import Met, ResponseOf, WirePoint, walk
+from models.catenary.contact_and_slack.contact_wire import WireInterval
+from models.catenary.contact_and_slack.wire_response import IntervalResponse, WirePoint
 from models.catenary.linear_motion.interval_modes import IntervalModes
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.sparse_products import BlockProduct, Multiplier, Product, TransposedProduct
@@ -33,7 +32,6 @@ from models.catenary.linear_motion.step_matrices import StepMatrices
 #: Ends of an interval that its modes in one plane move with.
 _ENDS_IN_PLANE = 6
 
-
 #: A point of a contact wire, and a force on it that is known before a step, positive up [N].
 AppliedForce = tuple[WirePoint, float]
 
@@ -41,8 +39,8 @@ AppliedForce = tuple[WirePoint, float]
 class LinearStep:
     """What is linear in steps of one size, in the parts that contacts and slack come between.
 
-    The order of calls: `begin`; `meet` for every strip; `apply` and changes of ``attached`` for what acts inside the
-    step and is not known before it; `finish`; `place`.
+    The order of calls: `begin`; `local` where strips are; `apply` and changes of ``attached`` for what acts inside the
+    step and is not known before it; `finish`.
 
     Parameters
     ----------
@@ -50,127 +48,106 @@ class LinearStep:
 
     Attributes
     ----------
+    matrices : StepMatrices
     attached : ndarray, shape (n_attached,)
         Change of the attachments' displacements in this step [m].
     """
 
     def __init__(self, matrices: StepMatrices) -> None:
         modes, newmark, mu = matrices.modes, matrices.newmark, matrices.mu
-        self._matrices = matrices
-        n, m = len(mu), len(modes.attached)
+        self.matrices, self.attached = matrices, np.zeros(len(modes.attached))
         self._out, self._back = _products(modes, matrices.coupling)
         self._own = Product(sp.hstack([-2.0 * modes.K, newmark.a2 * modes.M]))
         self._from_modal = -2.0 * modes.eigenvalue * matrices.inverse
         self._from_momentum = newmark.a2 * matrices.inverse
         # One number where all wires are damped alike: that is read faster than a vector.
-        alike = np.all(mu == mu[:1])
-        divisor = float(mu[0]) if alike and mu.size else mu
+        divisor = float(mu[0]) if mu.size and np.all(mu == mu[0]) else mu
         self._from_velocity, self._to_momentum = newmark.a2 / divisor, newmark.a1 / divisor
-        self.attached, self._right = np.empty(m), np.empty(m)
         self._ends = np.empty(self._back[0].matrix.shape[0])
-        #: Change of the modal amplitudes in this step, were the attachments held.
-        self._modal, self._work, self._following = np.empty(n), np.empty(n), np.empty(n)
+        #: Change of the modal amplitudes in this step, were the attachments held; work space.
+        self._modal, self._work, self._following = (np.empty(len(mu)) for _ in range(3))
         #: Motion of intervals at the end of this step, forces found inside it left out.
         self._free: dict[WireInterval, FloatArray] = {}
 
-    def begin(self, motion: LineMotion, pressed: FloatArray, applied: Sequence[AppliedForce] = ()) -> None:
+    def begin(self, motion: LineMotion, load: FloatArray, applied: Sequence[AppliedForce] = ()) -> None:
         """Find the changes of this step without what is found inside it.
 
         Parameters
         ----------
         motion : LineMotion
             At the beginning of the step.
-        pressed : ndarray, shape (n_attached,)
-            Known forces on the attachments, beginning plus end of the step [N]; what those on the wires do to the
-            attachments at their ends is added.
+        load : ndarray, shape (n_attached,)
+            Known forces on the attachments, beginning plus end of the step [N]; changed in place: what those on the
+            wires do to the attachments at their ends is added, and what the motion does.
         applied : sequence of AppliedForce
             Forces on the contact wires, at the beginning of the step.
         """
         self._free.clear()
         for point, force in applied:
-            pressed[point.response.interval.ends] += force * point.load
-        modal, work, right = self._modal, self._work, self._right
-        (amplitude, rate), momentum = motion.plain()
-        np.multiply(self._from_modal, amplitude, out=modal)
+            load[point.response.interval.ends] += force * point.load
+        modal, work, ends = self._modal, self._work, self._ends
+        amplitudes, momentum = motion.plain()
+        np.multiply(self._from_modal, amplitudes[0], out=modal)
         np.multiply(self._from_momentum, momentum, out=work)
         modal += work
-        np.multiply(self._from_velocity, rate, out=work)
+        np.multiply(self._from_velocity, amplitudes[1], out=work)
         work -= modal
-        right[...] = pressed
-        self._own.add(motion.attached.ravel(), right)
-        self._ends[...] = 0.0
-        self._back[0].add(work, self._ends)
-        self._back[1].add(self._ends, right)
-        self.solve()
+        self._own.add(motion.attached.ravel(), load)
+        ends.fill(0.0)
+        self._back[0].add(work, ends)
+        self._back[1].add(ends, load)
+        self.attached = self.matrices.factor.solve(load)
         for point, force in applied:
             self._press(point, force)
 
-    def solve(self) -> None:
-        """Find the change of the attachments' displacements from the forces on them."""
-        self.attached[...] = self._matrices.factor.solve(self._right)
+    def local(self, response: IntervalResponse, motion: LineMotion) -> FloatArray:
+        """Return an interval's local coordinates and their rates at the end of the step, shape (2, m).
 
-    def meet(
-        self, wire: ContactWire, response_of: ResponseOf, strip: FloatArray, guess: int, motion: LineMotion
-    ) -> Met | None:
-        """Return where a strip crosses a wire at the end of the step, forces found inside the step left out.
+        Forces that are found inside the step are left out.
 
         Parameters
         ----------
-        strip : ndarray, shape (2, 2, 3)
-            Ends A and B; position and velocity.
-        guess : int
-            Element of the wire, to begin with.
         motion : LineMotion
             At the beginning of the step.
         """
-
-        def motion_of(interval: WireInterval) -> FloatArray:
-            found = self._free.get(interval)
-            if found is None:
-                change = np.concatenate((self._modal[interval.modes], self.attached.take(interval.ends)))
-                a1 = self._matrices.newmark.a1
-                found = self._free[interval] = response_of(interval).advance(interval.local(motion), change, a1)
-            return found
-
-        return walk(wire, response_of, motion_of, strip, guess)
+        interval = response.interval
+        found = self._free.get(interval)
+        if found is None:
+            change = np.concatenate((self._modal[interval.modes], self.attached.take(interval.ends)))
+            a1 = self.matrices.newmark.a1
+            found = self._free[interval] = response.advance(interval.local(motion), change, a1)
+        return found
 
     def apply(self, point: WirePoint, force: float) -> None:
         """Add what a force on a point of a wire changes in this step; ``force`` is that at its end [N], positive up."""
         self._press(point, force)
         columns = point.response.columns
-        self.attached[columns.rows] += columns.values @ (force * point.load)
+        self.attached[columns.rows] += columns.values.dot(force * point.load)
 
     def finish(self, motion: LineMotion) -> None:
         """Let the intervals follow their attachments, and replace the motion by that at the end of the step."""
-        a1, modal, following, work = self._matrices.newmark.a1, self._modal, self._following, self._work
-        self._ends[...] = 0.0
-        self._out[1].add(self.attached, self._ends)
-        following[...] = 0.0
-        self._out[0].add(self._ends, following)
-        np.multiply(following, self._matrices.inverse, out=work)
-        modal -= work
-        (amplitude, rate), momentum = motion.plain()
-        amplitude += modal
+        a1, modal, following, ends = self.matrices.newmark.a1, self._modal, self._following, self._ends
+        ends.fill(0.0)
+        self._out[1].add(self.attached, ends)
+        following.fill(0.0)
+        self._out[0].add(ends, following)
+        np.multiply(following, self.matrices.inverse, out=self._work)
+        modal -= self._work
+        amplitudes, momentum = motion.plain()
+        amplitudes[0] += modal
         modal *= a1
-        np.subtract(modal, rate, out=rate)
+        np.subtract(modal, amplitudes[1], out=amplitudes[1])
         following *= self._to_momentum
         modal += following
         np.subtract(modal, momentum, out=momentum)
-        displacement, velocity = motion.attached
-        displacement += self.attached
+        attached = motion.attached
+        attached[0] += self.attached
         self.attached *= a1
-        np.subtract(self.attached, velocity, out=velocity)
-
-    def place(self, crossing: Crossing, point: WirePoint, motion: LineMotion, place: FloatArray) -> None:
-        """Put the place of a point of a wire into ``place``, shape (3,) [m]."""
-        interval = point.response.interval
-        local = np.concatenate((motion.modal[0, interval.modes], motion.attached[0].take(interval.ends)))
-        place[:] = *interval.at(crossing, local), point.height + point.row.dot(local)
+        np.subtract(self.attached, attached[1], out=attached[1])
 
     def _press(self, point: WirePoint, force: float) -> None:
         """Add what a force does to the modes of its interval, the attachments held."""
-        response = point.response
-        self._modal[response.interval.modes] += force * point.modal * response.inverse
+        self._modal[point.response.interval.modes] += force * point.give
 
 
 _Chain = tuple[Multiplier, Multiplier]
@@ -193,20 +170,17 @@ def _products(modes: IntervalModes, coupling: sp.csr_matrix) -> tuple[_Chain, _C
 def _by_blocks(modes: IntervalModes, coupling: sp.csr_matrix) -> tuple[sp.bsr_matrix, sp.csr_matrix] | None:
     """Return mu G by dense blocks and the turn to its ends, renumbered; None if intervals are of several sizes.
 
-    Every end belongs to one block of modes; a block with more than six of them takes several columns of blocks.
+    Every end belongs to one block of modes. Behind the ends of each block zeros fill its last column of blocks up.
     """
-    sizes = {block.modes.shape[1] for block in modes.blocks}
-    if len(sizes) != 1:
+    if len(modes.blocks) != 1:
         return None
-    size = sizes.pop()
+    size = modes.blocks[0].modes.shape[1]
     entries = coupling.tocoo()
     owner = np.zeros(coupling.shape[1], dtype=np.int64)
-    owner[entries.col] = entries.row // size
-    order = np.argsort(owner, kind="stable")
-    count = np.bincount(owner, minlength=coupling.shape[0] // size)
-    begin = np.cumsum(np.concatenate([[0], -(-count // _ENDS_IN_PLANE) * _ENDS_IN_PLANE]))
-    place = np.empty_like(order)
-    place[order] = begin[owner[order]] + np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-    ones, before = np.ones(len(place)), np.arange(len(place))
-    renumbered = sp.csr_matrix((ones, (place, before)), shape=(int(begin[-1]), len(place)))
+    owner[entries.col] = entries.row // size  # ends are numbered block by block
+    gaps = -np.bincount(owner, minlength=coupling.shape[0] // size) % _ENDS_IN_PLANE
+    before = np.arange(len(owner))
+    place = before + (np.cumsum(gaps) - gaps)[owner]
+    shape = len(owner) + int(gaps.sum()), len(owner)
+    renumbered = sp.csr_matrix((np.ones(len(owner)), (place, before)), shape=shape)
     return (coupling @ renumbered.T).tobsr((size, _ENDS_IN_PLANE)), (renumbered @ modes.turn).tocsr()

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from models.arrays import FloatArray
-from models.catenary.contact_and_slack.contact_wire import put_in_lap
+from models.catenary.contact_and_slack.contact_wire import WireInterval, put_in_lap
 from models.catenary.contact_and_slack.local_problem import ContactCandidate, LocalForces, LocalProblem
 from models.catenary.contact_and_slack.response_cache import ResponseCache
 from models.catenary.contact_and_slack.wire_response import WirePoint, interval_response
@@ -16,11 +16,12 @@ from models.catenary.line_state import CatenaryState, ContactResult, StripMotion
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.sparse_products import Product
 from models.catenary.linear_motion.step_matrices import StepMatrices
-from models.catenary.step.linear_step import AppliedForce, LinearStep
+from models.catenary.step.linear_step import LinearStep
 from models.catenary.step.step_engine import GivenForce, SteppedLine
 
-#: No forces on the contact wires.
-_NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
+_NO_STRIPS = np.zeros(0)
+#: Where a force acts, its section, element and xi; the point of the wire there; the force at the end of the step [N].
+_Placed = tuple[tuple[int, int, float], WirePoint, float]
 
 
 class PlainStep:
@@ -51,49 +52,50 @@ class PlainStep:
         self._responses = ResponseCache(
             lambda interval, columns: interval_response(matrices, interval, columns), compliance, len(line.wires)
         )
-        #: Points of wires that strips crossed in the last step: the next one begins with the forces on them.
+        #: Points of wires with forces at the end of the last step: the next one begins with them.
         self._points: dict[tuple[int, int, float], WirePoint] = {}
         #: What a change of the attachments adds to the droppers' pulls.
         self._pull = Product(sp.diags(by_change) @ line.droppers.B)
 
     def step(self, state: CatenaryState, motion: StripMotion) -> ContactResult:
         """Advance the line by one step under moving strips; see `StepEngine`."""
-        free_force = self._begin(state)
+        pull = self._begin(state)
         candidates = self._candidates(state, motion)
         # One that was closed stays among the contacts: other forces of the step may keep it so.
         contacts = [c for c in candidates if c.penetration > 0.0 or c.impact_velocity > 0.0]
-        forces = self._local.solve(free_force, contacts, _strip_compliance(contacts, motion), state.slack)
-        self._apply(contacts, forces)
-        self.linear.finish(state.motion)
-        _note(state, contacts, forces)
-        return self._result(state, candidates, contacts, forces, motion)
+        found = self._local.solve(pull, contacts, motion.compliance, state.slack)
+        acting = zip(contacts, found.contact, strict=True)
+        placed = [((c.section, c.crossing.element, c.crossing.xi), c.point, force) for c, force in acting]
+        self._finish(state, placed, found)
+        result = empty_result(*state.element.shape)
+        state.impact_velocity[...] = 0.0
+        for contact, force, velocity, closed in zip(contacts, *found[:3], strict=True):
+            p, s = contact.pantograph, contact.section
+            result.force[p, s] = force
+            if closed:
+                state.impact_velocity[p, s] = contact.impact_velocity or max(velocity, 1e-6)
+        for candidate in candidates:
+            self._place(candidate, state, result)
+        put_in_lap(self._line.wires, result.point, motion.strip)
+        return result
 
     def push(self, state: CatenaryState, forces: Sequence[GivenForce]) -> None:
         """Advance the line by one step under forces that are given at its end; see `StepEngine`."""
-        wires = self._line.wires
         pull = self._begin(state)
-        placed = [(s, *wires[s].locate(x), force) for s, x, force in forces]
-        for s, element, xi, force in placed:
-            point = self._responses.of(wires[s].interval(element)).point(element, xi)
-            self.linear.apply(point, force)
+        placed: list[_Placed] = []
+        for s, x, force in forces:
+            place = s, *self._line.wires[s].locate(x)
+            point = self._point(*place)
             columns = point.response.columns
-            pull[columns.dropper_index] += columns.dropper_force @ (force * point.load)
-        found = self._local.solve(pull, (), np.zeros((0, 0)), state.slack)
-        self._apply((), found)
-        self.linear.finish(state.motion)
-        state.slack, state.compensation = found.slack, found.compensation
-        state.loaded = np.array([(s, element) for s, element, _, _ in placed], dtype=np.int64).reshape(-1, 2)
-        state.load = np.array([(xi, force) for _, _, xi, force in placed]).reshape(-1, 2)
+            pull[columns.dropper_index] += columns.dropper_force.dot(force * point.load)
+            placed.append((place, point, force))
+        self._finish(state, placed, self._local.solve(pull, (), _NO_STRIPS, state.slack))
 
     def _begin(self, state: CatenaryState) -> FloatArray:
         """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N]."""
-        applied: list[AppliedForce] = []
-        droppers = self._line.droppers
+        droppers, applied = self._line.droppers, []
         for (s, element), (xi, force) in zip(state.loaded.tolist(), state.load.tolist(), strict=True):
-            known = self._points.get((s, element, xi))
-            point = known or self._responses.of(self._line.wires[s].interval(element)).point(element, xi)
-            applied.append((point, force))
-        self._points.clear()
+            applied.append((self._points.get((s, element, xi)) or self._point(s, element, xi), force))
         self.linear.begin(state.motion, droppers.known_load(state.slack, state.compensation), applied)
         pull = droppers.pull(state.motion.attached)
         self._pull.add(self.linear.attached, pull)
@@ -101,69 +103,55 @@ class PlainStep:
 
     def _candidates(self, state: CatenaryState, motion: StripMotion) -> list[ContactCandidate]:
         """Return all strips that cross a wire at the end of the step, forces found inside it left out."""
-        candidates = []
+
+        def local(interval: WireInterval) -> FloatArray:
+            return self.linear.local(self._responses.of(interval), state.motion)
+
+        def positions(interval: WireInterval) -> list[float]:
+            return interval.positions(local(interval)[0])
+
+        candidates, strips = [], motion.strip.tolist()
         for s, wire in enumerate(self._line.wires):
-            for p, strip in enumerate(motion.strip):
+            for p, strip in enumerate(strips):
                 if not wire.is_near(strip):
                     continue
-                met = self.linear.meet(wire, self._responses.of, strip, int(state.element[p, s]), state.motion)
-                if met is None:
+                crossing = wire.find(strip, positions, state.element.item(p, s))
+                if crossing is None:
                     continue
-                crossing, point, rise, speed = met
                 state.element[p, s] = crossing.element
-                self._points[s, crossing.element, crossing.xi] = point
+                point = self._point(s, crossing.element, crossing.xi)
+                rise, speed = local(point.response.interval).dot(point.row).tolist()
                 delta, rate = wire.penetration(crossing.share, point.height + rise, speed, strip, self._line.gap)
-                impact = float(state.impact_velocity[p, s])
+                impact = state.impact_velocity.item(p, s)
                 candidates.append(ContactCandidate(p, s, crossing, point, delta, rate, impact))
                 self._responses.prepare(wire.next_interval(crossing.element))
         return candidates
 
-    def _apply(self, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
-        """Add what contact and compensation forces change within the step."""
-        for contact, force in zip(contacts, forces.contact, strict=True):
+    def _finish(self, state: CatenaryState, placed: Sequence[_Placed], found: LocalForces) -> None:
+        """Let forces on wires, and those that slack droppers lack, act in the step; finish it.
+
+        All of them are recorded: the next step begins with them.
+        """
+        for _, point, force in placed:
             if force != 0.0:
-                self.linear.apply(contact.point, force)
-        for j, compensation in zip(forces.slack.tolist(), forces.compensation.tolist(), strict=True):
+                self.linear.apply(point, force)
+        for j, compensation in zip(found.slack.tolist(), found.compensation.tolist(), strict=True):
             column = self._local.dropper_columns[j]
             self.linear.attached[column.rows] -= compensation * column.values[:, 0]
+        self.linear.finish(state.motion)
+        self._points = {place: point for place, point, _ in placed}
+        state.slack, state.compensation = found.slack, found.compensation
+        state.loaded = np.array([place[:2] for place, _, _ in placed], dtype=np.int64).reshape(-1, 2)
+        state.load = np.array([(xi, force) for (_, _, xi), _, force in placed]).reshape(-1, 2)
 
-    def _result(
-        self,
-        state: CatenaryState,
-        candidates: Sequence[ContactCandidate],
-        contacts: Sequence[ContactCandidate],
-        forces: LocalForces,
-        motion: StripMotion,
-    ) -> ContactResult:
-        result = empty_result(*state.element.shape)
-        for contact, force in zip(contacts, forces.contact, strict=True):
-            result.force[contact.pantograph, contact.section] = force
-        for p, s, crossing, point, *_ in candidates:
-            self.linear.place(crossing, point, state.motion, result.point[p, s])
-        put_in_lap(self._line.wires, result.point, motion.strip)
-        return result
+    def _point(self, section: int, element: int, xi: float) -> WirePoint:
+        """Return a point of a wire."""
+        return self._responses.of(self._line.wires[section].interval(element)).point(element, xi)
 
-
-def _strip_compliance(contacts: Sequence[ContactCandidate], motion: StripMotion) -> FloatArray:
-    """Return how far strips give way to the contacts' forces [m/N]; two contacts of one strip share its retreat."""
-    if len(contacts) == 1:
-        return motion.compliance[contacts[0].pantograph].reshape(1, 1)
-    owners = [c.pantograph for c in contacts]
-    return np.array([[motion.compliance[i] if i == j else 0.0 for j in owners] for i in owners]).reshape(
-        len(owners), len(owners)
-    )
-
-
-def _note(state: CatenaryState, contacts: Sequence[ContactCandidate], forces: LocalForces) -> None:
-    """Record the forces at the end of the step; the next one begins with them."""
-    state.slack, state.compensation = forces.slack, forces.compensation
-    state.impact_velocity[...] = 0.0
-    for contact, velocity, closed in zip(contacts, forces.velocity, forces.closed, strict=True):
-        if closed:
-            impact = contact.impact_velocity or max(velocity, 1e-6)
-            state.impact_velocity[contact.pantograph, contact.section] = impact
-    state.loaded, state.load = _NOWHERE, _NOTHING
-    if contacts:
-        places = [c.crossing for c in contacts]
-        state.loaded = np.array([(c.section, place.element) for c, place in zip(contacts, places, strict=True)])
-        state.load = np.array([(place.xi, f) for place, f in zip(places, forces.contact, strict=True)])
+    @staticmethod
+    def _place(candidate: ContactCandidate, state: CatenaryState, result: ContactResult) -> None:
+        """Write down where a strip meets a wire at the end of the step."""
+        p, s, crossing, point, *_ = candidate
+        interval = point.response.interval
+        local = interval.local(state.motion)[0]
+        result.point[p, s] = *interval.at(crossing, local), point.height + point.row.dot(local)

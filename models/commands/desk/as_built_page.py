@@ -33,7 +33,8 @@ def page(found: AsBuiltOutcome, file: str, doubts: tuple[str, ...], drawn: Mappi
 def _badge(found: AsBuiltOutcome) -> str:
     measured, beyond = int(found.built.is_measured.sum()), int(found.is_beyond.sum())
     kind = "fail" if beyond else "pass"
-    words = f"{beyond} of {measured} droppers beyond {1e3 * found.tolerance:g} mm"
+    words = f"{measured - beyond} of {measured} droppers passed, limit {1e3 * found.tolerance:g} mm"
+    words += f"; {beyond} failed" if beyond else ""
     return f"<p><span class='badge {kind}'>{markup.text(words)}</span></p>"
 
 

@@ -17,12 +17,12 @@ def page(definition: CatenaryDefinition, found: SpanTable, file: str, asked: Seq
     head = [
         f"<h1>{markup.text(definition.title or definition.name)}</h1>",
         markup.note(f"spans and radii of the line {definition.name} in the wind, for its designer"),
-        *map(markup.warning, spans_report.warnings(definition)),
+        *map(markup.warning, spans_report.warnings(definition, found)),
         markup.pairs([
             ("file", file),
             ("contact wire", f"{found.tension:g} N, diameter {1e3 * definition.contact_wire.width:.2f} mm"),
             ("wind", f"{found.pressure:.2f} Pa, {found.force:.3f} N/m on the contact wire"),
-            ("permissible offset from the middle of the track", f"{found.limit:g} m"),
+            ("permissible offset from the middle of the track", spans_report.permissible(found)),
             *asked,
         ]),
     ]  # fmt: skip
@@ -35,7 +35,7 @@ def page(definition: CatenaryDefinition, found: SpanTable, file: str, asked: Seq
             markup.note("Radii in steps of 5 m; none: the span keeps within the limit in no curve."),
         )),
         Part("spans", "Largest span for a radius [m]", (
-            markup.table(("radius [m]", *columns), spans_report.rows(found.radii, found.largest_span, 2), leading=0),
+            markup.table(spans_report.span_heads(found, "stagger "), spans_report.span_rows(found), leading=0),
             markup.note(
                 "None: the staggers alone are beyond the limit; any: no wind moves the wire that far. Staggers are "
                 "those at both ends of a span, positive to the outside of the curve; the contact wire as a string."

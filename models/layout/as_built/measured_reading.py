@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -54,7 +55,7 @@ def read_measured_run(path: Path) -> MeasuredRun:
     except LayoutError as error:
         raise LayoutError(_first_ones(error.problems)) from None
     assert table is not None
-    return _run(path, table)
+    return replace(_run(path, table), notes=problems.notes)
 
 
 def _first_ones(problems: Sequence[Problem]) -> tuple[Problem, ...]:
@@ -79,8 +80,8 @@ def _grid(path: Path, problems: SheetProblems) -> SheetGrid | None:
     sheets = read_xlsx(path, problems)
     if len(sheets) == 1:
         return next(iter(sheets.values()))
-    if sheets and _SHEET not in sheets:
-        text = f"has {len(sheets)} sheets, none of them named '{_SHEET}': name the one with the run so"
+    if _SHEET not in sheets and (sheets or problems.hidden):
+        text = f"has {len(sheets)} sheets that are not hidden, none named '{_SHEET}': name the one with the run so"
         problems.add(Place(""), text)
     return sheets.get(_SHEET)
 

@@ -36,6 +36,8 @@ class MeasuredRun:
         Name of the structure that stands there; empty elsewhere.
     row : tuple of int
         Where each stands in the file, from 1; empty if it is none.
+    notes : tuple of str
+        What of the file was not read.
     """
 
     source: str
@@ -45,6 +47,7 @@ class MeasuredRun:
     thickness: FloatArray
     structure: tuple[str, ...]
     row: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def way(self) -> float:

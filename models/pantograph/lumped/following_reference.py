@@ -11,7 +11,7 @@ which without u is the spring in series with a damper k T: a bellows whose regul
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -88,18 +88,20 @@ class FollowingReference(NamedTuple):
         return first, second
 
 
-def link_stiffness(frequency: FloatArray, stiffness: float, damping: float, time: float) -> ComplexArray:
+def link_stiffness(
+    frequency: FloatArray, stiffness: float | FloatArray, damping: float | FloatArray, time: float | FloatArray
+) -> ComplexArray:
     """Return the dynamic stiffness between the roof and the lowest mass, shape (f,) [N/m].
 
     Parameters
     ----------
     frequency : ndarray, shape (f,)
         [Hz]
-    stiffness, damping : float
-        Of the lowest stage [N/m, N.s/m].
-    time : float
+    stiffness, damping : float or ndarray, shape (p, 1)
+        Of the lowest stage [N/m, N.s/m]; of several stages.
+    time : float or ndarray, shape (p, 1)
         Time constant [s].
     """
-    s = 2j * np.pi * np.asarray(frequency)
+    s: Any = 2j * np.pi * np.asarray(frequency)
     link: ComplexArray = stiffness * s * time / (1.0 + s * time) + damping * s
     return link

@@ -38,7 +38,7 @@ def chain_stiffness(
     masses: FloatArray,
     dampings: FloatArray,
     stiffnesses: FloatArray,
-    reference_time: float = math.inf,
+    reference_time: float | FloatArray = math.inf,
 ) -> ComplexArray:
     """Return the dynamic stiffness at the top of a chain of masses on fixed ground, shape (f,) [N/m].
 
@@ -47,15 +47,16 @@ def chain_stiffness(
     frequency : ndarray, shape (f,)
         [Hz]
     masses, dampings, stiffnesses : ndarray, shape (n,)
-        Bottom to top; damper and spring i connect mass i to the one below.
-    reference_time : float
+        Bottom to top; damper and spring i connect mass i to the one below. Of shape (n, p, 1) they are those of p
+        chains, and the result has shape (p, f).
+    reference_time : float or ndarray, shape (p, 1)
         Time constant of a lowest spring that hangs on a reference following the height [s]; infinite: on the ground.
     """
     s = 2j * np.pi * np.asarray(frequency)
     total: ComplexArray | None = None
     for m, c, k in zip(masses, dampings, stiffnesses, strict=True):
         link = k + s * c
-        if total is None and math.isfinite(reference_time):
+        if total is None and np.isfinite(reference_time).all():
             link = link_stiffness(np.asarray(frequency), k, c, reference_time)
         total = s**2 * m + (link if total is None else link * total / (link + total))
     if total is None:

@@ -91,6 +91,26 @@ def test_a_loader_that_came_with_the_package_is_taken(monkeypatch, tmp_path):
         loader_build.loader_library.cache_clear()
 
 
+@linux
+def test_a_loader_is_compiled_once_for_each_compiler(monkeypatch, tmp_path):
+    compiled = []
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(loader_build, "built_name", lambda: "none.so")
+    monkeypatch.setattr(loader_build, "compile_loader", lambda library: compiled.append(library.write_bytes(b"made")))
+    try:
+        for compiler in ("cc", "cc", "cp"):
+            monkeypatch.setenv("CC", compiler)
+            loader_build.loader_library.cache_clear()
+            assert loader_build.loader_library() == b"made"
+        assert len(compiled) == 2
+        monkeypatch.setenv("OPENPANTO_CACHE", "off")
+        loader_build.loader_library.cache_clear()
+        assert loader_build.loader_library() == b"made"
+        assert len(compiled) == 3
+    finally:
+        loader_build.loader_library.cache_clear()
+
+
 # What Python is asked before pythonfmu sees the FMU.
 
 

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from master.report.run_inputs import unequal_inputs
 from master.results.kept_definitions import differing_definitions, write_definitions
 from models.library.catalogue import line_path
 from tests.master.report.conftest import made_up  # noqa: F401  fixture
@@ -38,6 +39,17 @@ def test_the_keys_that_differ_are_named_with_both_values_and_their_unit(run):
         ("catenary: profile.encumbrance", "1.4 m", "1.5 m"),
         ("catenary: spans.lengths[2]", "45.0 m", "40.0 m"),
     ]
+
+
+@pytest.mark.parametrize("is_set", [False, True])
+def test_a_value_of_the_definition_is_listed_once_unless_the_scenario_sets_another(run, is_set):
+    runs = [run("before", LN2), run("after", LN2.replace('encumbrance = [1.4, "m"', 'encumbrance = [1.5, "m"'))]
+    for done, value in zip(runs, (1.4, 1.6 if is_set else 1.5), strict=True):
+        line = done.summary["components"][1]
+        line["inputs"] = [{"name": "profile.encumbrance", "value": value, "unit": "m", "changed": value == 1.6}]
+    rows = [row for row in unequal_inputs(runs) if "encumbrance" in row[0]]
+    own = ("catenary: profile.encumbrance", "1.4 m", "1.5 m")
+    assert rows == [own, *([("catenary.profile.encumbrance [m]", "1.4", "1.6")] if is_set else [])]
 
 
 def test_other_sources_and_comments_are_no_other_line(run):

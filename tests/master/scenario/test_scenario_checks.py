@@ -265,6 +265,15 @@ def test_parameters_that_cannot_be_set_are_refused(given, declared, text):
         assert (problems[0].file, problems[0].line) == ("parameters.ssv", 11)
 
 
+@pytest.mark.parametrize("bound", [[], [parameter("a.start_height", 4000.0, "mm")]])
+def test_a_strip_that_starts_beyond_its_stops_is_told_where_that_is_written(bound):
+    stops = [dataclasses.replace(variable("lowest_height", "parameter", "m"), start="4.5")]
+    given = [] if bound else [parameter("start_height", 4.0, "m")]
+    _, (problem,) = parameters_of(given, variable("start_height", "parameter", "m"), *stops, system=bound)
+    assert (problem.file, problem.line) == ("parameters.ssv", 11)
+    assert problem.text == "a.start_height = 4 m is below the lowest_height of 4.5 m"
+
+
 def test_system_parameters_of_nobody_are_refused():
     _, problems = parameters_of([], variable("f", "parameter"), system=[parameter("c.f", 2.0)])
     assert ["'c.f' belongs to no component" in p.text for p in problems] == [True]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from master.scenario.value_checks import empty_cells, half_empty_rows, problems, stop_after_interval
+from master.scenario.value_checks import empty_cells, half_empty_rows, problems, stop_after_interval, uncovered
 from master.ssp.run_settings import EvaluationInterval, RunSettings
 from master.system.components import Component, Fmu, System, Variable
 from master.system.connections import Connection
@@ -76,6 +76,7 @@ def test_a_stop_time_must_cover_the_interval(stop, ends):
     if found:
         assert f"ends at {stop:g} s with 'train' at {30 + 80 * stop:.6g} m, before the end of the interval" in found[0]
         assert 'stop at 4.5 s or later, or write until="end" into Interval, or run a part of it with --stop' in found[0]
+    assert uncovered(system(stop=stop)) == "".join(found).removesuffix(", or run a part of it with --stop")
 
 
 def test_the_cure_counts_from_the_start_time_and_rounds_up():
@@ -94,6 +95,26 @@ def test_the_interval_begins_no_earlier_than_the_pantograph(position, begins):
     assert bool(found) == begins
     if found:
         assert f"'train' starts at {position} m, beyond the start of the interval of interest, 100 m" in found[0]
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"start_height": 4.4}, "train.start_height = 4.4 m is below the lowest_height of 4.5 m"),
+        ({"start_height": 6.3}, "train.start_height = 6.3 m is above the highest_height of 6.2 m"),
+        ({"highest_height": 5.0}, "train.reference_height = 5.02 m is above the highest_height of 5 m"),
+        ({"start_height": 4.5}, ""),
+    ],
+)
+def test_a_strip_starts_between_its_stops(values, said):
+    heights = {"start_height": "5", "reference_height": "5.02", "lowest_height": "4.5", "highest_height": "6.2"}
+    found = list(problems(system(pantograph(values=values, **heights))))
+    assert [text.partition(": between its stops the strip goes from 4.5 to ")[0] for text in found] == [said] * bool(
+        said
+    )
+    low = [n for n in heights if n != "lowest_height"]
+    (alone,) = problems(system(pantograph(values={"start_height": 7.0}, **{n: heights[n] for n in low})))
+    assert alone == "train.start_height = 7 m is above the highest_height of 6.2 m"
 
 
 def test_a_part_that_was_asked_for_may_end_early_but_not_be_idle():

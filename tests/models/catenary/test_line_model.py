@@ -290,11 +290,13 @@ def test_exact_slack_equals_the_plain_iteration_run_to_convergence(line_maker, l
     assert np.abs(np.array(contact) - plain_contact).max() < 1e-6
 
 
-def test_droppers_slacken_far_from_the_contact_as_well(line_maker):
+@pytest.mark.parametrize("kernel", ["numpy", *rest("auto")])
+def test_droppers_slacken_far_from_the_contact_as_well(line_maker, kernel, monkeypatch):
     """A wave lifts the wire 600 m from a strip that only touches it: droppers slacken there as without the strip.
 
     So far away that a force under the strip does not reach them within a step.
     """
+    monkeypatch.setenv("OPENPANTO_KERNEL", kernel)
     model = CatenaryModel(line_maker(spans=14))
     x = model.mesh.points[:, 0]
     (chain,) = model.mesh.contact_chains()

@@ -35,6 +35,18 @@ def test_a_limit_is_needed(said):
     assert text.err == "error: how far may the wire be blown? give --limit, in m, or --head 1600 or 1950\n"
 
 
+def test_a_head_has_a_limit_for_every_radius_and_more_cant_is_told(said):
+    code, text = said(
+        "spans", "AC_mixed", "--wind", "29", "--head", "1600", "--radius", "400", "--stagger", "0.2", "0.2"
+    )
+    assert code == 0
+    assert text.err.startswith(
+        "warning: the limits of the head are those of curves with up to 66 mm of cant; this line's"
+    )
+    assert "limit [m]" in text.out
+    assert "0.400" in text.out.splitlines()[-2]
+
+
 def test_a_limit_without_wind_is_refused(said):
     code, text = said("statics", "LN2", "--head", "1600")
     assert code == 1

@@ -59,6 +59,30 @@ def test_a_mistake_of_a_rule_is_reported_once_for_all_spans(tmp_path):
     assert problem.text.endswith("more like this)")
 
 
-def test_a_byte_order_mark_is_named(tmp_path):
-    (marked,) = mistakes(tmp_path, ("# LN2", "\ufeff# LN2"))
-    assert marked.text.endswith("; the file begins with a byte order mark: save it as UTF-8 without one")
+def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
+    file = tmp_path / "LN2.toml"
+    file.write_text(line_path("LN2").read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert load_line(str(file)) == load_line("LN2")
+    (marked,) = mistakes(tmp_path, ("# LN2", "\ufeff# LN2"), ("tension = [20000,", "tension = [20.0,5,,"))
+    assert "decimal comma" in marked.text
+
+
+def test_a_text_among_the_lengths_of_spans_is_named_and_nothing_that_follows_from_it(tmp_path):
+    (problem,) = mistakes(tmp_path, ("45.3, 45.5", '45.3, "45,5"'))
+    assert (problem.key, problem.text) == (
+        "spans.lengths",
+        "'45,5' is not a number; write 45.5, without quotation marks",
+    )
+
+
+def test_a_decimal_comma_in_a_list_is_guessed(tmp_path):
+    added, order = mistakes(tmp_path, ("45.3, 45.5", "45.3, 45,5"))
+    assert added.text.endswith("correct their lengths or this end; has '45,5' a decimal comma? write 45.5")
+    assert order.key == "spans.droppers.first"
+
+
+def test_a_file_in_another_encoding_is_told_by_line(tmp_path):
+    file = tmp_path / "line.toml"
+    file.write_bytes(b'name = "line"\n# H\xf6he\n')
+    with pytest.raises(DefinitionError, match=r"is not UTF-8 text \(line 2\): save it as UTF-8$"):
+        load_line(str(file))

@@ -55,6 +55,22 @@ def test_tables_have_the_rows_of_what_was_asked_for(line, rest):
     assert table.frame().shape == (41, 2)
 
 
+def test_a_head_leaves_less_room_in_curves(line_maker):
+    """The working range less sway, half the gauge's play and 2.5 m2 / R, or the cap of 0.4 m (EN 15273, TSI)."""
+    definition = line_maker()
+    high = dataclasses.replace(definition, profile=dataclasses.replace(definition.profile, contact_wire_height=6.2))
+    found = span_table(Line(high), speed=29.0, head=1600, radii=[300.0, 2000.0], staggers=[(0.2, 0.2)])
+    assert np.array(found.limits) == pytest.approx([0.6 - (0.11 + 0.04 * 1.45) - 0.0275 - 2.5 / 300.0, 0.4])
+    given = [
+        span_table(Line(high), speed=29.0, limit=limit, radii=[R], staggers=[(0.2, 0.2)]).largest_span[0, 0]
+        for limit, R in zip(found.limits, found.radii, strict=True)
+    ]
+    assert found.largest_span[0].tolist() == given
+    for length, R in zip(found.lengths[::10], found.smallest_radius[0, ::10].tolist(), strict=True):
+        beside = span_table(Line(high), speed=29.0, head=1600, radii=[R - 5.0, R], staggers=[(0.2, 0.2)])
+        assert beside.largest_span[0, 0] < length <= beside.largest_span[0, 1]
+
+
 def test_clearances_are_judged_at_rest_lifted_and_where_it_is_coldest(rest):
     found = {j.what: j for j in rest.judgements}
     at_rest = found["clearance under A-4, at rest [m]"]

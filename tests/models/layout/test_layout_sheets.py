@@ -97,3 +97,24 @@ def test_a_link_to_a_layout_is_one_and_a_broken_link_is_told(tmp_path):
     (tmp_path / "circle").symlink_to(tmp_path / "circle")
     with pytest.raises(LayoutError, match="cannot be read"):
         read_layout(tmp_path / "circle", SheetProblems("circle"))
+
+
+def test_hidden_sheets_are_left_out_and_that_is_said(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.title = "supports"
+    book.active.append(["position"])
+    book.active.append([0.0])
+    for name in ("droppers", "Supports ", "old"):
+        book.create_sheet(name).append(["position", "#N/A"])
+    book["Supports "].sheet_state, book["old"].sheet_state = "hidden", "veryHidden"
+    book.save(tmp_path / "survey.xlsx")
+    problems = SheetProblems("survey.xlsx")
+    layout = read_layout(tmp_path / "survey.xlsx", problems)
+    assert layout.notes == ("survey.xlsx: 'Supports ' and 'old' are hidden and were not read",)
+    assert layout.sheets["supports"].numbers("position").tolist() == [0.0]
+    book["droppers"].sheet_state = "hidden"
+    book.save(tmp_path / "survey.xlsx")
+    problems = SheetProblems("survey.xlsx")
+    read_layout(tmp_path / "survey.xlsx", problems)
+    assert [str(p) for p in problems.found] == ["survey.xlsx: droppers: the sheet is hidden: show it"]

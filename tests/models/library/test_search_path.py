@@ -67,6 +67,9 @@ def test_a_folder_that_is_not_there_is_told_and_a_name_that_its_file_does_not_ha
     assert doubts("lines", "Mine") == ["OPENPANTO_LIBRARY names no folder with 'nowhere': correct it"]
     with pytest.raises(UnknownNameError, match="OPENPANTO_LIBRARY names no folder with 'nowhere'"):
         line_path("Other")
+    monkeypatch.setenv("OPENPANTO_LIBRARY", str(project / "lines"))  # one folder too deep
+    told = f"OPENPANTO_LIBRARY names '{project / 'lines'}', with no folder lines or pantographs in it: correct it"
+    assert doubts("lines", "Mine") == [told]
 
 
 def test_a_name_that_is_not_there_is_answered_by_the_known_ones(project):

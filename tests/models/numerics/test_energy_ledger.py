@@ -35,11 +35,15 @@ def coupled(line, cx, **values):
     settings = WATCHED | values
     own = ("static_force", "start_position")
     catenary = CatenaryPart(line.with_values({k: v for k, v in settings.items() if k not in own}))
-    first = {"start_position": 60.0, "raise_duration": 0.05}
-    pantograph = LumpedPantographPart(cx.with_values(first | settings))
+    return catenary, raised_under(catenary, cx.with_values({"start_position": 60.0} | settings))
+
+
+def raised_under(catenary, definition):
+    """Return a pantograph that begins with a line."""
+    pantograph = LumpedPantographPart(definition.with_values({"raise_duration": 0.05}))
     pantograph.initialise(0.0, 0.0, np.zeros(3), BASE)
     catenary.initialise(0.0, pantograph.strip[None])
-    return catenary, pantograph
+    return pantograph
 
 
 def go(catenary, pantograph, stop, step=1e-3):
@@ -134,11 +138,10 @@ def _absorbed(model, state):
 
 
 def test_forces_on_two_wires_are_each_counted(cx):
-    line = load_line("LN2_overlap")
-    catenary, _ = coupled(line, cx)
+    catenary = CatenaryPart(load_line("LN2_overlap").with_values(WATCHED))
     first, second = catenary.model.wires
     middle = 0.5 * (first.ends[1] + second.ends[0])
-    catenary, pantograph = coupled(line, cx, start_position=middle - 50.0)
+    pantograph = raised_under(catenary, cx.with_values(WATCHED | {"start_position": middle - 50.0}))
     shared, exchanged = 0, 0.0
     for _ in range(100):
         exchanged += go(catenary, pantograph, 0.01)[0]

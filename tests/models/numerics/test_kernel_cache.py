@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import pickle
@@ -64,6 +65,24 @@ def test_the_second_process_compiles_nothing(cache, twice, caplog):
     assert sum(first.stats.cache_hits.values()) == 0
     assert sum(second.stats.cache_hits.values()) == 1
     assert not caplog.records
+
+
+def test_no_garbage_is_looked_for_while_a_kernel_is_compiled(cache, twice):
+    found = []
+    first = twice()
+    first._cache.load_overload = lambda *_: found.append(gc.isenabled())
+    assert first(21) == 42
+    assert found == [False]
+    assert gc.isenabled()
+    with pytest.raises(Exception, match="Cannot determine Numba type"):
+        first(object())
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        assert first(0.5) == 1.0
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
 
 
 def test_compiling_is_told_once_and_only_if_it_happens(cache, twice, caplog, monkeypatch):

@@ -59,7 +59,7 @@ def test_another_column_may_hold_the_times(file):
         ("time [s],z [m]\n0,1\n1,1\n0.5,2\n", "line 4: the time 0.5 s lies before that of the line before"),
         ("time [s],z [m]\n0,1\n", "has 1 row of values where a signal takes at least 2"),
         ("time [s],z [m]\n", "has no row of values"),
-        (b"time [s],z [m]\n0,\xff\n", "is not a text file in UTF-8"),
+        (b"time [s],z [m]\n0,\xff\n", "is not UTF-8 text (line 2): save it as UTF-8"),
         ("", "line 1: needs a column of times"),
     ],
 )

@@ -360,7 +360,7 @@ def _with_numbers(rows: Sequence[Row], parameters: Sequence[str]) -> list[Row]:
 
 def _read_rows(path: Path, parameters: Sequence[str]) -> list[Row]:
     """Return the rows of a table; parameters are texts as yet."""
-    heads, *cells = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8")))) or [[]]
+    heads, *cells = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")))) or [[]]
     names = [plain_cell(head) for head in heads]
     return [
         {name: _cell(cell, name in _TEXTS or name in parameters) for name, cell in zip(names, row, strict=True)}

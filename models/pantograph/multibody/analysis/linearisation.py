@@ -105,7 +105,7 @@ def stiffness(mechanism: Mechanism, y: FloatArray, inputs: Inputs, basis: FloatA
         vectors = mechanism.pool.evaluate(kinematics)
         jacobian = mechanism.constraints.evaluate(vectors).jacobian
         loads = mechanism.loads(moved, kinematics, inputs, vectors)
-        loads = loads - np.tensordot(multipliers, jacobian, axes=1)
+        loads = loads - (multipliers @ jacobian.reshape(len(multipliers), -1)).reshape(loads.shape)
         reduced: FloatArray = basis.T @ (loads[:, None, :] @ W).ravel()
         return reduced
 

@@ -114,10 +114,17 @@ def turned(p: FloatArray, angles: FloatArray) -> FloatArray:
     ndarray, shape (n, 4)
         Unit Euler parameters.
     """
-    size = np.linalg.norm(angles, axis=1, keepdims=True)
-    half = 0.5 * angles * np.sinc(size / (2.0 * np.pi))
-    product = np.cos(0.5 * size) * p + 2.0 * euler_rates(p, half)
-    return product / np.linalg.norm(product, axis=1, keepdims=True)
+    size = _lengths(angles)
+    argument = np.pi * (size / (2.0 * np.pi))
+    argument[argument == 0.0] = np.pi * 1e-20  # as in `np.sinc`, whose value there is 1
+    product = np.cos(0.5 * size) * p + 2.0 * euler_rates(p, 0.5 * angles * (np.sin(argument) / argument))
+    return product / _lengths(product)
+
+
+def _lengths(rows: FloatArray) -> FloatArray:
+    """Return what ``np.linalg.norm`` makes of rows, shape (n, 1), which takes a few of them three times as long."""
+    lengths: FloatArray = np.sqrt(np.add.reduce(rows * rows, axis=1, keepdims=True))
+    return lengths
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:

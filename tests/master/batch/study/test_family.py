@@ -10,6 +10,14 @@ def load(folder):
     return load_family(str(folder))
 
 
+def test_files_may_begin_with_a_byte_order_mark(family_folder):
+    plain = load_family(str(family_folder))
+    for name in ("study.toml", "variants.csv"):
+        path = family_folder / name
+        path.write_text(path.read_text(), encoding="utf-8-sig")
+    assert load_family(str(family_folder)) == plain
+
+
 def test_the_table_says_values_and_run(family_folder):
     family = load(family_folder)
     assert family.name == "toy"

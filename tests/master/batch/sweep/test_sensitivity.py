@@ -117,7 +117,9 @@ def test_a_sweep_writes_the_indices_of_every_figure(ishigami_swept, tmp_path):
     assert min(by_name[name] for name in ANGLES) > 1.0
     data = json.loads((tmp_path / "out" / "sensitivity.json").read_text())
     assert data["indices"][0]["first"][0] == by_name["f.x1"]
-    ishigami_swept(over={"f.x1": "1,2"})
+    points = "".join(f"{','.join(map(repr, point))}\n" for point in done.plan.points)
+    (tmp_path / "t.csv").write_text(f"{','.join(vary)}\n{points}")
+    ishigami_swept(table=tmp_path / "t.csv")  # the same runs, asked for without a design
     assert not (tmp_path / "out" / "sensitivity.csv").exists()
 
 

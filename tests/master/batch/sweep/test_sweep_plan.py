@@ -78,7 +78,7 @@ def test_what_cannot_be_is_one_sentence(toy_system, request_, said):
         ("catenary.stiffness,speed\n1\n", "line 2: has 1 cells, the head has 2"),
         ("catenary.stiffness,speed\n\n1,2\n\n1\n", "line 5: has 1 cells, the head has 2"),
         ("catenary.stiffness;speed\n4000,5;1\n", "its cells are separated by semicolons; separate them by commas"),
-        ("catenary.stiffness\n\ud800\n", "is not text in UTF-8 (byte 19)"),
+        ("catenary.stiffness\n\ud800\n", "is not UTF-8 text (line 2): save it as UTF-8"),
         ("catenary.stiffness\nmuch\n", "'much' is not a number"),
         ("catenary.stiffness,catenary.stiffness\n1,2\n", "more than once"),
         ("catenary.stiffness,stop [s]\n1,\n", "has an empty cell"),

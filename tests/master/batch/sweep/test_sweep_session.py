@@ -2,8 +2,10 @@
 
 import csv
 import io
+import json
 import math
 import os
+import re
 import signal
 import time
 from dataclasses import replace
@@ -12,15 +14,16 @@ from types import SimpleNamespace
 import pytest
 
 from master import run_session
-from master.batch.sweep import sweep_run
+from master.batch.sweep import sweep_run, sweep_session
 from master.batch.sweep.pages import grid_charts
 from master.batch.sweep.sweep_engines import HereEngine
 from master.batch.sweep.sweep_plan import SweepRequest
 from master.batch.sweep.sweep_run import SweepResult
-from master.batch.sweep.sweep_session import PreparedSweep, sweep, write_report
+from master.batch.sweep.sweep_session import PreparedSweep, as_data, sweep, write_report
 from master.batch.sweep.sweep_table import as_csv, write_parquet
 from master.commands.main import main
 from master.errors import InterruptedRunError, MasterError
+from master.results import results_folder
 from master.results.results_folder import WORK
 from tests.master.batch.sweep.conftest import GRID, ended, journal
 
@@ -105,11 +108,35 @@ def test_a_figure_that_is_no_number_is_an_empty_cell(ishigami_swept, tmp_path, m
     assert "nan" not in (tmp_path / "out" / "sweep.csv").read_text()
 
 
-def test_runs_without_figures_are_told_at_the_end(toy, toy_system, tmp_path):
+def test_runs_that_will_have_no_figures_are_told_before_the_first_one_others_at_the_end(
+    toy_system, tmp_path, monkeypatch
+):
     told = []
-    short = replace(toy_system, may_stop_early=True)
-    sweep(PreparedSweep.of(short, SweepRequest.read({**STIFFNESSES, "stop": 0.2})), tmp_path / "out", tell=told.append)
-    assert told[-1].startswith("3 runs have no figures; run 1: the run ends with 'pantograph' at ")
+    asked = SweepRequest.read({"over": {"catenary.stiffness": "4000,5000"}, "stop": 0.2})
+    known = {1: "the run ends at 0.2 s: stop at 1 s", 2: ""}
+    monkeypatch.setattr(sweep_session, "uncovered", lambda system: known[int(system.name[-1])])
+    prepared = PreparedSweep.of(replace(toy_system, may_stop_early=True), asked)
+    sweep(prepared, tmp_path / "out", tell=told.append)
+    assert told[0] == f"1 run will have no figures; run 1: {known[1]}"
+    assert told[1].startswith("2 runs, 1 at a time")
+    assert told[2].startswith("1 run has no figures; run 2: the run ends with 'pantograph' at ")
+
+
+@pytest.mark.parametrize("verb", [["sweep"], ["optimise", "--minimise", "sigma", "--vary", "catenary.stiffness=1:2"]])
+def test_a_folder_that_cannot_be_had_is_told_before_anything_is_built(toy, tmp_path, monkeypatch, capsys, verb):
+    (tmp_path / "notes").write_text("mine")
+    for path in (toy / "resources").glob("*.fmu"):
+        path.unlink()  # what would be told next
+    for out, why in (
+        ("notes/out", f"cannot be made: {tmp_path}/notes is a file"),
+        ("a/b", f"no permission in {tmp_path}"),
+    ):
+        assert main([verb[0], str(toy), *verb[1:], "--out", str(tmp_path / out)]) == 1
+        assert why in capsys.readouterr().err
+        monkeypatch.setattr(results_folder.os, "access", lambda *_: False)
+    monkeypatch.chdir(tmp_path)
+    assert main([verb[0], str(toy), *verb[1:]]) == 1
+    assert "the folder results/" in capsys.readouterr().err
 
 
 def test_what_was_thinned_is_made_again_if_all_is_to_be_kept(swept, tmp_path):
@@ -286,13 +313,40 @@ def test_a_folder_of_something_else_is_left_alone(swept, tmp_path):
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["thesis.txt"]
 
 
-def test_a_sweep_of_another_scenario_is_left_alone(swept, toy_system, tmp_path):
-    swept(**STIFFNESSES)
-    before = (tmp_path / "out" / "sweep.csv").read_bytes()
+def test_a_sweep_of_another_scenario_is_left_alone(toy_system, tmp_path):
+    data = {"generator": "openpanto sweep", "scenario": toy_system.name}
+    (tmp_path / "sweep.json").write_text(json.dumps(data))
+    (tmp_path / "sweep.csv").write_text("mine")
     other = PreparedSweep.of(replace(toy_system, name="other"), SweepRequest(**STIFFNESSES))
     with pytest.raises(MasterError, match=f"holds a sweep of the scenario '{toy_system.name}', this one is of 'other'"):
-        sweep(other, tmp_path / "out")
-    assert (tmp_path / "out" / "sweep.csv").read_bytes() == before
+        sweep(other, tmp_path)
+    assert (tmp_path / "sweep.csv").read_text() == "mine"
+
+
+LOST = "and its table would be replaced; choose another with --out"
+
+
+@pytest.mark.parametrize(
+    ("changed", "asked", "why"),
+    [
+        ({"step": 0.0025}, {}, "a sweep with step 0.001 s, this one has step 0.0025 s; choose another with --out"),
+        ({"changes": {"a.b": "2"}}, {}, "with no --set a.b, this one has --set a.b=2; choose another with --out"),
+        ({}, {"over": {"catenary.stiffness": "4000"}}, f"; 2 of its 3 runs are not among those of this one, {LOST}"),
+        (
+            {},
+            {"over": {"speed": "50"}},
+            "another sweep, over catenary.stiffness; 3 of its 3 runs are not",
+        ),
+        ({}, {"static_force": "130 N"}, f"; 3 of its 3 runs are not among those of this one, {LOST}"),
+    ],
+)
+def test_another_sweep_of_the_scenario_is_left_alone(toy_system, tmp_path, changed, asked, why):
+    made = as_data(PreparedSweep.of(toy_system, SweepRequest.read(STIFFNESSES)).outcome)
+    assert made["settings"] == {"step": 0.001, "scheme": "jacobi", "tolerance": {}}
+    (tmp_path / "sweep.json").write_text(json.dumps({**made, "generator": "openpanto sweep", "finished": 3}))
+    other = PreparedSweep.of(replace(toy_system, **changed), SweepRequest.read({**STIFFNESSES, **asked}))
+    with pytest.raises(MasterError, match=re.escape(why)):
+        sweep(other, tmp_path)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])

@@ -197,7 +197,7 @@ def test_a_child_in_an_endless_loop_ends_with_its_master(crasher_fmu):
         from master.fmu.isolation.isolated_instance import IsolatedInstance, Isolation
         from master.system.components import Component
         fmu = read_fmu(Path({str(crasher_fmu)!r}))
-        toy = IsolatedInstance(Component("toy", fmu, {{"deed": 3}}, ("u",), ("pid",)), Isolation())
+        toy = IsolatedInstance(Component("toy", fmu, {{"deed": 10}}, ("u",), ("pid",)), Isolation())
         pid = np.zeros(1)
         toy.bind(np.zeros(1), pid)
         toy.start(0.0, 1.0)

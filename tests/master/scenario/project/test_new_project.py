@@ -124,6 +124,9 @@ def test_a_pantograph_from_elsewhere_is_brought_along_and_set_as_far_as_it_can_b
     joined = {(c.end_element, c.end_connector) for c in structure.connections}
     assert ("pantograph", "push") in joined
     assert len(joined) == 13
+    page = (tmp_path / "demo" / "README.md").read_text()
+    assert "values of `pantograph`: speed, start, lifting force |" in page
+    assert "follow_height" not in page  # nobody knows how it is lifted
 
 
 def test_a_pantograph_that_nothing_can_be_set_of_runs_as_it_is(tmp_path, make_fmu):
@@ -131,7 +134,10 @@ def test_a_pantograph_that_nothing_can_be_set_of_runs_as_it_is(tmp_path, make_fm
     structure = read(new_project(request(tmp_path / "demo", pantographs=[theirs])))
     assert values(structure, "pantograph") == {}
     assert structure.annotations.settings.calibration is None
-    assert "Nothing is calibrated" in (tmp_path / "demo" / "README.md").read_text()
+    page = (tmp_path / "demo" / "README.md").read_text()
+    assert "Nothing is calibrated" in page
+    assert "no parameter that sets its start and its speed, which must be as said above by itself" in page
+    assert "pantograph.ssv" not in page
 
 
 def test_a_line_from_elsewhere_gets_what_it_takes(tmp_path, make_fmu):

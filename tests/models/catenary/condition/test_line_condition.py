@@ -379,12 +379,14 @@ def test_faults_are_of_the_droppers_that_they_name():
     """Section, span and dropper count along the track; hangers are not droppers."""
     line = load_line("LN2_overlap")
     design = design_of(line)
-    for section in (1, 2):
-        condition = changed(design, with_faults(line, slipped(2, 0.05, span=4, section=section)))
-        longer = np.flatnonzero(condition.unstrained_length - design.unstrained_length > 0.04)
-        (node,) = design.shape.mesh.droppers[longer, 0]
-        assert design.shape.mesh.section[node] == section - 1
-        wanted = line.sections[section - 1].spans[3].droppers[1]
+    faults = (slipped(2, 0.05, span=4, section=1), slipped(3, 0.08, span=5, section=2))
+    condition = changed(design, with_faults(line, *faults))
+    longer = condition.unstrained_length - design.unstrained_length
+    for section, fault in enumerate(faults):
+        (dropper,) = np.flatnonzero(np.abs(longer - fault["value"]) < 0.01)
+        node = design.shape.mesh.droppers[dropper, 0]
+        assert design.shape.mesh.section[node] == section
+        wanted = line.sections[section].spans[fault["span"] - 1].droppers[fault["dropper"] - 1]
         assert math.isclose(design.shape.mesh.points[node, 0], wanted, abs_tol=1e-9)
 
 

@@ -183,7 +183,7 @@ def test_a_profile_is_no_parameter_and_an_fmu_has_its_own_name_for_it(profiled):
         (b"position,height\n0,0\n1,5.3\n", "line 3: a height of 5.3 m is more than 0.05 m from the static shape"),
         (b"position,height\n1,0\n0,0\n", "wear.csv, line 3: the position 0 m does not lie beyond that before it, 1 m"),
         (b"position,height\n0,0\n1,0,3\n", "wear.csv, line 3: has 3 values for 2 columns"),
-        (b"position,height\n0,\xff\n", "wear.csv: is not UTF-8 text (byte 18)"),
+        (b"position,height\n0,\xff\n", "wear.csv: is not UTF-8 text (line 2): save it as UTF-8"),
     ],
 )
 def test_a_wrong_profile_is_told(profiled, content, said):

@@ -23,6 +23,7 @@ from models.catenary.shape.line_mesh import build_mesh
 from models.catenary.statics.temperature_table import temperature_table
 from models.definition_files.parameter import ParameterError
 from models.definition_files.toml_reader import DefinitionError
+from models.library.catalogue import line_path, load_line
 
 EA, LOAD, SPAN, EXPANSION = 120e-6 * 120e9, 10.6222, 55.0, 17e-6
 
@@ -237,6 +238,20 @@ def test_the_table_as_read(line_maker):
     assert {"tensioning.temperature", "tensioning.direction", "tensioning.contact_wire.efficiency",
             "tensioning.messenger_wire.ratio", "tensioning.messenger_wire.expansion"} <= set(names)  # fmt: skip
     assert line.with_values({"tensioning.direction": 1}).tensioning.direction == 1
+
+
+def test_several_sections_share_no_fixed_point(tmp_path):
+    table = "\n[tensioning]\ntemperature = [40, 'degC', 'x']\nreference_temperature = [15, 'degC', 'x']\n"
+    file = tmp_path / "AC_mixed.toml"
+    text = line_path("AC_mixed").read_text(encoding="utf-8") + table
+    file.write_text(text + "fixed_point = [700, 'm', 'x']\n", encoding="utf-8")
+    with pytest.raises(DefinitionError) as raised:
+        load_line(str(file))
+    (problem,) = raised.value.problems
+    assert problem.key == "tensioning.fixed_point"
+    assert problem.text.endswith("the line has several: leave it out, and each is fixed in its middle")
+    file.write_text(text, encoding="utf-8")
+    assert load_line(str(file)).tensioning.fixed_point is None
 
 
 @pytest.mark.parametrize(

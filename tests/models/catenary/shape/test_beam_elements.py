@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import eigh
 
 from models.catenary.shape.beam_elements import (
+    bar_stiffness,
     beam_geometric_stiffness,
     beam_mass,
     beam_stiffness,
@@ -46,6 +47,15 @@ def test_elastic_stiffness_is_blind_to_rigid_body_motion(oblique):
     modes = _rigid_body_modes(start[0], end[0])
     assert np.abs(K @ modes.T).max() < 1e-9 * np.abs(K).max()
     assert np.linalg.matrix_rank(K, tol=1e-9 * np.abs(K).max()) == 6
+
+
+def test_a_beam_without_bending_and_torsion_is_a_bar(oblique):
+    _, _, axes, length = oblique
+    beam = to_global(beam_stiffness(_one(EA), _one(0.0), _one(0.0), length), axes)[0]
+    bar = bar_stiffness(axes[:, 0, :], EA / length)[0]
+    moves = np.array([0, 1, 2, 6, 7, 8])
+    assert np.array_equal(bar, beam[np.ix_(moves, moves)])
+    assert np.count_nonzero(beam) == np.count_nonzero(bar)
 
 
 def test_geometric_stiffness_is_blind_to_translation_and_resists_rotation(oblique):

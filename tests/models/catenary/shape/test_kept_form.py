@@ -80,12 +80,16 @@ def test_what_changes_a_form_is_found_anew(folder, found, short_line, monkeypatc
 
 def test_the_code_belongs_to_the_key(short_line, monkeypatch, tmp_path):
     mesh = build_mesh(short_line)
-    before = module._key(short_line, mesh)
-    assert before == module._key(short_line, mesh)
+    before, code = module._key(short_line, mesh), module._code()
+    assert code == module._CODE
     (tmp_path / "form_finding.py").write_text("another")
     monkeypatch.setattr(module, "__file__", str(tmp_path / "kept_form.py"))
+    assert module._code() != code
+    assert module._key(short_line, mesh) == before  # read once: an FMU's folder may be gone by now
+    monkeypatch.setattr(module, "_CODE", module._code())
     assert module._key(short_line, mesh) != before
     monkeypatch.setattr(module, "_source", lambda _: tmp_path / "missing.py")
+    monkeypatch.setattr(module, "_CODE", module._code())
     assert module._key(short_line, mesh) == ""
 
 

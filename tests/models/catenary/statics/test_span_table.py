@@ -32,7 +32,7 @@ PRINTED = [
 
 @pytest.mark.parametrize(("length", "start", "end", "printed", "formula"), PRINTED)
 def test_the_smallest_radius_of_ca160(ca160, length, start, end, printed, formula):
-    found = ca160.smallest_radius(0.55, length, start / 100.0, end / 100.0)
+    found = ca160.smallest_radius(lambda _: 0.55, length, start / 100.0, end / 100.0)
     assert found == formula
     assert formula <= printed
 
@@ -62,5 +62,5 @@ def test_the_largest_span_is_blown_to_the_limit(ca160, start, end):
 
 def test_what_cannot_be(ca160):
     assert math.isnan(ca160.largest_span(0.15, 0.0, 0.2, 0.2))
-    assert math.isnan(ca160.smallest_radius(0.15, 40.0, 0.2, -0.2))
-    assert len(radii(ca160, 0.55, 0.2, 0.2)) == len(LENGTHS) == 41
+    assert math.isnan(ca160.smallest_radius(lambda _: 0.15, 40.0, 0.2, -0.2))
+    assert len(radii(ca160, lambda _: 0.55, 0.2, 0.2)) == len(LENGTHS) == 41

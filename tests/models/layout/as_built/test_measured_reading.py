@@ -71,3 +71,15 @@ def test_a_column_in_another_unit_is_told_ten_times_and_counted(tmp_path):
     assert told[0].endswith("row 2, column B (height): 5080 is outside 2 ... 10 m: check its size and its unit")
     assert told[-1].endswith("column B (height): ... and 490 more rows are wrong")
     assert any("row 502, column A (position)" in line for line in told)
+
+
+def test_a_run_beside_hidden_sheets_is_read(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["position", "height"], [1.0, 5.01], [2.0, 5.02], [3.0, 5.03]):
+        book.active.append(row)
+    book.create_sheet("raw").sheet_state = "hidden"
+    book.save(tmp_path / "run.xlsx")
+    run = read_measured_run(tmp_path / "run.xlsx")
+    assert run.height.tolist() == [5.01, 5.02, 5.03]
+    assert run.notes == (f"{tmp_path / 'run.xlsx'}: 'raw' is hidden and was not read",)

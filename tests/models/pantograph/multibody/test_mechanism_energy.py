@@ -8,7 +8,7 @@ from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from tests.effort import rest
 
 
-def run(name, step, roof=0.0, stop=0.5):
+def run(name, step, roof=0.0, stop=0.25):
     """Run under a force that swings, on a roof that may move."""
     part = MultibodyPantographPart(load_pantograph(name).with_values({"monitor_energy": 1}))
     speed = part.definition.speed

@@ -28,10 +28,10 @@ def test_pendulum_swings_as_its_equation_says():
     inertia = 0.2 + 2.0 * 0.25  # about the hinge
     start = 2.0 * np.arcsin(0.1)
     exact = solve_ivp(
-        lambda t, u: [u[1], 2.0 * 9.81 * 0.5 * np.cos(u[0]) / inertia], (0.0, 2.0), [start, 0.0],
+        lambda t, u: [u[1], 2.0 * 9.81 * 0.5 * np.cos(u[0]) / inertia], (0.0, 1.2), [start, 0.0],
         method="DOP853", rtol=1e-12, atol=1e-13,
     )  # fmt: skip
-    y = run(m, y, 2.0)
+    y = run(m, y, 1.2)
     s = m.split(y)
     assert 2.0 * np.arctan2(s.p[1, 2], s.p[1, 0]) == pytest.approx(exact.y[0, -1], abs=1e-7)
     assert s.w[1, 1] == pytest.approx(exact.y[1, -1], abs=1e-6)
@@ -66,10 +66,10 @@ def test_top_in_steady_precession_keeps_its_tilt_and_rate():
     # weight h = polar spin' precession - (about_tip - polar) precession^2 cos(tilt), spin' the body's own z rate
     spin_total = (weight + about_tip * precession**2 * np.cos(tilt)) / (polar * precession)
     m, y = top(spin_total - precession * np.cos(tilt), precession, tilt)
-    y = run(m, y, 0.5, tolerance=1e-8)
+    y = run(m, y, 0.3, tolerance=1e-8)
     r = m.split(y).r[1]
     assert np.arccos(r[2] / 0.3) == pytest.approx(tilt, abs=1e-5)
-    assert np.arctan2(r[1], r[0]) == pytest.approx(0.5 * precession, abs=1e-5)
+    assert np.arctan2(r[1], r[0]) == pytest.approx(0.3 * precession, abs=1e-5)
 
 
 def test_nutating_top_keeps_energy_and_momentum():
@@ -82,7 +82,7 @@ def test_nutating_top_keeps_energy_and_momentum():
         return np.array([m.energy(y), momentum[2], momentum @ A[:, 2]])
 
     before = invariants(y)
-    after = invariants(run(m, y, 0.5, tolerance=1e-9))
+    after = invariants(run(m, y, 0.25, tolerance=1e-9))
     np.testing.assert_allclose(after, before, rtol=1e-7)
 
 
@@ -131,7 +131,7 @@ def test_four_bar_follows_its_closed_form_while_it_swings():
     y = assemble(m)
     energy = m.energy(y)
     seen = []
-    y = run(m, y, 1.0, watch=lambda t, done: seen.append(angle_of(m, done.y, "crank")))
+    y = run(m, y, 0.6, watch=lambda t, done: seen.append(angle_of(m, done.y, "crank")))
     wrapped = lambda a: (a + np.pi) % (2 * np.pi) - np.pi  # noqa: E731
     assert wrapped(angle_of(m, y, "rocker") - rocker_angle(angle_of(m, y, "crank"))) == pytest.approx(0.0, abs=1e-8)
     assert np.ptp(seen) > 0.5
@@ -227,7 +227,7 @@ def test_joint_friction_stops_a_pendulum():
     }  # fmt: skip
     m = Mechanism(mechanism_from(data))
     energies = []
-    y = run(m, assemble(m), 3.0, watch=lambda t, done: energies.append(m.energy(done.y)), tolerance=1e-8)
+    y = run(m, assemble(m), 2.0, watch=lambda t, done: energies.append(m.energy(done.y)), tolerance=1e-8)
     assert (np.diff(energies) <= 1e-9).all()
     assert abs(m.split(y).w[1, 1]) < 0.01
 
@@ -241,6 +241,6 @@ def test_bushing_carries_a_body_like_springs():
     }  # fmt: skip
     m = mechanism({"box": body(2.0, (1, 1, 1), (0, 0, 1))}, {}, {"bushing": bushing})
     y = m.shifted(m.written_state(), np.zeros((2, 3)), np.array([[0, 0, 0], [0.05, 0.1, 0.02]]))
-    s = m.split(run(m, y, 20.0, largest=5e-3, step=5e-3, tolerance=1e-7))
+    s = m.split(run(m, y, 8.0, largest=5e-3, step=5e-3, tolerance=1e-7))
     np.testing.assert_allclose(s.r[1], [0, 0, 1 - 2 * 9.81 / 2e3], atol=1e-7)
     np.testing.assert_allclose(s.p[1, 1:], 0.0, atol=1e-5)

@@ -1,10 +1,13 @@
 """Cams: the constant-force one against its published moments, tables, stops, where the arms stand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from models.definition_files.toml_reader import DefinitionError
 from models.numerics.cubic_curve import CubicCurve
+from models.pantograph.multibody.analysis import cam_design
 from models.pantograph.multibody.analysis.cam_design import stand
 from models.pantograph.multibody.analysis.mechanism_rig import Rig
 from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium_where
@@ -12,6 +15,7 @@ from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from models.pantograph.operation import Drive
+from models.pantograph.train_motion import SpeedProfile
 from tests.effort import rest
 from tests.models.pantograph.multibody.mechanisms import library, library_data, mechanism_from, q
 
@@ -60,6 +64,34 @@ def test_raise_becomes_neutral_and_the_head_swings_as_before():
     assert max(m.growth for m in raised) < 1e-3
     assert "neutral: rests at any height" in {m.remark for m in raised}
     assert held.warning(157.5) == ""
+
+
+def test_a_cam_is_found_once_for_all_runs_of_a_pantograph(monkeypatch):
+    """What a run may set leaves no bit of it changed; what the mechanism is changes it."""
+    monkeypatch.setattr(cam_design, "_POINTS", 3)
+    monkeypatch.setattr(cam_design, "_MOST_FOUND", 1)
+    monkeypatch.setattr(cam_design, "_found", {})
+    plain = library("generic_multibody_cam")
+    run = {
+        "speed": 60.0, "start_position": 30.0, "reference_height": 5.3, "start_height": 4.9, "raise_start": 1.0,
+        "raise_duration": 0.3, "aerodynamic_uplift": (0.02, 0.01), "knuckle": "trailing", "direction": -1,
+        "extrapolation_order": 1, "monitor_energy": 1, "time_step": 5e-4, "tolerance": 1e-7, "use_train": 1,
+        "speed_profile": SpeedProfile(time=(0.0, 1.0), speed=(10.0, 20.0)),
+    }  # fmt: skip
+    assert set(run) == set(cam_design._OF_A_RUN)
+
+    def fitted(definition):
+        mechanism = Mechanism(definition)
+        stand(mechanism)
+        cam = mechanism.forces.cam
+        return cam, [curve.rows.tobytes() for curve in cam]
+
+    cam, numbers = fitted(plain)
+    assert fitted(replace(plain, **run))[0] is cam
+    assert fitted(plain.with_values({"body.lower_arm.mass": 30.0}))[1] != numbers
+    other, same = fitted(replace(plain, **run))
+    assert other is not cam  # that of the last one alone is kept
+    assert same == numbers
 
 
 def with_table(moment=(900.0, 1000.0, 1100.0, 1150.0), angle=(-10.0, 0.0, 10.0, 20.0), **values):
@@ -248,7 +280,9 @@ def test_a_curve_holds_its_ends_and_goes_through_its_points():
 
 def test_a_force_from_outside_becomes_the_moment_that_carries_it():
     """With the arm at the same angle, a moment more by what 30 N on the strip need: it rises by 2.34 m per rad."""
-    part = MultibodyPantographPart(library("generic_multibody"))
+    data = library_data("generic_multibody")
+    data["force"]["arm_stops"] = library_data("generic_multibody_cam")["force"]["arm_stops"]
+    part = MultibodyPantographPart(mechanism_from(data))
     part.initialise(0.0, 157.5, np.zeros(3), np.zeros(2), Drive(uplift=30.0))
     mechanism, reference = part._built.mechanism, part._built.reference
     place = mechanism.forces.lift_place

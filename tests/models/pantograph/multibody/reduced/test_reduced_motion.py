@@ -265,6 +265,7 @@ def test_an_arm_is_tabulated_once_for_all_runs_of_a_pantograph(monkeypatch):
     first, same = (reduced(d)[0]._arm for d in (plain, run))
     assert same is first
     assert reduced_as_assembled(plain)[0]._arm is not first
+    assert reduced(replace(plain, start_height=4.95))[0]._arm is not first  # its coordinates begin elsewhere
     assert reduced(plain.with_values({"body.m1.mass": 9.0}))[0]._arm is not first
     other = reduced(run)[0]._arm
     assert other is not first  # the two used last alone are kept

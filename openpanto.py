@@ -30,15 +30,23 @@ if __name__ == "__main__" and sys.path[0] != os.path.dirname(__file__) and not s
 
 import argparse
 import importlib
+import importlib.util
 import re
 import shlex
+import textwrap
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, NoReturn
 
-from master.errors import empty_argument, hint
+for _name in ("master", "models", "fmus"):  # PYTHONPATH comes before what is installed
+    _found = importlib.util.find_spec(_name)
+    _file = "" if _found is None else os.path.abspath(_found.origin or "")
+    if _file and _file != os.path.join(os.path.dirname(os.path.abspath(__file__)), _name, "__init__.py"):
+        sys.exit(f"error: {_file} stands before our package '{_name}': take its folder out of PYTHONPATH")
+
+from master.errors import empty_argument, hint, said
 from master.safety.supervision import phase, supervised
 
 
@@ -224,6 +232,8 @@ VERBS: Final[Mapping[str, Verb]] = {
 }
 
 
+#: Columns that help takes.
+_WIDTH: Final = 80
 EPILOG: Final = """\
 openpanto VERB --help says more of a verb and has examples. To begin with:
   openpanto run cx_ln2
@@ -234,13 +244,29 @@ Completion with TAB, in bash (zsh, fish likewise):
 class Parser(argparse.ArgumentParser):
     """A parser that suggests what a mistyped option or choice may have been meant to be."""
 
+    _given: Sequence[str] = ()
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse arguments, and keep them for `error`."""
+        self._given = list(sys.argv[1:] if args is None else args)
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
         """Print the mistake in one sentence, and end with exit code 2."""
         if found := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message, re.DOTALL):
             message += hint(found[1], re.findall(r"'(.*?)'", found[2]))
         if "required" in message:
+            if mistyped := [text for text in self._given if self.is_no_option(text)]:
+                self._given = ()
+                self.unknown(mistyped)
             message += f" ({self.prog} --help has examples)"
         self.exit(2, f"{self.prog}: error: {message}\n")
+
+    def is_no_option(self, text: str) -> bool:
+        """Whether an argument is written as an option, and neither is one nor the beginning of one."""
+        name, known = text.partition("=")[0], self._option_string_actions
+        is_written_so = re.match(r"--?[a-zA-Z]", name) is not None
+        return is_written_so and not any(option.startswith(name) for option in known)
 
     def unknown(self, given: Sequence[str]) -> NoReturn:
         """Refuse arguments that the verb does not have."""
@@ -261,6 +287,10 @@ class Completion(argparse.Action):
             print(completion(shell), flush=True)
         except ModuleNotFoundError as error:
             parser.exit(1, f"error: {error.name} is not installed: pip install {error.name}\n")
+        except BrokenPipeError:  # the reader has closed it, and knows
+            raise
+        except OSError as error:
+            parser.exit(1, f"error: standard output: {said(error)}\n")
         parser.exit()
 
 
@@ -314,7 +344,28 @@ def _verbs(parser: argparse.ArgumentParser) -> Mapping[str, argparse.ArgumentPar
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return the exit code: 0 done, 1 failed, 2 a command line that was not understood."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    return supervised(lambda: _worked(given))
+    return supervised(lambda: _understood(given))
+
+
+def _understood(given: Sequence[str]) -> int:
+    """Carry out a command line; say what is wrong if that fails with a package that PYTHONPATH has put in the way."""
+    try:
+        return _worked(given)
+    except Exception as error:
+        if not (foreign := list(_from_python_path())):
+            raise
+        text = f"{', '.join(foreign)} instead of what is installed, by PYTHONPATH, does not do ({error})"
+        print(f"error: {text}: take its folder out of PYTHONPATH", file=sys.stderr)
+        return 1
+
+
+def _from_python_path() -> Iterator[str]:
+    """Yield the files that packages which we need come from, those in the folders of PYTHONPATH."""
+    folders = [Path(name).resolve() for name in os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    for name in REQUIRED:
+        file = getattr(sys.modules.get(name), "__file__", None)
+        if file is not None and any(Path(file).resolve().parent in (f, f / name) for f in folders):
+            yield file
 
 
 def _worked(given: Sequence[str]) -> int:
@@ -326,8 +377,10 @@ def _worked(given: Sequence[str]) -> int:
         return 2
     if empty := empty_argument(given):
         parser.error(empty)
+    if parser.is_no_option(verb):
+        parser.unknown([verb])
     if not verb.startswith("-") and verb not in VERBS:
-        parser.error(f"there is no verb '{verb}'{_wanted_run(verb) or hint(verb, VERBS)}")
+        parser.error(f"there is no verb '{verb}'{_wanted_verb(parser, verb)}")
     options, unknown = parser.parse_known_args(given)
     if unknown:
         options.parser.unknown(unknown)
@@ -337,12 +390,16 @@ def _worked(given: Sequence[str]) -> int:
         return int(_named(execution)(options))
 
 
-def _wanted_run(name: str) -> str:
-    """Return the hint that a scenario is run by a verb, if the name may be one."""
+def _wanted_verb(parser: Parser, name: str) -> str:
+    """Return the hint what may be meant by a word that is no verb: an option, a scenario to run, a verb like it."""
     from master.scenario.scenario_place import scenario_names
 
     is_scenario = os.path.lexists(name) or name.endswith(".ssp") or name in scenario_names()
-    return f"; to run a scenario: openpanto run {name}" if is_scenario else ""
+    if is_scenario:
+        return f"; to run a scenario: openpanto run {name}"
+    if f"--{name}" in parser._option_string_actions:
+        return f"; it is an option: openpanto --{name}"
+    return hint(name, VERBS) or "; openpanto --help lists them"
 
 
 def command_line(wanted: Collection[str] = tuple(VERBS)) -> Parser:
@@ -364,11 +421,23 @@ def command_line(wanted: Collection[str] = tuple(VERBS)) -> Parser:
             continue
         _named(verb.declaration)(verbs)
         added = verbs.choices[name]
-        added.description = verb.text
-        added.epilog = "\n".join(["examples:", *(f"  openpanto {example}" for example in verb.examples)])
+        added.description = textwrap.fill(verb.text, _WIDTH)
+        added.epilog = "\n".join(["examples:", *(_on_lines(f"  openpanto {example}") for example in verb.examples)])
         added.formatter_class = argparse.RawDescriptionHelpFormatter
         added.set_defaults(parser=added)
     return parser
+
+
+def _on_lines(example: str) -> str:
+    """Return an example on as many lines as it needs, broken before options as a shell wants it."""
+    first, *others = re.split(r" (?=--)", example)
+    lines = [first]
+    for part in others:
+        if len(f"{lines[-1]} {part} \\") <= _WIDTH:
+            lines[-1] += f" {part}"
+        else:
+            lines.append(f"      {part}")
+    return " \\\n".join(lines)
 
 
 def _version(package: str = "openpanto") -> str:

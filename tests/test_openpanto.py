@@ -74,7 +74,7 @@ def test_examples_of_every_verb_are_in_its_help_and_understood(verb):
     parser = command_line([verb])
     text = parser._subparsers._group_actions[0].choices[verb].format_help()
     for example in VERBS[verb].examples:
-        assert f"\n  openpanto {example}\n" in text
+        assert f"\n  openpanto {example}\n" in text.replace(" \\\n      ", " ")
         assert example.startswith(verb)
         parser.parse_args(shlex.split(example))
 
@@ -94,7 +94,11 @@ def test_version_and_help_import_nothing_that_takes_time(asked):
     ("line", "said"),
     [
         (["rnu", "x"], "there is no verb 'rnu'; did you mean 'run'?"),
-        (["quux"], "there is no verb 'quux'"),
+        (["quux"], "there is no verb 'quux'; openpanto --help lists them"),
+        (["version"], "there is no verb 'version'; it is an option: openpanto --version"),
+        (["--verson"], "unrecognized arguments: --verson; did you mean '--version'?"),
+        (["-v"], "openpanto: error: unrecognized arguments: -v"),
+        (["new", "x", "--pantograf", "CX"], "unrecognized arguments: --pantograf; did you mean '--pantograph'?"),
         (["cx_ln2"], "there is no verb 'cx_ln2'; to run a scenario: openpanto run cx_ln2"),
         (["cx_ln2.ssp"], "there is no verb 'cx_ln2.ssp'; to run a scenario: openpanto run cx_ln2.ssp"),
         (["run", "x", "--sheme", "jacobi"], "unrecognized arguments: --sheme jacobi; did you mean '--scheme'?"),
@@ -106,6 +110,35 @@ def test_a_mistyped_word_is_told_with_what_it_may_have_been(line, said, capsys):
         openpanto._worked(line)
     assert end.value.code == 2
     assert capsys.readouterr().err.endswith(f"{said}\n")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_fits_a_terminal_of_80_columns(verb, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    text = openpanto._verbs(command_line([verb]))[verb].format_help()
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def started(tmp_path, **files):
+    """Return what the command says with files in a folder that PYTHONPATH names."""
+    for name, text in files.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    code = "import sys\nfrom openpanto import main\nsys.exit(main(['statics', 'NONE']))"
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    command = [sys.executable, "-P", "-c", code]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": path}
+    )
+    assert done.returncode == 1
+    (sentence,) = done.stderr.splitlines()
+    return sentence
+
+
+@pytest.mark.parametrize("name", ["models", "rich"])
+def test_a_foreign_package_by_pythonpath_is_one_sentence(tmp_path, name):
+    said = started(tmp_path, **{name: "x = 1"})
+    assert said.startswith(f"error: {tmp_path / name}.py ")
+    assert said.endswith(": take its folder out of PYTHONPATH")
 
 
 def test_the_packages_that_nothing_works_without_are_those_of_pyproject():

@@ -162,6 +162,7 @@ def test_values_are_numbers_or_texts_with_units(toy_run):
         ({"pantograph.static_force": float("nan")}, "pantograph.static_force"),
         ({"pantograph.static_force": [1]}, "give a number, a text or True or False, not a list"),
         ({"pantograph.static_force": "1 parsec"}, "parsec"),
+        ({3: 1.0}, "set: 3 is not the name of a parameter"),
     ],
 )
 def test_wrong_values_are_refused_at_once(toy_run, values, said):
@@ -173,6 +174,8 @@ def test_wrong_values_are_refused_at_once(toy_run, values, said):
 
 def test_short_names_must_be_of_one_parameter(toy_run):
     scenario = toy_run[0]
+    with pytest.raises(master.MasterError, match=r"'pantograph\.static_force' is given twice"):
+        scenario.set({"pantograph.static_force": 120.0}, static_force=130.0)
     fmu = scenario.system.components[0].fmu
     wires = ("contact_wire.tension", "messenger_wire.tension")
     variables = {n: replace(fmu.variables["stiffness"], name=n) for n in (*wires, "damping")}
@@ -291,6 +294,7 @@ def test_runs_side_by_side(toy_run, tmp_path):
     other = master.run(scenario.set(ripple=0.0), tmp_path / "smooth")
     frame = master.compare(results, other)
     assert list(frame.columns) == ["out", "smooth"]
+    assert master.compare(results.folder, tmp_path / "smooth").equals(frame)
     assert frame.loc["standard deviation [N]", "smooth"] < frame.loc["standard deviation [N]", "out"]
     assert frame.attrs["notes"] == ()
     with pytest.raises(master.MasterError, match="nothing to compare"):
@@ -301,6 +305,8 @@ def test_runs_side_by_side(toy_run, tmp_path):
 
 def test_calibration_returns_a_scenario_and_stores_nothing(toy_run):
     scenario, _ = toy_run
+    with pytest.raises(master.MasterError, match="out: 3 is not the path of a results folder"):
+        master.run(scenario, 3)
     before = (scenario.path / "parameters.ssv").read_bytes()
     found = master.calibrate(scenario, parameter="pantograph.static_force", mean=150.0)
     assert found.mean_force == pytest.approx(150.0, abs=0.1)
@@ -336,6 +342,13 @@ def test_figures_of_a_foreign_record_are_those_of_the_run(toy_run):
         (lambda _: master.contact_figures([0, 1], [1, 2], [0, 1]), "step must be one number"),
         (lambda _: master.contact_figures([0, 1], [1, 2], 0.001), "fewer than two samples"),
         (lambda _: master.read_results("nowhere"), "is not a results folder"),
+        # What is of another type than it should be is a sentence as well.
+        (lambda _: master.contact_figures("a", "b", 0.1), "position and force must be rows of numbers"),
+        (lambda _: master.contact_figures([0, 1], [1, 2], "0.1"), "step must be one number"),
+        (lambda _: master.read_results(None), "read_results(None): give the path of a results folder"),
+        (lambda r: r.frame(3), "frame(3): names are texts"),
+        (lambda r: master.compare([r, r]), "compare: a list is neither results nor a results folder"),
+        (lambda _: master.compare("nowhere", "nowhere"), "nowhere is not a results folder"),
     ],
 )
 def test_what_is_not_there_is_said_in_a_sentence(toy_run, ask, said):
@@ -416,7 +429,11 @@ def test_definitions_by_name_and_path(tmp_path):
         (lambda: models.open_line("LN9"), models.UnknownNameError, "LN9"),
         (lambda: models.open_line("LN2").set({"contact_wire.tension": "22 kg"}), models.ParameterError, "give it in N"),
         (lambda: models.open_line("LN2").set({"contact_wire.tensio": 1.0}), models.ParameterError, "tensio"),
-        (lambda: models.open_line("LN2").set({"contact_wire.tension": [1]}), models.ParameterError, "tension"),
+        (
+            lambda: models.open_line("LN2").set({"contact_wire.tension": [1]}),
+            models.ParameterError,
+            "contact_wire.tension = [1]: this is neither a number nor a text",
+        ),
         (lambda: models.statics("LN2", span=99), models.ParameterError, "span 99: the line has spans 1 to"),
         (lambda: models.statics("LN2", section=2), models.ParameterError, "section 2: the line has sections 1 to 1"),
         (lambda: models.statics("LN2", speed=300), models.ParameterError, "'300 km/h'"),
@@ -424,6 +441,7 @@ def test_definitions_by_name_and_path(tmp_path):
         (lambda: models.couple("LN2", "generic_multibody"), models.ParameterError, "couple needs a lumped one"),
         (lambda: models.couple("LN2", "CX", step=1.0), models.ParameterError, "must lie between"),
         (lambda: models.couple("CA160", "CX", start=1e6), models.ParameterError, "does not lie on the line"),
+        (lambda: models.couple("CA160", "CX", start=300, end=200), models.ParameterError, "ends before it begins"),
     ],
 )
 def test_what_cannot_be_meant_is_said_in_a_sentence(ask, kind, said):
@@ -431,6 +449,16 @@ def test_what_cannot_be_meant_is_said_in_a_sentence(ask, kind, said):
         ask()
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_name_that_two_definitions_have_is_told(tmp_path, monkeypatch):
+    (tmp_path / "pantographs").mkdir()
+    copy = shutil.copy(ROOT / "models" / "library" / "pantographs" / "CX.toml", tmp_path / "pantographs")
+    monkeypatch.setenv("OPENPANTO_LIBRARY", str(tmp_path))
+    with pytest.warns(UserWarning, match="two definitions are named 'CX'") as told:
+        models.open_pantograph("CX")
+    assert str(copy) in str(told[0].message)
+    assert told[0].filename == __file__
 
 
 def test_statics_follow_the_tension():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -31,6 +32,8 @@ _COMMENTS: Final = ("#", "%", "//")
 _LARGEST: Final = 1e12
 #: Share of the interval of interest that counts as all of it: rows of a measurement seldom lie on its ends.
 _WHOLE: Final = 0.99
+#: How many times the simulated force a measured one may be before its unit is doubted.
+_MANY: Final = 5.0
 _SPELLED: Final = {"m": "m", "km": "km", "s": "s", "ms": "ms", "n": "N", "dan": "daN", "kn": "kN"}
 
 
@@ -88,7 +91,15 @@ class MeasuredComparison:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader has to know beyond the figures."""
-        return tuple(filter(None, (self.part, self.coarse)))
+        return tuple(filter(None, (self.part, self.coarse, self.size)))
+
+    @property
+    def size(self) -> str:
+        """A warning if one force is many times the other, as in another unit than its column says; else empty."""
+        measured, simulated = (float(np.abs(force).mean()) for force in (self.measured, self.simulated))
+        if min(measured, simulated) <= 0.0 or 1.0 / _MANY < measured / simulated < _MANY:
+            return ""
+        return f"the measured force is {measured / simulated:.3g} times the simulated one: check the unit of its column"
 
     @property
     def start(self) -> float:
@@ -131,9 +142,9 @@ def read_measured(path: Path) -> Measurement:
     place, over_time = _abscissa(path, titles)
     force = _find(path, titles, _FORCES)
     if force is None:
-        raise MasterError(f"{path} has no column named force (e.g. 'force [N]')")
+        raise MasterError(f"{path} has no column named force (e.g. 'force [N]'){_instead(titles)}")
     for row in rows[1:]:
-        if len(row.cells) != len(titles):
+        if len(row.cells) < len(titles) or any(map(str.strip, row.cells[len(titles) :])):
             text = f"{path}:{row.line}: has {len(row.cells)} cells, the head has {len(titles)}"
             comma = "; numbers with a decimal comma need columns separated by semicolons or tabs"
             raise MasterError(text + (comma if len(row.cells) == 2 * len(titles) else ""))
@@ -146,11 +157,10 @@ def read_measured(path: Path) -> Measurement:
 
 @dataclass(frozen=True)
 class _Row:
-    """A row that is not empty, with the line of the file that it ends on; its numbers may have a decimal comma."""
+    """A row that is not empty, with the line of the file that it ends on."""
 
     line: int
     cells: list[str]
-    may_have_comma: bool
 
 
 def _rows(path: Path) -> list[_Row]:
@@ -159,7 +169,7 @@ def _rows(path: Path) -> list[_Row]:
         head = next(filter(None, lines), "")
         mark = next((mark for mark in ";\t" if mark in head), ",")
         reader = csv.reader(lines, delimiter=mark)
-        return [_Row(reader.line_num, cells, mark != ",") for cells in reader if any(cell.strip() for cell in cells)]
+        return [_Row(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
     except OSError as error:
         raise MasterError(f"{path} cannot be read ({said(error)})") from error
     except UnicodeDecodeError as error:
@@ -175,8 +185,10 @@ def _without_comment(line: str) -> str:
 
 def _check_marks(path: Path, rows: Sequence[_Row], columns: Sequence[int]) -> None:
     """Refuse a table with decimal commas in some numbers and points in others: one of them groups thousands."""
-    mixed = (row for row in rows if row.may_have_comma)
-    marks = {mark: row.line for row in mixed for i in columns for mark in ",." if mark in row.cells[i]}
+    marks: dict[str, int] = {}
+    for row, i, mark in itertools.product(rows, columns, ",."):
+        if mark in row.cells[i]:
+            marks.setdefault(mark, row.line)
     if len(marks) > 1:
         where = f"a comma in line {marks[',']} and a point in line {marks['.']}"
         raise MasterError(
@@ -194,7 +206,26 @@ def _abscissa(path: Path, titles: Sequence[tuple[str, str]]) -> tuple[int, bool]
         found = _find(path, titles, names)
         if found is not None:
             return found, over_time
-    raise MasterError(f"{path} has no column named position or time (e.g. 'position [m]', 'time [s]')")
+    example = "e.g. 'position [m]', 'time [s]'"
+    raise MasterError(f"{path} has no column named position or time ({example}){_instead(titles)}")
+
+
+def _instead(titles: Sequence[tuple[str, str]]) -> str:
+    """Return what a table has instead of a column that is looked for."""
+    if not titles:
+        return "; it is empty"
+    shown = ", ".join(f"'{name}'" for name, _ in titles)
+    if all(_is_number(name) for name, _ in titles if name):
+        return f"; it begins with {one_line(shown)}: write a line of titles above, as 'position [m],force [N]'"
+    return f"; it has {one_line(shown)}: rename the columns"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _find(path: Path, titles: Sequence[tuple[str, str]], names: Sequence[str]) -> int | None:
@@ -222,7 +253,7 @@ def _column(path: Path, rows: Sequence[_Row], index: int, factor: float) -> Floa
 def _number(path: Path, row: _Row, index: int) -> float:
     text = row.cells[index].strip()
     try:
-        value = float(text.replace(",", ".") if row.may_have_comma else text)
+        value = float(text.replace(",", "."))  # one between commas is in quotation marks, and so a decimal one
     except ValueError:
         value = math.nan
     # Python accepts 1_000, and the digits of every script; in a table they are typing errors.

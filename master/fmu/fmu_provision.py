@@ -48,7 +48,10 @@ _UNREADABLE: Final = (
 
 
 def provide_fmu(
-    path: Path, tell: Callable[[str], None], scratch: Path | None = None, library: Path | None = None
+    path: Path,
+    tell: Callable[[str], None],
+    scratch: Callable[[], Path] | None = None,
+    library: Path | None = None,
 ) -> Path:
     """Build the FMU at ``path`` if it is missing, or ours and older than the sources it is built from.
 
@@ -59,8 +62,9 @@ def provide_fmu(
     path : Path
     tell : callable
         Called with what takes time, and what is kept.
-    scratch : Path, optional
-        Folder to build into instead, where nothing may be written next to ``path``; what it holds is used if it fits.
+    scratch : callable, optional
+        Gives a folder to build into instead, where nothing may be written next to ``path``; what it holds is used if it
+        fits. Asked for where something is to be built.
     library : Path, optional
         Folder in which, and in whose parents up to the project, definitions are looked up first.
 
@@ -86,7 +90,7 @@ def provide_fmu(
     if path.exists() and (why := why_not_ours(path)):
         tell(f"{path.name} is used as it is: {why}; to have it rebuilt, remove it")
         return path
-    place = scratch / path.name if scratch else path
+    place = scratch() / path.name if scratch else path
     if place.is_file() and _matches(wanted, stored_guid(place)):
         return place
     tell(f"building {path.name}" + (" again: what it is made of has changed" if place.is_file() else ""))

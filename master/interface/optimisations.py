@@ -14,7 +14,7 @@ from master.batch.optimisation.optimisation_session import optimise as run_optim
 from master.batch.sweep.engine_selection import engine_of
 from master.batch.sweep.sweep_table import typed_columns
 from master.interface.data_frames import columns_frame
-from master.interface.scenario_runs import by_parameter, keep_apart, teller
+from master.interface.scenario_runs import by_parameter, check_out, keep_apart, teller
 from master.interface.scenario_view import Scenario, open_scenario
 from master.scenario import open_scenario as scenario_files
 
@@ -128,6 +128,7 @@ def optimise(
     asked |= {} if mean_tolerance is None else {"tolerance": mean_tolerance}
     request = OptimisationRequest.read({**asked, "max_runs": max_runs, "seed": seed, "stop": chosen.overrides.stop})
     tell = teller(progress)
+    check_out(out)
     check_place(None if out is None else Path(out))
     with scenario_files.open_scenario(chosen.path, replace(chosen.overrides, may_stop_early=False)) as opened:
         folder = Path(out) if out is not None else PLACE / opened.system.name

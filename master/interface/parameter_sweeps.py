@@ -18,7 +18,7 @@ from master.batch.sweep.sweep_table import typed_columns
 from master.errors import RequestError
 from master.interface.data_frames import columns_frame, table_frame
 from master.interface.results_view import Results, read_results
-from master.interface.scenario_runs import by_parameter, keep_apart, teller
+from master.interface.scenario_runs import by_parameter, check_out, keep_apart, teller
 from master.interface.scenario_view import Scenario, open_scenario
 from master.scenario import open_scenario as scenario_files
 
@@ -171,6 +171,7 @@ def sweep(
     request = SweepRequest.read({**asked, **given, "stop": chosen.overrides.stop})
     tell = teller(progress)
     overrides = replace(chosen.overrides, faults=request.faults, faults_of=request.faults_of)
+    check_out(out)
     check_place(None if out is None else Path(out))
     with scenario_files.open_scenario(chosen.path, overrides) as opened:
         folder = Path(out) if out is not None else PLACE / opened.system.name

@@ -176,6 +176,8 @@ class Results:
         RequestError
             If no recorded variable has such a name.
         """
+        if wrong := [p for p in patterns if not isinstance(p, str)]:
+            raise RequestError(f"frame({wrong[0]!r}): names are texts, one by one: frame('*.uplift', '*[N]')")
         chosen = [r for r in self.stored.recordings if every is None or _is_near(_interval(r), every)]
         if not chosen:
             known = ", ".join(f"{_interval(r):g} s" for r in self.stored.recordings)
@@ -310,22 +312,28 @@ def read_results(folder: str | Path) -> Results:
     ...
     master.errors.MasterError: no_such_folder is not a results folder: it has no summary.json...
     """
+    if not isinstance(folder, str | Path):
+        raise RequestError(f"read_results({folder!r}): give the path of a results folder")
     return Results(run_results.read(Path(folder)))
 
 
-def compare(*results: Results) -> pandas.DataFrame:
+def compare(*results: Results | str | Path) -> pandas.DataFrame:
     """Return the figures of several runs side by side, a column each (needs pandas).
 
-    What makes them hard to compare (other filters, intervals, limits) is in ``frame.attrs["notes"]``.
+    Runs are results, or their folders. What makes them hard to compare (other filters, intervals, limits) is in
+    ``frame.attrs["notes"]``.
 
     Raises
     ------
     MasterError
-        If fewer than two contacts have figures.
+        If fewer than two contacts have figures, or something is not results.
     """
     if not results:
         raise RequestError("nothing to compare: give the results of two runs, or of one with several pantographs")
-    runs = [r.stored for r in results]
+    if wrong := [r for r in results if not isinstance(r, Results | str | Path)]:
+        text = f"compare: a {type(wrong[0]).__name__} is neither results nor a results folder"
+        raise RequestError(f"{text}; give the runs one by one: compare(one, other)")
+    runs = [(r if isinstance(r, Results) else read_results(r)).stored for r in results]
     frame = side_by_side({c.name: figure_values(c.assessment) for c in columns(runs)}, _FIGURE)
     frame.attrs["notes"] = run_difference.setting_notes(runs)
     return frame
@@ -369,12 +377,15 @@ def contact_figures(
     >>> round(figures["mean force [N]"], 1), round(figures["maximum [N]"], 1)
     (150.0, 170.0)
     """
-    places, forces = np.asarray(position, dtype=np.float64), np.asarray(force, dtype=np.float64)
+    try:
+        places, forces = np.asarray(position, dtype=np.float64), np.asarray(force, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RequestError(f"position and force must be rows of numbers ({error})") from error
     if places.ndim != 1 or places.shape != forces.shape:
         raise RequestError(
             f"position and force must be equally long rows, not of shapes {places.shape}, {forces.shape}"
         )
-    if np.ndim(step):
+    if np.ndim(step) or step is None or isinstance(step, str):
         raise RequestError(
             "step must be one number, the time between two samples in s: position, force, step in this order"
         )

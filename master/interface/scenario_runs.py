@@ -64,6 +64,7 @@ def run(
     """
     chosen = scenario if isinstance(scenario, Scenario) else open_scenario(scenario)
     options = RunOptions(isolation=Isolation() if isolate else None)
+    check_out(out)
     with scenario_files.open_scenario(chosen.path, chosen.overrides) as opened:
         system = opened.system
         folder = Path(out) if out is not None else Path("results") / system.name
@@ -75,6 +76,17 @@ def run(
             if parquet:
                 parquet_export.write_parquet(folder)
     return Results(done)
+
+
+def check_out(out: object) -> None:
+    """Refuse what cannot be the path of a results folder.
+
+    Raises
+    ------
+    RequestError
+    """
+    if out is not None and (not isinstance(out, str | Path) or not str(out).strip()):
+        raise RequestError(f"out: {out!r} is not the path of a results folder")
 
 
 def teller(progress: bool) -> Callable[[object], None]:

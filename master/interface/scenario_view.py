@@ -126,7 +126,12 @@ class Scenario:
         if values is not None and not isinstance(values, Mapping):
             text = "write set(static_force='120 N') or set({'pantograph.static_force': '120 N'})"
             raise RequestError(f"set({values!r}) says no parameter with its value: {text}")
-        given = {**(values or {}), **{self._full(name): value for name, value in parameters.items()}}
+        if wrong := [name for name in values or {} if not isinstance(name, str)]:
+            raise RequestError(f"set: {wrong[0]!r} is not the name of a parameter, such as 'pantograph.static_force'")
+        short = {self._full(name): value for name, value in parameters.items()}
+        if twice := sorted(short.keys() & (values or {})):
+            raise RequestError(f"parameter '{twice[0]}' is given twice, in full and in short: give it once")
+        given = {**(values or {}), **short}
         texts = {**self.overrides.parameters, **{name: _text(name, value) for name, value in given.items()}}
         components = with_values(self.system.components, texts)
         changed = replace(self.overrides, parameters=texts)

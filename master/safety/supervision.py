@@ -15,6 +15,7 @@ import os
 import select
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -30,6 +31,8 @@ _PR_SET_PDEATHSIG: Final = 1
 _PATIENCE: Final = {"loading": 2.0, "computing": 5.0, "stepping": 10.0, "closing": 10.0}
 #: Seconds within which a child that has finished has to be gone.
 _ENDING_SECONDS: Final = 10.0
+#: Seconds after which an interrupt that was dropped is delivered again.
+_AGAIN_SECONDS: Final = 0.01
 
 #: When the command's process looks for cyclic garbage (`gc.set_threshold`): what it imports makes none, and a run next
 #: to none, so that looking hundreds of times, as is usual, finds nothing and takes as long as ten simulated seconds.
@@ -114,10 +117,13 @@ def _worked(work: Callable[[], int]) -> int:
     code = 1
     try:
         raise_on_signals()
+        sys.unraisablehook = keep_interrupt
         signal.pthread_sigmask(signal.SIG_UNBLOCK, end_signals())
         code = work()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        if isinstance(end.code, str):
+            print(end.code, file=sys.stderr)
     except KeyboardInterrupt:
         print("error: interrupted", file=sys.stderr)
     except MemoryError:
@@ -135,6 +141,15 @@ def _worked(work: Callable[[], int]) -> int:
     # Python looks through all objects several times as it ends, a sixth of the time of a run; the system frees them.
     gc.freeze()
     return code
+
+
+def keep_interrupt(dropped: Any) -> None:
+    """Deliver an interrupt again that came where Python drops what is raised, as in a callback during an import."""
+    if dropped.exc_type is KeyboardInterrupt:
+        waiting = threading.main_thread().ident or 0
+        threading.Timer(_AGAIN_SECONDS, signal.pthread_kill, (waiting, signal.SIGINT)).start()
+    else:
+        sys.__unraisablehook__(dropped)
 
 
 def _is_interrupt(error: BaseException) -> bool:

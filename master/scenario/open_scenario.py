@@ -6,8 +6,9 @@ import math
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from master.errors import Problem, RequestError, ScenarioError
@@ -73,19 +74,24 @@ def open_scenario(
 
 
 @contextmanager
-def _scratch(package: Package, is_check: bool) -> Iterator[Path | None]:
-    """Yield the folder that FMUs are built into, None for their place in the scenario."""
-    if not is_check:
-        yield fmu_cache(package.root)
-        return
-    with tempfile.TemporaryDirectory(prefix="openpanto_") as folder:
-        yield Path(folder)
+def _scratch(package: Package, is_check: bool) -> Iterator[Callable[[], Path] | None]:
+    """Yield what gives the folder that FMUs are built into, made when one is; None for their place in the scenario."""
+    place = None if is_check else fmu_cache(package.root)
+    with ExitStack() as stack:
+        if is_check:
+            yield cache(lambda: Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="openpanto_"))))
+        else:
+            yield None if place is None else lambda: place
 
 
 def load_system(
-    package: Package, overrides: Overrides, tell: Callable[[str], None], build: bool, scratch: Path | None = None
+    package: Package,
+    overrides: Overrides,
+    tell: Callable[[str], None],
+    build: bool,
+    scratch: Callable[[], Path] | None = None,
 ) -> System:
-    """Read and check the files of ``package``; FMUs are built into ``scratch`` if there is one."""
+    """Read and check the files of ``package``; FMUs are built into what ``scratch`` gives if there is one."""
     reader = Reader(SSD_NAME)
     sources = Sources(package.root, overrides.outside, None if package.writable else package.origin)
     structure = read_structure(sources, reader)
@@ -201,7 +207,7 @@ class _Provision:
 
     build: bool
     tell: Callable[[str], None]
-    scratch: Path | None
+    scratch: Callable[[], Path] | None
     library: Path
 
 

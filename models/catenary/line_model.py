@@ -22,13 +22,7 @@ from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.form_finding import EquilibriumError, StaticState
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import CatenaryMesh, build_mesh
-from models.catenary.shape.wire_intervals import (
-    Interval,
-    attachments,
-    intervals,
-    plan_angles,
-    plan_rotation,
-)
+from models.catenary.shape.wire_intervals import Interval, attachments, intervals, plan_angles, plan_rotation
 from models.catenary.step.engine_choice import make_engine
 from models.catenary.step.step_engine import GivenForce, StepEngine, SteppedLine
 from models.contact_law import CONTACT_LAWS
@@ -36,8 +30,6 @@ from models.numerics.newmark import Newmark
 
 #: Step sizes whose factorisation is kept.
 _KEPT_STEPS = 3
-#: No forces on the contact wires.
-_NOWHERE, _NOTHING = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
 
 
 class CatenaryModel:
@@ -83,8 +75,8 @@ class CatenaryModel:
             compensation=lacking[lacking > 0.0],
             element=np.full(shape, -1),
             impact_velocity=np.zeros(shape),
-            loaded=_NOWHERE,
-            load=_NOTHING,
+            loaded=np.zeros((0, 2), dtype=np.int64),
+            load=np.zeros((0, 2)),
         )
 
     def rehearse(self, step: float, strips: FloatArray) -> None:

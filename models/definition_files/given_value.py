@@ -42,6 +42,8 @@ def in_si(value: float | str, wanted: str | None) -> float:
     ------
     ValueError
         If the text is no number, or its unit does not fit; the message leaves out whose value it is.
+    TypeError
+        If it is neither a number nor a text.
 
     Examples
     --------
@@ -49,7 +51,10 @@ def in_si(value: float | str, wanted: str | None) -> float:
     (12000.0, 50.0, 0.5)
     """
     if not isinstance(value, str):
-        return float(value)
+        try:
+            return float(value)
+        except (TypeError, ValueError) as error:
+            raise TypeError("this is neither a number nor a text") from error
     match = WITH_UNIT.fullmatch(value)
     if "," in value:
         raise ValueError(f"'{value}' is not a number{number_advice(value)}")

@@ -172,6 +172,8 @@ def travelled(line: CatenaryModel, start: float | None, end: float | None) -> tu
     start = start if start is not None else first + 0.2 * length
     end = end if end is not None else last - 0.2 * length
     furthest = math.inf if line.wires[0].period else last  # one that closes on itself is travelled on and on
+    if first <= end <= start <= furthest:
+        raise ParameterError(f"the run from {start:g} m to {end:g} m ends before it begins: give start below end")
     if not first <= start < end <= furthest:
         text = f"the run from {start:g} m to {end:g} m does not lie on the line, {first:g} m to {last:g} m"
         raise ParameterError(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,7 @@ from models.catenary.definition.section_definition import Span
 from models.definition_files.given_value import in_si
 from models.definition_files.parameter import Definition, Parameter, ParameterError
 from models.library import catalogue
+from models.library.search_path import Kind
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 from models.pantograph.multibody.mechanism_definition import MechanismDefinition
 
@@ -136,6 +138,7 @@ def open_line(name: str | Path) -> Line:
     >>> line.spans[0].length, line.parameters["contact_wire.tension"].unit
     (45.0, 'N')
     """
+    _tell_doubts("lines", str(name))
     return Line(catalogue.load_line(str(name)))
 
 
@@ -147,7 +150,14 @@ def open_pantograph(name: str | Path) -> Pantograph:
     >>> open_pantograph("CX").is_lumped
     True
     """
+    _tell_doubts("pantographs", str(name))
     return Pantograph(catalogue.load_pantograph(str(name)))
+
+
+def _tell_doubts(kind: Kind, name: str) -> None:
+    """Warn of what deserves a second look, as on two definitions of the name."""
+    for text in catalogue.doubts(kind, name):
+        warnings.warn(text, stacklevel=3)
 
 
 def _in_si(definition: Definition, given: Mapping[str, float | str]) -> dict[str, float]:

@@ -123,6 +123,14 @@ def assert_lines(lines: Sequence[str]) -> None:
         assert line.isprintable(), repr(line)
 
 
+def put_file(path: Path, content: str | bytes) -> None:
+    """Write a file in the place of an old one, which is taken away first: where it is cut to nothing instead, some file
+    systems wait for the disk, four milliseconds for every input that is tried.
+    """
+    path.unlink(missing_ok=True)
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 Declared = tuple[str, str, str]
 
 
@@ -141,6 +149,7 @@ def make_fmu(path: Path, variables: Sequence[Declared], attributes: str = "", be
         f"<UnitDefinitions>{definitions}</UnitDefinitions>\n"
         f"<ModelVariables>{lines}</ModelVariables>\n<ModelStructure/></fmiModelDescription>\n"
     )
+    path.unlink(missing_ok=True)  # see `put_file`
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("modelDescription.xml", xml)
         file.writestr(f"binaries/{fmpy.platform}/{name}{fmpy.sharedLibraryExtension}", "")

@@ -16,7 +16,7 @@ from tests.master.ssp.test_nested import BINDING
 from tests.master.ssp.test_nested import MAPPED as MAPPED_BINDING
 from tests.master.ssp.test_nested import MAPPING as NESTED_MAPPING
 from tests.robustness.mutation import changes
-from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_refused
+from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_refused, put_file
 
 SSD = "SystemStructure.ssd"
 TEXTS = {SSD: ssd_text(), "parameters.ssv": SSV}
@@ -26,9 +26,9 @@ MAPPED = ssd_text().replace(BINDING, MAPPED_BINDING)
 
 def rewrite(scenario, **changed):
     for name, text in TEXTS.items():
-        (scenario / name).write_text(text, encoding="utf-8")
+        put_file(scenario / name, text)
     for name, data in changed.items():
-        (scenario / name.replace("__", ".")).write_bytes(data)
+        put_file(scenario / name.replace("__", "."), data)
 
 
 def verdict(scenario, *place, warned=lambda: ()):
@@ -143,7 +143,7 @@ def test_archives(scenario, tmp_path_factory, change):
     folder = tmp_path_factory.getbasetemp()
     whole = packed(scenario, folder / "whole.ssp")
     path = folder / "changed.ssp"
-    path.write_bytes(change(whole))
+    put_file(path, change(whole))
     if verdict(path, "changed.ssp", SSD, "parameters.ssv"):
         assert read(path) == read(scenario)  # checksums: what is accepted is what was packed
 
@@ -156,8 +156,8 @@ def test_fmus(scenario, change):
     path = scenario / "resources" / "ToyPantograph.fmu"
     whole = path.read_bytes()
     with contextlib.ExitStack() as stack:
-        stack.callback(path.write_bytes, whole)
-        path.write_bytes(change(whole))
+        stack.callback(put_file, path, whole)
+        put_file(path, change(whole))
         verdict(scenario, "ToyPantograph.fmu")
 
 
@@ -172,7 +172,7 @@ def test_descriptions_of_fmus(scenario, change):
     with zipfile.ZipFile(path) as file:
         data = file.read("modelDescription.xml")
     with contextlib.ExitStack() as stack:
-        stack.callback(path.write_bytes, whole)
+        stack.callback(put_file, path, whole)
         with zipfile.ZipFile(path, "w") as file:
             file.writestr("modelDescription.xml", change(data))
         if verdict(scenario, "ToyPantograph.fmu", "pantograph"):

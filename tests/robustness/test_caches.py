@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from models.numerics.kernel_cache import _checked, _kept_source, _with_checksum
 from tests.effort import count
 from tests.robustness.mutation import changes
-from tests.robustness.support import PROFILE, TRIED
+from tests.robustness.support import PROFILE, TRIED, put_file
 
 #: What a file of the cache holds, about: an index, and machine code.
 INDEX = _with_checksum(pickle.dumps({"stamp": (1, 2), "overloads": {("f8",): "k.1.nbc"}}))
@@ -19,12 +19,12 @@ CODE = _with_checksum(pickle.dumps(("f8", bytes(range(256)) * 8)))
 
 
 @pytest.mark.parametrize("whole", [INDEX, CODE], ids=["index", "code"])
-@settings(PROFILE, max_examples=count(200, 5000))
+@settings(PROFILE, max_examples=count(100, 5000))
 @given(change=changes())
 def test_what_is_changed_is_not_read(tmp_path_factory, whole, change):
     TRIED["cache file, blindly"] += 1
     path = tmp_path_factory.getbasetemp() / "k.nbc.sum"
-    path.write_bytes(data := change(whole))
+    put_file(path, data := change(whole))
     if data == whole:
         assert _checked(path) == whole[32:]
         return
@@ -40,5 +40,5 @@ def test_a_changed_copy_of_the_source_is_replaced(tmp_path_factory, change, sour
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp()))
         copy = _kept_source(source, "key")
-        copy.write_bytes(change(source))
+        put_file(copy, change(source))
         assert _kept_source(source, "key").read_bytes() == source

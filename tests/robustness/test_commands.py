@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fmus.__main__ import main as fmus
 from master.commands.main import main as master
 from models.commands.physics_main import main as models
-from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_quick, assert_refused
+from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_quick, assert_refused, put_file
 
 MAINS = {"master": master, "models": models, "fmus": fmus}
 BAD_NUMBERS = ("", "x", "nan", "inf", "-inf", "1e999", "1,5", "0x10", "--", "٣x", "٣", "1_0", "9" * 500 + "x", "1 2")
@@ -184,8 +184,8 @@ def test_help_is_no_error(who):
 def foreign(folder):
     """A folder that is somebody else's."""
     folder.mkdir()
-    (folder / "thesis.tex").write_text("years of work")
-    (folder / "summary.json").write_text(json.dumps({"generator": "something else"}))
+    put_file(folder / "thesis.tex", "years of work")
+    put_file(folder / "summary.json", json.dumps({"generator": "something else"}))
     return folder
 
 
@@ -199,6 +199,6 @@ def test_results_of_others_are_left_alone(scenario, tmp_path):
 
 def test_a_file_in_the_place_of_the_results_is_left_alone(scenario, tmp_path):
     path = tmp_path / "out"
-    path.write_text("years of work")
+    put_file(path, "years of work")
     assert_refused(ask(master, "run", scenario, "--out", path, "--no-build", "--quiet"), "choose another with --out")
     assert path.read_text() == "years of work"

@@ -18,15 +18,15 @@ from master.fmu.fmu_description import read_fmu
 from master.ssp import archive
 from master.ssp.archive import extract
 from tests.master.conftest import SSV, ssd_text
-from tests.robustness.support import TRIED, ask, assert_accepted, assert_refused, make_fmu
+from tests.robustness.support import TRIED, ask, assert_accepted, assert_refused, make_fmu, put_file
 
 ROOT = Path(__file__).parents[2]
 SSD = "SystemStructure.ssd"
 
 
 def restore(scenario):
-    (scenario / SSD).write_text(ssd_text(), encoding="utf-8")
-    (scenario / "parameters.ssv").write_text(SSV, encoding="utf-8")
+    put_file(scenario / SSD, ssd_text())
+    put_file(scenario / "parameters.ssv", SSV)
 
 
 def sound_members(scenario):
@@ -134,7 +134,7 @@ def test_a_size_that_is_a_lie(tmp_path):
     data = path.read_bytes()
     TRIED["hostile ssp"] += 1
     central = data.index(b"PK\x01\x02")
-    path.write_bytes(_patched(_patched(data, central + 24, "<I", 10), 22, "<I", 10))
+    put_file(path, _patched(_patched(data, central + 24, "<I", 10), 22, "<I", 10))
     (tmp_path / "out").mkdir()
     with pytest.raises(ScenarioError, match=r"not a readable \.ssp archive"):
         extract(path, tmp_path / "out")
@@ -147,7 +147,7 @@ def test_encrypted_members(tmp_path, flags):
     data = path.read_bytes()
     TRIED["hostile ssp"] += 1
     central = data.index(b"PK\x01\x02")
-    path.write_bytes(_patched(_patched(data, central + 8, "<H", flags), 6, "<H", flags))
+    put_file(path, _patched(_patched(data, central + 8, "<H", flags), 6, "<H", flags))
     assert_refused(ask(main, "validate", path), "x.ssp")
 
 
@@ -157,7 +157,7 @@ def test_members_packed_in_other_ways(tmp_path, method):
     data = path.read_bytes()
     TRIED["hostile ssp"] += 1
     central = data.index(b"PK\x01\x02")
-    path.write_bytes(_patched(_patched(data, central + 10, "<H", method), 8, "<H", method))
+    put_file(path, _patched(_patched(data, central + 10, "<H", method), 8, "<H", method))
     assert_refused(ask(main, "validate", path), "is not a readable .ssp archive")
 
 
@@ -208,7 +208,7 @@ KINDS = tuple(bombs(""))
 def test_documents_made_to_do_harm(scenario, tmp_path, kind, place):
     TRIED["hostile document"] += 1
     secret = tmp_path / "secret"
-    secret.write_text(SECRET)
+    put_file(secret, SECRET)
     members = dict(sound_members(scenario))
     text = bombs(secret)[kind]
     if place == "fmu":
@@ -225,7 +225,7 @@ def test_documents_made_to_do_harm(scenario, tmp_path, kind, place):
     folder = tmp_path / "x.ssp"
     for name, data in members.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(data)
+        put_file(folder / name, data)
     answer = ask(main, "validate", folder, "--no-build")
     assert_refused(answer, "ToyPantograph.fmu" if place == "fmu" else f"{place}:")
     assert SECRET not in answer.err
@@ -238,7 +238,7 @@ def test_an_entity_inside_a_sound_document(scenario, tmp_path):
         TRIED["hostile document"] += 1
         head, _, rest = SSV.partition("?>")
         text = f"{head}?>{before}{rest}".replace('value="140"', 'value="&f;"' if "f '" in before else 'value="140"')
-        (scenario / "parameters.ssv").write_text(text)
+        put_file(scenario / "parameters.ssv", text)
         answer = ask(main, "validate", scenario, "--no-build")
         assert_refused(answer, "a document type declaration is not allowed")
     restore(scenario)
@@ -261,7 +261,7 @@ def test_sources_outside_the_scenario(scenario, source, what):
         "mapping": (binding, f'{binding[:-2]}><ssd:ParameterMapping source="{source}"/></ssd:ParameterBinding>'),
     }[what]
     restore(scenario)
-    (scenario / SSD).write_text(ssd_text().replace(old, new), encoding="utf-8")
+    put_file(scenario / SSD, ssd_text().replace(old, new))
     answer = ask(main, "validate", scenario, "--no-build")
     assert_refused(answer, f"{SSD}:")
     assert "root:" not in answer.err
@@ -274,7 +274,7 @@ def test_links_in_a_folder(scenario, tmp_path, target):
     folder = tmp_path / "x.ssp"
     for name, data in sound_members(scenario):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(data)
+        put_file(folder / name, data)
     (folder / "parameters.ssv").unlink()
     (folder / "circle").symlink_to("circle")
     (folder / "parameters.ssv").symlink_to(target)
@@ -319,7 +319,7 @@ def test_descriptions_of_fmus_that_cannot_be(scenario, tmp_path, kind):
 def test_files_that_are_no_fmu(tmp_path, data):
     TRIED["FMU, by hand"] += 1
     path = tmp_path / "x.fmu"
-    path.write_bytes(data)
+    put_file(path, data)
     with pytest.raises(ValueError, match="is not a readable FMU"):
         read_fmu(path)
     answer = ask(fmus, "doctor", path)

@@ -13,7 +13,7 @@ from master.scenario.open_scenario import open_scenario
 from tests.effort import count
 from tests.master.conftest import SSV, ssd_text
 from tests.robustness.mutation import changes
-from tests.robustness.support import PROFILE, TRIED, ask, assert_quick, assert_refused
+from tests.robustness.support import PROFILE, TRIED, ask, assert_quick, assert_refused, put_file
 from tests.robustness.test_blind import SSD, TEXTS
 
 BINDING = '<ssd:ParameterBinding source="parameters.ssv"/>'
@@ -34,8 +34,8 @@ NAMES = {"static_force", "ripple", "speed"}
 
 
 def write(scenario, text):
-    (scenario / "parameters.ssv").write_text(SSV, encoding="utf-8")
-    (scenario / SSD).write_bytes(text)
+    put_file(scenario / "parameters.ssv", SSV)
+    put_file(scenario / SSD, text)
 
 
 def parameters(scenario):
@@ -59,7 +59,7 @@ def judged(scenario, text):
 def _as_it_was(scenario):
     yield
     for name, text in TEXTS.items():
-        (scenario / name).write_text(text, encoding="utf-8")
+        put_file(scenario / name, text)
 
 
 def test_the_sound_set_is_taken_in_newtons(scenario):
@@ -81,7 +81,7 @@ def reported(data):
 BEGIN, END = INLINE.index("<ssv:ParameterSet"), INLINE.index("</ssd:ParameterValues>")
 
 
-@settings(PROFILE, max_examples=count(150, 4000))
+@settings(PROFILE, max_examples=count(100, 4000))
 @given(change=changes())
 def test_inline_sets_blindly(scenario, change):
     TRIED["inline set, blindly"] += 1
@@ -112,7 +112,7 @@ def test_every_number_and_unit_of_an_inline_set(scenario, place):
 POWERS = st.dictionaries(st.sampled_from(["kg", "m", "s", "A", "K", "mol", "cd", "rad"]), st.integers(-3, 3))
 
 
-@settings(PROFILE, max_examples=count(120, 3000))
+@settings(PROFILE, max_examples=count(80, 3000))
 @given(powers=POWERS, factor=st.floats(1e-9, 1e9), offset=st.sampled_from([None, 0.0, 273.15]))
 def test_a_unit_of_any_dimension(scenario, powers, factor, offset):
     """Accepted just where it measures a force; then the value is factor times value plus offset."""
@@ -146,7 +146,7 @@ UNITS = ssd_text().replace(
 UNITS_FROM, UNITS_TO = UNITS.index("<ssd:Units>"), UNITS.index("<ssd:DefaultExperiment")
 
 
-@settings(PROFILE, max_examples=count(120, 3000))
+@settings(PROFILE, max_examples=count(80, 3000))
 @given(change=changes())
 def test_units_blindly(scenario, change):
     """Units that nothing refers to change nothing, if they are any."""

@@ -12,7 +12,7 @@ from models.definition_files.toml_reader import DefinitionError, Problem
 from models.layout.layout_import import import_layout
 from tests.effort import count
 from tests.robustness.mutation import changes
-from tests.robustness.support import UNWORDED
+from tests.robustness.support import UNWORDED, put_file
 
 SHEETS = {
     "supports": """\
@@ -55,7 +55,7 @@ fault[1].value;0;mm;test
 
 def written(folder: Path, **changed: bytes) -> Path:
     for name, text in SHEETS.items():
-        (folder / f"{name}.csv").write_bytes(changed.get(name, text.encode()))
+        put_file(folder / f"{name}.csv", changed.get(name, text.encode()))
     return folder
 
 

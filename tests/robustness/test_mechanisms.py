@@ -13,7 +13,7 @@ from models.commands.physics_main import main
 from models.library.catalogue import pantograph_path
 from tests.effort import count
 from tests.robustness.mutation import changes
-from tests.robustness.support import PROFILE, TRIED, Answer, ask, assert_lines
+from tests.robustness.support import PROFILE, TRIED, Answer, ask, assert_lines, put_file
 
 NAMES = ("CX_multibody", "generic_multibody")
 TEXTS = {name: pantograph_path(name).read_text(encoding="utf-8") for name in NAMES}
@@ -25,7 +25,7 @@ SCALES = ("0.0", "1e-12", "1e-6", "-1.0", "1e3", "1e6", "1e12")
 
 def analysed(path, text) -> Answer:
     """Ask for a mechanism's figures; whatever the answer, it is in words."""
-    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    put_file(path, text if isinstance(text, bytes) else text.encode())
     answer = ask(main, "pantograph", path)
     assert answer.code in (0, 1, 2), answer
     assert_lines(answer.err.splitlines())
@@ -87,19 +87,19 @@ MAKERS = (without_a_line, without_a_table, with_another_name, with_another_kind,
 def test_one_thing_is_wrong(tmp_path, name, maker):
     cases = list(maker(name))
     assert len(cases) > 10
-    for text in part(cases, 3):
+    for text in part(cases, 2):
         TRIED["mechanism, one thing wrong"] += 1
         analysed(tmp_path / "broken.toml", text)
 
 
-@settings(PROFILE, max_examples=count(12, 2500))
+@settings(PROFILE, max_examples=count(8, 2500))
 @given(change=changes())
 def test_blindly(tmp_path_factory, change):
     TRIED["mechanism, blindly"] += 1
     analysed(tmp_path_factory.getbasetemp() / "broken.toml", change(TEXTS["CX_multibody"].encode()))
 
 
-@settings(PROFILE, max_examples=count(2, 800))
+@settings(PROFILE, max_examples=count(1, 800))
 @given(factors=st.lists(st.floats(0.5, 2.0), min_size=4, max_size=4), name=st.sampled_from(NAMES))
 def test_masses_and_inertias_of_another_machine(tmp_path_factory, factors, name):
     """Sound ones: a pantograph of other masses has figures."""

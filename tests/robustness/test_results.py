@@ -17,7 +17,7 @@ from master.results import run_results
 from master.results.summary_schema import read_geometry, read_summary
 from tests.effort import count
 from tests.robustness.mutation import changes
-from tests.robustness.support import PROFILE, TRIED, assert_lines, assert_worded
+from tests.robustness.support import PROFILE, TRIED, assert_lines, assert_worded, put_file
 
 PREFIX = "catenary.pantograph[1].contact"
 CONTACT = {"index": 1, "catenary": "catenary", "pantograph": "pantograph", "prefix": PREFIX, "told": "p", "ends": {}}
@@ -61,7 +61,7 @@ def test_every_value_of_a_summary(tmp_path, place):
     path = tmp_path / "summary.json"
     for value in VALUES:
         TRIED["results, value by value"] += 1
-        path.write_text(json.dumps(changed(place, value)), encoding="utf-8")
+        put_file(path, json.dumps(changed(place, value)))
         if any(type(value) is type(v) and value == v for v in SOUND[place]):
             assert read_summary(path) == changed(place, value)
             continue
@@ -76,7 +76,7 @@ def test_every_value_of_a_summary(tmp_path, place):
 def test_blindly(tmp_path_factory, read, data, change):
     TRIED["results, blindly"] += 1
     path = tmp_path_factory.getbasetemp() / "some.json"
-    path.write_bytes(change(json.dumps(data, indent=1).encode()))
+    put_file(path, change(json.dumps(data, indent=1).encode()))
     try:
         found = read(path)
     except MasterError as error:
@@ -88,7 +88,7 @@ def test_blindly(tmp_path_factory, read, data, change):
 @pytest.mark.parametrize("text", ["", "[]", "1", "null", "{", "[" * 100_000, '{"a": NaN}', '{"a": {"b": "c"}}', "\x00"])
 def test_geometry_that_is_none(tmp_path, text):
     TRIED["results, by hand"] += 1
-    (tmp_path / "geometry.json").write_text(text, encoding="utf-8")
+    put_file(tmp_path / "geometry.json", text)
     with pytest.raises(MasterError, match=r"geometry\.json is damaged"):
         read_geometry(tmp_path / "geometry.json")
 
@@ -164,8 +164,8 @@ def reported(folder):
 
 
 def fill(folder, summary=WHOLE, geometry=LINE):
-    (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
-    (folder / "geometry.json").write_text(json.dumps(geometry), encoding="utf-8")
+    put_file(folder / "summary.json", json.dumps(summary))
+    put_file(folder / "geometry.json", json.dumps(geometry))
 
 
 @pytest.mark.parametrize("name", ["summary", "geometry"])
@@ -191,10 +191,10 @@ def test_reports_blindly(measured_results, name, change):
     TRIED["results, report of a blindly changed file"] += 1
     whole = (measured_results / name).read_bytes()
     try:
-        (measured_results / name).write_bytes(change(whole))
+        put_file(measured_results / name, change(whole))
         reported(measured_results)
     finally:
-        (measured_results / name).write_bytes(whole)
+        put_file(measured_results / name, whole)
 
 
 @pytest.fixture(scope="module")
@@ -205,5 +205,5 @@ def measured_results(tmp_path_factory):
     fill(folder)
     head = f"time [s],{PREFIX}.force [N],{PREFIX}.x [m]"
     rows = [f"{t / 1000},{150 + t % 7},{t * 0.5}" for t in range(201)]
-    (folder / "timeseries.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    put_file(folder / "timeseries.csv", "\n".join([head, *rows]) + "\n")
     return folder

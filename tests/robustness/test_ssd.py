@@ -16,7 +16,7 @@ from master.commands.main import main
 from master.scenario.open_scenario import open_scenario
 from tests.effort import IS_LONG
 from tests.master.conftest import SSV, ssd_text
-from tests.robustness.support import TRIED, ask, assert_accepted, assert_refused
+from tests.robustness.support import TRIED, ask, assert_accepted, assert_refused, put_file
 
 SSD, SSV_NAME = "SystemStructure.ssd", "parameters.ssv"
 RUN = (
@@ -122,7 +122,7 @@ def removed_attributes(file: str) -> Iterator[Case]:
 
 
 def changed_attributes(file: str) -> Iterator[Case]:
-    """Every value in every place in `.ci/long`; else half in the first of an attribute's, a quarter in the others."""
+    """Every value in every place in `.ci/long`; else a quarter in an attribute's first, an eighth in the others."""
     seen: Counter[tuple[str, str]] = Counter()
     for root, node in nodes(file):
         for name in node.attrib:
@@ -131,7 +131,7 @@ def changed_attributes(file: str) -> Iterator[Case]:
             values = BAD_NUMBERS if name in NUMBERS else BAD_TEXTS
             place = seen[name_of(node), name]
             seen[name_of(node), name] += 1
-            for value in values if IS_LONG else values[place % 4 :: 4 if place else 2]:
+            for value in values if IS_LONG else values[place % 8 :: 8 if place else 4]:
                 before = node.get(name)
                 node.set(name, value)
                 sound = (name, value.strip()) in (("order", ""), ("variables", ""))
@@ -141,7 +141,7 @@ def changed_attributes(file: str) -> Iterator[Case]:
 
 def check(scenario: Path, case: Case) -> None:
     for name, text in TEXTS.items():
-        (scenario / name).write_text(case.text if name == case.file else text, encoding="utf-8")
+        put_file(scenario / name, case.text if name == case.file else text)
     answer = ask(main, "validate", scenario, "--no-build")
     TRIED["scenario, element by element"] += 1
     try:
@@ -173,7 +173,7 @@ def test_every_element_and_attribute(scenario, maker, file):
 
 
 def test_line_100_is_no_emoji(scenario):
-    (scenario / SSD).write_text("\n" * 99 + "<nothing/>", encoding="utf-8")
+    put_file(scenario / SSD, "\n" * 99 + "<nothing/>")
     assert "error: SystemStructure.ssd:100: is not" in ask(main, "validate", scenario, "--no-build").err
 
 
@@ -210,8 +210,8 @@ def test_systems_that_hand_values_on(scenario, length, is_closed):
     wires = WIRE.format(*source, "chain", "u") + WIRE.format("chain", "y", "pantograph", "contact.x")
     text = ssd_text().replace("</ssd:Elements>", passing("chain", length) + "</ssd:Elements>", 1)
     assert FED in text
-    (scenario / SSD).write_text(text.replace(FED, wires), encoding="utf-8")
-    (scenario / SSV_NAME).write_text(SSV, encoding="utf-8")
+    put_file(scenario / SSD, text.replace(FED, wires))
+    put_file(scenario / SSV_NAME, SSV)
     answer = ask(main, "validate", scenario, "--no-build")
     if is_closed:
         assert_refused(answer, f"{SSD}:", "form a circle")
@@ -222,8 +222,8 @@ def test_systems_that_hand_values_on(scenario, length, is_closed):
 def test_a_component_that_feeds_itself(scenario):
     TRIED["scenario, circles"] += 1
     own = WIRE.format("pantograph", "A.x", "pantograph", "contact.x")
-    (scenario / SSD).write_text(ssd_text().replace(FED, own), encoding="utf-8")
-    (scenario / SSV_NAME).write_text(SSV, encoding="utf-8")
+    put_file(scenario / SSD, ssd_text().replace(FED, own))
+    put_file(scenario / SSV_NAME, SSV)
     assert_accepted(ask(main, "validate", scenario, "--no-build"), "toy: valid")
     with open_scenario(scenario, build=False) as opened:
         assert ("pantograph", "pantograph") in {(c.source, c.target) for c in opened.system.connections}
@@ -235,6 +235,6 @@ def test_thousands_of_elements_are_answered_at_once(scenario):
     more = "".join(INPUT.format(f"x{i}") for i in range(3000))
     wires = "".join(WIRE.format("catenary", "pantograph[1].contact.x", "pantograph", f"x{i}") for i in range(3000))
     text = ssd_text().replace(INPUT.format("contact.x"), INPUT.format("contact.x") + more)
-    (scenario / SSD).write_text(text.replace(FED, FED + wires), encoding="utf-8")
-    (scenario / SSV_NAME).write_text(SSV, encoding="utf-8")
+    put_file(scenario / SSD, text.replace(FED, FED + wires))
+    put_file(scenario / SSV_NAME, SSV)
     assert_refused(ask(main, "validate", scenario, "--no-build"), "has no such variable", "more problems")

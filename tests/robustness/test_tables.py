@@ -23,7 +23,16 @@ from models.definition_files.toml_reader import DefinitionError
 from models.pantograph.identification import read_response
 from tests.effort import count
 from tests.robustness.mutation import changes
-from tests.robustness.support import PROFILE, TRIED, ask, assert_accepted, assert_lines, assert_refused, assert_worded
+from tests.robustness.support import (
+    PROFILE,
+    TRIED,
+    ask,
+    assert_accepted,
+    assert_lines,
+    assert_refused,
+    assert_worded,
+    put_file,
+)
 
 SCENARIOS = Path(__file__).parents[2] / "ssp_scenarios"
 BAD_CELLS = (
@@ -67,7 +76,7 @@ def test_sound_measurements_are_read_as_written(tmp_path_factory, table, unit, f
     name = "time" if unit.endswith("s") else "position"
     rows = [(repr(x), repr(f)) for x, (_, f) in zip(place, table, strict=True)]
     path = tmp_path_factory.getbasetemp() / "m.csv"
-    path.write_text(csv_text(f"{name} [{unit}]{separator}force [{force}]", rows, separator))
+    put_file(path, csv_text(f"{name} [{unit}]{separator}force [{force}]", rows, separator))
     found = read_measured(path)
     assert found.over_time == (name == "time")
     factor = {"m": 1.0, "s": 1.0, "km": 1e3, "ms": 1e-3}[unit]
@@ -82,7 +91,7 @@ def test_a_bad_cell_of_a_measurement_is_told_with_its_line(tmp_path, bad, column
         TRIED["measurement, bad cell"] += 1
         rows = [[f"{x}", f"{100 + x}"] for x in range(ROWS)]
         rows[row][column] = f'"{bad}"'
-        (tmp_path / "m.csv").write_text(csv_text("position [m],force [N]", rows))
+        put_file(tmp_path / "m.csv", csv_text("position [m],force [N]", rows))
         with pytest.raises(MasterError) as error:
             read_measured(tmp_path / "m.csv")
         assert f"m.csv:{row + 2}: " in refused(error)
@@ -114,7 +123,7 @@ def test_a_bad_cell_of_a_measurement_is_told_with_its_line(tmp_path, bad, column
 )
 def test_measurements_that_cannot_be_read(tmp_path, text, said):
     TRIED["measurement, by hand"] += 1
-    (tmp_path / "m.csv").write_text(text)
+    put_file(tmp_path / "m.csv", text)
     with pytest.raises(MasterError) as error:
         read_measured(tmp_path / "m.csv")
     assert said in refused(error)
@@ -123,18 +132,18 @@ def test_measurements_that_cannot_be_read(tmp_path, text, said):
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-32", "cp500"])
 def test_measurements_in_other_encodings(tmp_path, encoding):
     TRIED["measurement, by hand"] += 1
-    (tmp_path / "m.csv").write_bytes("time [s],force [N]\n1,2\n2,3\n3,4\n".encode(encoding))
+    put_file(tmp_path / "m.csv", "time [s],force [N]\n1,2\n2,3\n3,4\n".encode(encoding))
     with pytest.raises(MasterError) as error:
         read_measured(tmp_path / "m.csv")
     assert "m.csv" in refused(error)
 
 
-@settings(PROFILE, max_examples=count(200, 400))
+@settings(PROFILE, max_examples=count(120, 400))
 @given(change=changes())
 def test_measurements_blindly(tmp_path_factory, change):
     TRIED["measurement, blindly"] += 1
     path = tmp_path_factory.getbasetemp() / "m.csv"
-    path.write_bytes(change(csv_text("position [m],force [N]", [(x, 100 + x) for x in range(20)]).encode()))
+    put_file(path, change(csv_text("position [m],force [N]", [(x, 100 + x) for x in range(20)]).encode()))
     try:
         found = read_measured(path)
     except MasterError as error:
@@ -158,7 +167,7 @@ RESPONSE = [(0.5 + 0.5 * i, 1e-3 / (1 + i), -1e-4) for i in range(ROWS)]
 
 def test_a_sound_response_is_read_as_written(tmp_path):
     for head in ("", "frequency [Hz],real,imaginary\n", "# measured\nf,re,im\n"):
-        (tmp_path / "r.csv").write_text(head + csv_text("", RESPONSE).lstrip())
+        put_file(tmp_path / "r.csv", head + csv_text("", RESPONSE).lstrip())
         found = read_response(tmp_path / "r.csv")
         assert found.frequency == pytest.approx([f for f, _, _ in RESPONSE])
         assert 1.0 / found.stiffness == pytest.approx([re + 1j * im for _, re, im in RESPONSE])
@@ -173,7 +182,7 @@ def test_a_bad_cell_of_a_response_is_told_with_its_line(tmp_path, bad, column):
         TRIED["response, bad cell"] += 1
         rows = [list(map(str, r)) for r in RESPONSE]
         rows[row][column] = f'"{bad}"'
-        (tmp_path / "r.csv").write_text(csv_text("f,re,im", rows))
+        put_file(tmp_path / "r.csv", csv_text("f,re,im", rows))
         if bad == "1e-300":
             assert read_response(tmp_path / "r.csv").frequency[row] == 1e-300
             continue
@@ -182,12 +191,12 @@ def test_a_bad_cell_of_a_response_is_told_with_its_line(tmp_path, bad, column):
         assert f"r.csv: line {row + 2}: " in refused(error)
 
 
-@settings(PROFILE, max_examples=count(200, 400))
+@settings(PROFILE, max_examples=count(120, 400))
 @given(change=changes())
 def test_responses_blindly(tmp_path_factory, change):
     TRIED["response, blindly"] += 1
     path = tmp_path_factory.getbasetemp() / "r.csv"
-    path.write_bytes(change(csv_text("f,re,im", RESPONSE).encode()))
+    put_file(path, change(csv_text("f,re,im", RESPONSE).encode()))
     try:
         found = read_response(path)
     except DefinitionError as error:
@@ -235,7 +244,7 @@ UNREAD = ("invalid int value", "invalid choice", "write NAME=VALUE", "'x' is not
 )
 def test_identify_says_what_is_wrong(tmp_path, text, options, said):
     TRIED["models identify"] += 1
-    (tmp_path / "r.csv").write_text(text)
+    put_file(tmp_path / "r.csv", text)
     assert_refused(ask(models, "identify", tmp_path / "r.csv", *options), said, code=2 if said in UNREAD else 1)
 
 
@@ -246,7 +255,7 @@ def family(folder, **changed):
     for name in (STUDY, VARIANTS):
         shutil.copy(FAMILY / name, folder / name)
     for name, data in changed.items():
-        (folder / name.replace("__", ".")).write_bytes(data)
+        put_file(folder / name.replace("__", "."), data)
 
 
 @pytest.mark.parametrize("name", [STUDY, VARIANTS])
@@ -328,7 +337,7 @@ def test_measurements_reach_the_command(measured_run, tmp_path):
         TRIED["master report --measured"] += 1
         rows = [[f"{x}", f"{100 + x}"] for x in range(ROWS)]
         rows[5][column] = f'"{bad}"'
-        (tmp_path / "m.csv").write_text(csv_text("position [m],force [N]", rows))
+        put_file(tmp_path / "m.csv", csv_text("position [m],force [N]", rows))
         assert_refused(ask(master, "report", measured_run, "--measured", tmp_path / "m.csv"), "m.csv:7: ")
         assert not (measured_run / "report.html").exists()
 
@@ -341,7 +350,7 @@ CELL = st.one_of(
 )  # fmt: skip
 
 
-@settings(PROFILE, max_examples=count(120, 4000))
+@settings(PROFILE, max_examples=count(80, 4000))
 @given(head=st.lists(CELL, max_size=3), rows=st.lists(st.lists(CELL, min_size=1, max_size=4), min_size=1, max_size=4))
 def test_study_tables_of_any_cells(tmp_path_factory, head, rows):
     """Reported in words with the file, or listed; whatever the cells hold, all that is printed can be read."""

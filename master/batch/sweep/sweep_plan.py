@@ -225,7 +225,8 @@ def make_plan(system: System, request: SweepRequest) -> SweepPlan:
     parts = [part for part in (table, *grid) if part is not None]
     parts += [_sample(distributions, request)] if distributions else []
     if not parts:
-        raise RequestError("nothing is varied: give --over, --vary with --samples, or --from-csv")
+        text = "--over, --vary with --samples, or --from-csv; in Python over, vary with samples, or table"
+        raise RequestError(f"nothing is varied: give {text}")
     parameters = tuple(p for part in parts for p in part.parameters)
     check_distinct(parameters)
     _check_used(request, parameters)

@@ -245,21 +245,6 @@ class ContactWire:
         found = bisect_left(self.starts, x) - 1
         return min(max(found, 0), len(self._of_element) - 1)
 
-    def in_lap(self, strip: FloatArray) -> FloatArray:
-        """Return a strip in the lap of the elements of a wire that closes on itself; on one that ends, the strip.
-
-        Parameters
-        ----------
-        strip : ndarray, shape (2, 2, 3)
-            Ends A and B; position and velocity.
-        """
-        laps = self._laps(0.5 * float(strip[0, 0, 0] + strip[1, 0, 0]))
-        if not laps:
-            return strip
-        moved = strip.copy()
-        moved[:, 0, 0] -= laps * self.period
-        return moved
-
     def alongside(self, x: FloatArray, place: FloatArray) -> FloatArray:
         """Return places along the track of a wire that closes on itself in the lap of strips near them.
 

@@ -10,7 +10,7 @@ from tests.master.report.conftest import _made_up
 
 
 def write(path, text):
-    path.write_text(text)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path
 
 
@@ -80,7 +80,12 @@ def test_noise_above_20_hz_does_not_disturb(signals, tmp_path):
         ("time [s],force [N]\n1,2\n2,x\n3,4\n", "is not a finite number"),
         ("time [s],force [N]\n1,2\n1,3\n3,4\n", "does not increase"),
         ("time [s],force [N]\n1,2\n2,nan\n3,4\n", "finite"),
-        ("", "no column named position or time"),
+        ("", "no column named position or time .*; it is empty"),
+        ("PK;Fc\n1;2\n", "no column named position or time .*; it has 'pk', 'fc': rename the columns"),
+        ("position [m];Kraft [N]\n1;2\n", "no column named force .*; it has 'position', 'kraft': rename the columns"),
+        ("312,5;127,1\n313;128\n", "; it begins with '312,5', '127,1': write a line of titles above"),
+        ("position [m],force [N]\n1,2,,3\n", ":2: has 4 cells, the head has 2"),
+        (b"position [m],force [N]\n# M\xfcller\n", r"m\.csv is not UTF-8 text \(line 2\): save it as UTF-8"),
     ],
 )
 def test_what_is_wrong_with_a_measurement_is_said(tmp_path, text, said):
@@ -109,9 +114,20 @@ def test_comments_decimal_commas_tabs_and_decanewtons(signals, tmp_path):
 
 
 def test_two_decimal_marks_in_one_table_are_refused(tmp_path):
-    path = write(tmp_path / "m.csv", "position [m];force [N]\n1,5;120\n2.5;121\n3;122\n")
+    path = write(tmp_path / "m.csv", "position [m];force [N]\n1,5;120\n2.5;121\n3;122\n4,5;123\n5.5;124\n")
     with pytest.raises(MasterError, match="a comma in line 2 and a point in line 3"):
         read_measured(path)
+
+
+def test_quoted_decimal_commas_and_empty_cells_at_the_end_are_read(tmp_path):
+    path = write(tmp_path / "m.csv", 'position [m],force [N]\n"1,5","120,5"\n"2,5",121,,\n3,"122,5"\n')
+    assert read_measured(path).force.tolist() == [120.5, 121.0, 122.5]
+
+
+def test_a_force_in_another_unit_than_its_column_says_is_doubted(signals, tmp_path):
+    path = write(tmp_path / "m.csv", as_csv("position [m],force [kN]", signals.position, signals.raw))
+    (warning,) = compare_measured(signals, read_measured(path)).warnings
+    assert warning == "the measured force is 1e+03 times the simulated one: check the unit of its column"
 
 
 def test_decimal_commas_between_commas_are_explained(tmp_path):

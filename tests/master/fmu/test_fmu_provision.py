@@ -156,7 +156,7 @@ def test_an_fmu_says_which_definition_it_was_built_from(tmp_path):
 def test_nothing_is_written_where_there_is_a_scratch_folder(builder, tmp_path):
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    assert fmu_provision.provide_fmu(tmp_path / "X.fmu", lambda _: None, scratch) == scratch / "X.fmu"
+    assert fmu_provision.provide_fmu(tmp_path / "X.fmu", lambda _: None, lambda: scratch) == scratch / "X.fmu"
     assert not (tmp_path / "X.fmu").exists()
 
 
@@ -164,10 +164,10 @@ def test_what_the_scratch_folder_holds_is_used_as_long_as_it_fits(builder, tmp_p
     scratch, reported = tmp_path / "cache", []
     scratch.mkdir()
     for _ in range(2):
-        fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, scratch)
+        fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, lambda: scratch)
     assert builder.asked == ["fingerprint", "build", "fingerprint"]
     builder.fingerprint = "CD-34"
-    fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, scratch)
+    fmu_provision.provide_fmu(tmp_path / "X.fmu", reported.append, lambda: scratch)
     assert reported == ["building X.fmu", "building X.fmu again: what it is made of has changed"]
 
 

@@ -9,8 +9,11 @@ import sys
 import textwrap
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+
+from master.safety.supervision import keep_interrupt
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = """
@@ -136,3 +139,13 @@ def test_what_the_caller_has_closed_takes_no_output_of_others(tmp_path):
     command = [sys.executable, "-c", script(work), str(table)]
     done = subprocess.run(["sh", "-c", 'exec "$@" >&- 2>&-', "sh", *command], cwd=ROOT, timeout=60)
     assert (done.returncode, table.read_text()) == (0, "row")
+
+
+def test_an_interrupt_that_python_drops_is_delivered_again():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        keep_interrupt(SimpleNamespace(exc_type=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            time.sleep(5.0)
+    finally:
+        signal.signal(signal.SIGINT, before)

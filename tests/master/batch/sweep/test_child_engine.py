@@ -26,7 +26,7 @@ def test_a_process_that_is_killed_once_costs_its_run_one_retry(ending_toy, reque
     done = swept("out", ChildEngine(said.append), **RUNS)
     assert (done.failures, len(done.rows), mark.exists()) == ({}, 2, True)
     assert said == ["the process of run 1 was ended by signal SIGKILL (Killed); the run is made once more"]
-    swept("again", **RUNS)  # in this process: it was killed once
+    swept("again", ChildEngine(), **RUNS)
     assert (tmp_path / "out" / "sweep.csv").read_bytes() == (tmp_path / "again" / "sweep.csv").read_bytes()
 
 

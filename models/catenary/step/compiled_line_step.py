@@ -81,9 +81,11 @@ class CompiledLineStep:
         contact, n_attached, n_droppers = line.contact, len(modes.attached), len(droppers.stiffness)
         law = contact.stiffness, contact.exponent, contact.restitution
         numbers = np.array([newmark.a1, newmark.a2, *law, line.gap])
+        B = sp.csr_matrix(droppers.B)
+        elongation = B.indptr.astype(np.uint32), B.indices.astype(np.uint32), B.data
         #: As named tuples of the kernels: `Lanes`, `LanesWork`, `Modes`, `Droppers`, `Wires`, `Surfaces`.
         self._line = (
-            *(*lanes.arrays, *lanes.work, *self.units.arrays, *_by_rows(droppers.B), droppers.elastic_at_rest),
+            *(*lanes.arrays, *lanes.work, *self.units.arrays, *elongation, droppers.elastic_at_rest),
             *(droppers.stiffness, droppers.slack_delay, droppers.unilateral, lanes.laid_out(2.0 * droppers.rest_load)),
             *self._records.wires,
             *_surfaces(line.wires),
@@ -171,10 +173,9 @@ class CompiledLineStep:
     def _packed(self, motion: LineMotion) -> PackedMotion:
         """Return the modal part of a motion in the kernels' order, which it is kept in from now on."""
         found = motion.packed
-        if isinstance(found, PackedMotion) and found.units is self.units:
-            return found
-        motion.packed = packed = PackedMotion(self.units, motion)
-        return packed
+        if not (isinstance(found, PackedMotion) and found.units is self.units):
+            motion.packed = found = PackedMotion(self.units, motion)
+        return found
 
 
 def _surfaces(wires: Sequence[ContactWire]) -> tuple[Any, ...]:
@@ -183,10 +184,3 @@ def _surfaces(wires: Sequence[ContactWire]) -> tuple[Any, ...]:
     wholes = [wire.surface.whole() if wire.surface is not None else nothing for wire in wires]
     knots = (np.concatenate([getattr(whole, name) for whole in wholes]) for name in ("position", "height", "slope"))
     return np.cumsum([0, *(len(whole.position) for whole in wholes)]), *knots
-
-
-def _by_rows(matrix: sp.spmatrix) -> tuple[Any, Any, FloatArray]:
-    """Return a matrix compressed by rows, with indices of 32 bits: the amount that is read sets the pace."""
-    rows = sp.csr_matrix(matrix)
-    rows.sort_indices()
-    return rows.indptr.astype(np.uint32), rows.indices.astype(np.uint32), rows.data

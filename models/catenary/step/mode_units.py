@@ -62,7 +62,7 @@ class ModeUnits:
         is_new = (np.diff(where, prepend=-1) != 0) | (np.diff(damping, axis=0, prepend=np.nan) != 0.0).any(axis=1)
         groups, group = np.flatnonzero(is_new), np.cumsum(is_new) - 1
         of_kinds, kinds = np.unique(damping[groups], axis=0, return_inverse=True)
-        alpha, beta = of_kinds.T
+        kinds, (alpha, beta) = kinds.ravel(), of_kinds.T
         # K_hat = lambda (1 + a1 alpha) + mu
         mu, stiff = newmark.a0 + newmark.a1 * beta, -2.0 / (1.0 + newmark.a1 * alpha)
         kinds_of_rows = np.concatenate([kinds, kinds[group[pairs[:, 0]]]])

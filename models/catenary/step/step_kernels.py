@@ -86,17 +86,11 @@ def step(
     int
         DONE, NO_SOLUTION, NOT_SETTLED, INTERVAL_LACKS, DROPPER_LACKS or NO_WIRE; ``work.report[LACKS]`` says which.
     """
-    lanes, lanes_work, modes, droppers = (
-        lanes_of(book, 0),
-        lanes_work_of(book, 11),
-        modes_of(book, 13),
-        droppers_of(book, 22),
-    )
-    wires, surfaces, work = wires_of(book, 30), surfaces_of(book, 35), work_of(book, 39)
-    points, records = points_of(book, 51), records_of(book, 69)
-    moving, report, a1 = moving_of(moving_book, 0), work.report, work.numbers[0]
-    driven, change = moving.driven, work.change
-    motion = Motion(a1, work.numbers[1], attached, moving.table, driven, moving.pull, change, lanes.slots)
+    lanes, lanes_work, modes = lanes_of(book, 0), lanes_work_of(book, 11), modes_of(book, 13)
+    droppers, wires, surfaces = droppers_of(book, 22), wires_of(book, 30), surfaces_of(book, 35)
+    work, points, records = work_of(book, 39), points_of(book, 51), records_of(book, 69)
+    moving, report, change, a1 = moving_of(moving_book, 0), work.report, work.change, work.numbers[0]
+    motion = Motion(a1, work.numbers[1], attached, moving.table, moving.driven, moving.pull, change, lanes.slots)
     if report[STAGE] < _BEGUN:
         for k in range(given.shape[0]):
             if not 0 <= given[k, 0] < wires.period.size:
@@ -274,13 +268,12 @@ def _apply(records, points, contacts, motion, work):
 def _move_attachments(modes, moving, motion, shift):
     """Replace the motion of the attachments, and find ``shift`` of `advance`."""
     x, v, size = moving.x, moving.v, np.uint64(moving.x.size)
-    for kind in range(np.uint64(modes.turned.size) - _1):
-        carried = modes.rates[_4 * kind + _1]
-        for at in range(_0, size, _LANES):
-            put(shift, kind * size + at, get(motion.change, at) - get(v, at) * carried)
     for at in range(_0, size, _LANES):
-        put(x, at, get(x, at) + get(motion.change, at))
-        put(v, at, get(motion.change, at) * motion.a1 - get(v, at))
+        change, before = get(motion.change, at), get(v, at)
+        for kind in range(np.uint64(modes.turned.size) - _1):
+            put(shift, kind * size + at, change - before * modes.rates[_4 * kind + _1])
+        put(x, at, get(x, at) + change)
+        put(v, at, change * motion.a1 - before)
     for i in range(motion.slots.size):
         motion.attached[0, i], motion.attached[1, i] = x[motion.slots[i]], v[motion.slots[i]]
 

@@ -8,29 +8,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.numerics.cubic_curve import CubicCurve
-from models.pantograph.multibody.analysis.mechanism_statics import Equilibrium, equilibrium_where, settle_springs
-from models.pantograph.multibody.elements.angle_elements import BodyAngle, Cam, PointDistance
-from models.pantograph.multibody.mechanism import Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_definition import (
-    AngleStop,
-    BumpStop,
-    CamTable,
-    LiftingMoment,
-    MechanismDefinition,
+from models.pantograph.multibody.analysis.mechanism_statics import (
+    ITERATIONS,
+    Equilibrium,
+    equilibrium_where,
+    settle_springs,
 )
+from models.pantograph.multibody.elements.angle_elements import BodyAngle, Cam, PointDistance
+from models.pantograph.multibody.last_found import LastFound
+from models.pantograph.multibody.mechanism import Mechanism, MechanismError
+from models.pantograph.multibody.mechanism_definition import AngleStop, BumpStop, CamTable, LiftingMoment
 
 #: Points of a cam that is found, over the working range.
 _POINTS: Final = 41
 #: Step on the way to the ends of a working range that no stop gives: of angles [rad], of lengths [m].
 _STEP: Final = {True: np.radians(1.0), False: 0.005}
+#: Iterations within which an equilibrium a step away is found if there is one: eight at most are seen, of sixty.
+_NEXT: Final = 20
 #: Longest way from one equilibrium to the next [rad or m].
 _STAGE: Final = 0.1
 #: Rise of the strip per angle below which the arms are at a dead centre [m/rad]; per length [1].
@@ -44,28 +45,8 @@ _CLOSE: Final = 0.1
 _ROUNDS: Final = 6
 #: Force for which M_1 is found if none is set [N].
 _USUAL_FORCE: Final = 100.0
-#: What says how a pantograph runs, and from where it starts: of no account for its cam. All else counts.
-_OF_A_RUN: Final[dict[str, Any]] = {
-    "speed": 0.0,
-    "start_position": 0.0,
-    "speed_profile": None,
-    "use_train": 0,
-    "reference_height": 0.0,
-    "start_height": None,
-    "raise_start": 0.0,
-    "raise_duration": 0.0,
-    "aerodynamic_uplift": (0.0, 0.0),
-    "knuckle": "leading",
-    "direction": 1,
-    "extrapolation_order": 0,
-    "monitor_energy": 0,
-    "time_step": 0.0,
-    "tolerance": 0.0,
-}
-#: Cams that were found last in this process, by what they depend on, and how many are kept: finding one takes half a
-#: second, and the runs of a sweep, or both pantographs of a train, need the same.
-_found: dict[tuple[MechanismDefinition, bytes], Cam] = {}
-_MOST_FOUND: Final = 8
+#: Finding a cam takes half a second.
+_found: Final = LastFound[Cam]()
 
 
 def stand(mechanism: Mechanism) -> FloatArray:
@@ -137,12 +118,7 @@ def _from_table(mechanism: Mechanism, standing: FloatArray, given: CamTable) -> 
 
 def _constant_force(mechanism: Mechanism, standing: FloatArray) -> Cam:
     """Return the cam that holds the force, for a mechanism whose springs are settled and that has no cam yet."""
-    key = replace(mechanism.definition, **_OF_A_RUN), standing.tobytes()
-    cam = _found.pop(key, None) or _find_constant_force(mechanism, standing)
-    _found[key] = cam
-    while len(_found) > _MOST_FOUND:
-        _found.pop(next(iter(_found)))
-    return cam
+    return _found.of(mechanism, standing, lambda: _find_constant_force(mechanism, standing))
 
 
 def _find_constant_force(mechanism: Mechanism, standing: FloatArray) -> Cam:
@@ -209,11 +185,15 @@ def _held_at(mechanism: Mechanism, standing: FloatArray, places: FloatArray, for
     return [*reversed(sides[1]), *sides[0]]
 
 
-def _held(mechanism: Mechanism, place: float, start: FloatArray, force: float, lift: float) -> Equilibrium:
+def _held(
+    mechanism: Mechanism, place: float, start: FloatArray, force: float, lift: float, iterations: int = ITERATIONS
+) -> Equilibrium:
     where = _place(mechanism)
-    return equilibrium_where(
-        mechanism, lambda y: where.at(mechanism.kinematics(y)) - place, start, contact_force=force, lift=lift
-    )
+
+    def beyond(y: FloatArray) -> float:
+        return where.at(mechanism.kinematics(y)) - place
+
+    return equilibrium_where(mechanism, beyond, start, contact_force=force, lift=lift, iterations=iterations)
 
 
 def strip_height_where(mechanism: Mechanism, standing: FloatArray, place: float) -> float:
@@ -251,7 +231,7 @@ def reach(mechanism: Mechanism, standing: FloatArray, way: float, steep: float =
     left = stops.touched(standing)  # it is to come away from them
     while abs(step) >= smallest:
         try:
-            found = _held(mechanism, place + step, y, 0.0, 0.0)
+            found = _held(mechanism, place + step, y, 0.0, 0.0, _NEXT)
         except (MechanismError, np.linalg.LinAlgError):
             step *= 0.5
             continue

@@ -155,7 +155,7 @@ def roofline(model: CatenaryModel) -> None:
         "attachments, -2 K and a2 M": engine.lanes.arrays.values.nbytes,
         "attachments, factor, there and back": 2 * engine.lanes.arrays.factor.nbytes,
         "modes, coupling and motion, read": units.table.nbytes,
-        "modes, motion, written": units.table.nbytes * 4 // rows,
+        "modes, motion, written": units.table.nbytes * 2 // rows,
         "modes, ends": units.arrays.places.nbytes + units.arrays.shares.nbytes,
     }
     whole = sum(moved.values())

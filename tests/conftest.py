@@ -20,6 +20,8 @@ TOGETHER: Final = {
     "robustness/": "inputs that are added up",
     "validation/test_cx_ln2.py": "whole runs",
     "validation/test_multibody_ln2.py": "whole runs",
+    "models/commands/desk/": "statics",  # of whose page and tables one run is enough
+    "models/commands/test_statics_command.py": "statics",
     "models/coupled/test_lanes.py": "lanes",  # whose kernels are compiled once, in a quarter of a minute
     "master/batch/sweep/test_lanes_engine.py": "lanes",
 }

@@ -42,15 +42,16 @@ def _calibrated(options: argparse.Namespace, is_stored: bool, check: Callable[[]
         task = calibration.task(system, options.parameter, options.mean, options.tolerance)
         place = _place(scenario.package, task.parameter) if is_stored else None
         found = _found(system, task)
+        runs = f"{len(found.trials)} run{'s' if len(found.trials) > 1 else ''}"
         print(
             f"{task.parameter} = {found.value:.6g} gives a mean force of {found.result:.2f} N "
-            f"({len(found.trials)} runs; filter {_filter_of(system)})"
+            f"({runs}; filter {_filter_of(system)})"
         )
         if place is not None:
             note = (
                 f"mean force {found.result:.2f} N (wanted {task.mean_force:g} N) after {_filter_of(system)}, with "
                 f"{system.settings.coupling.scheme}, macro step {system.step:g} s, "
-                f"in {len(found.trials)} runs of 'python -m master calibrate'"
+                f"in {runs} of 'openpanto calibrate'"
             )
             check()
             calibration.store_value(*place, found.value, note)

@@ -157,10 +157,11 @@ def read_measured(path: Path) -> Measurement:
 
 @dataclass(frozen=True)
 class _Row:
-    """A row that is not empty, with the line of the file that it ends on."""
+    """A row that is not empty, with the line of the file that it ends on; its numbers may have a decimal comma."""
 
     line: int
     cells: list[str]
+    may_have_comma: bool
 
 
 def _rows(path: Path) -> list[_Row]:
@@ -169,7 +170,7 @@ def _rows(path: Path) -> list[_Row]:
         head = next(filter(None, lines), "")
         mark = next((mark for mark in ";\t" if mark in head), ",")
         reader = csv.reader(lines, delimiter=mark)
-        return [_Row(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
+        return [_Row(reader.line_num, cells, mark != ",") for cells in reader if any(cell.strip() for cell in cells)]
     except OSError as error:
         raise MasterError(f"{path} cannot be read ({said(error)})") from error
     except UnicodeDecodeError as error:
@@ -186,7 +187,7 @@ def _without_comment(line: str) -> str:
 def _check_marks(path: Path, rows: Sequence[_Row], columns: Sequence[int]) -> None:
     """Refuse a table with decimal commas in some numbers and points in others: one of them groups thousands."""
     marks: dict[str, int] = {}
-    for row, i, mark in itertools.product(rows, columns, ",."):
+    for row, i, mark in itertools.product((row for row in rows if row.may_have_comma), columns, ",."):
         if mark in row.cells[i]:
             marks.setdefault(mark, row.line)
     if len(marks) > 1:
@@ -253,12 +254,14 @@ def _column(path: Path, rows: Sequence[_Row], index: int, factor: float) -> Floa
 def _number(path: Path, row: _Row, index: int) -> float:
     text = row.cells[index].strip()
     try:
-        value = float(text.replace(",", "."))  # one between commas is in quotation marks, and so a decimal one
+        value = float(text.replace(",", ".") if row.may_have_comma else text)
     except ValueError:
         value = math.nan
     # Python accepts 1_000, and the digits of every script; in a table they are typing errors.
     if not abs(value) <= _LARGEST or "_" in text or not text.isascii():
-        raise MasterError(f"{path}:{row.line}: '{one_line(text)}' in column {index + 1} is not a finite number")
+        # In quotation marks between commas it may be a decimal one, or stand between thousands.
+        comma = ": write a decimal point, and nothing between thousands" if re.search(r"\d,\d", text) else ""
+        raise MasterError(f"{path}:{row.line}: '{one_line(text)}' in column {index + 1} is not a finite number{comma}")
     return value
 
 

@@ -62,7 +62,8 @@ def _rows(name: str, runs: Sequence[Results]) -> Iterator[tuple[str, ...]]:
     if len(hashes) == 1 or not any(tables):
         return
     if not all(tables):
-        yield f"{name}: definition", *("kept" if table else "not kept with the run" for table in tables)
+        if all(_component(run, name) for run in runs):  # one that a run does not have is listed as such
+            yield f"{name}: definition", *("kept" if table else "not kept with the run" for table in tables)
         return
     for key in dict.fromkeys(key for table in tables for key in table):
         values = [table.get(key, "-") for table in tables]

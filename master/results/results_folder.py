@@ -34,7 +34,7 @@ GEOMETRY: Final = "geometry.json"
 FORCES: Final = "contact_force.csv"
 REPORT: Final = "report.html"
 _TABLES: Final = ("timeseries*.csv", "timeseries*.parquet", FORCES, "contact_force.parquet")
-_OURS: Final = (*_TABLES, SUMMARY, GEOMETRY, REPORT, "*.png", "*.svg", "definition_*.toml")
+_OURS: Final = (*_TABLES, GEOMETRY, REPORT, "*.png", "*.svg", "definition_*.toml")
 #: What a run, a study or a verification may leave half written if it is killed, and what is no result.
 _PARTS: Final = (*(name + PART for name in (SUMMARY, GEOMETRY, FORCES, CHECKPOINT)), f".*{PART}")
 _LOCKS: Final = (folder_lock.LOCK, folder_lock.OWNER)
@@ -240,7 +240,9 @@ def _alone_in(folder: Path, kind: str) -> Iterator[None]:
 
 
 def _empty(folder: Path, keep: Path | None) -> None:
-    """Remove the results of an earlier run from a claimed folder.
+    """Remove the results of an earlier run from a claimed folder; its summary is left for the new one to replace.
+
+    It says from now on that its run is not finished: whoever is killed here leaves a folder of ours without results.
 
     Parameters
     ----------
@@ -254,6 +256,8 @@ def _empty(folder: Path, keep: Path | None) -> None:
         If it cannot be written.
     """
     try:
+        if is_ours(folder):
+            write_json(folder / SUMMARY, {**contents_of(folder / SUMMARY), "status": "running"})
         _remove(folder, (*_OURS, *_PARTS))
         checkpoint = folder / CHECKPOINT
         if checkpoint.exists() and not (keep is not None and keep.exists() and checkpoint.samefile(keep)):

@@ -159,6 +159,8 @@ def write_timeseries(path: Path, run_of: Evaluated) -> None:
 
 def _check_interval(interval: Sequence[float] | None, way: tuple[float, float]) -> None:
     """Refuse an interval of interest that the run does not cover."""
+    if interval is not None and interval[0] >= interval[1]:
+        raise ParameterError(f"--interval {interval[0]:g} {interval[1]:g}: the first number must be the smaller one")
     if interval is not None and not way[0] <= interval[0] < interval[1] <= way[1]:
         text = f"must lie within the run, {way[0]:g} m to {way[1]:g} m"
         raise ParameterError(f"--interval {interval[0]:g} {interval[1]:g}: {text}")

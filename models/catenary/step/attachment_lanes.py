@@ -51,6 +51,10 @@ class AttachmentLanes:
 
     Attributes
     ----------
+    slots : ndarray of int, shape (n,)
+        Where the displacements are in an array in lanes.
+    size : int
+        Of such an array.
     arrays, work : Lanes, LanesWork
         See `models.catenary.step.attachment_kernels`.
     """
@@ -75,29 +79,31 @@ class AttachmentLanes:
         self._before[: self._count] = (np.arange(self._count) - 1) % self._count
         widths, factor, middle, shifts = self._factorised(entries)
         rows, targets, values, beyond = self._products(*products)
-        slot = self._row * self._lanes + self._lane
-        order = np.argsort(slot)
-        whole = [order, slot[order], rows, targets]
+        self.slots = self._row * self._lanes + self._lane
         size = [self._inner, self._border, width, beyond]
         neighbours = self._before, np.argsort(self._before)
         self.arrays = kernels.Lanes(
-            *(part.astype(np.uint32) for part in whole),
+            *(part.astype(np.uint32) for part in (self.slots, rows, targets)),
             aligned(values),
             widths.astype(np.uint64),
             aligned(factor),
             aligned(middle),
             *(np.asarray(part, dtype=np.uint64) for part in (shifts, *neighbours, size)),
         )
-        rows_of_work = self._length + max(beyond, width)
-        self.work = kernels.LanesWork(
-            *(aligned(np.zeros(k * self._lanes)) for k in (*3 * [rows_of_work], 2 * self._border, self._border))
-        )
+        self.size = (self._length + max(beyond, width)) * self._lanes
+        self.work = kernels.LanesWork(*(aligned(np.zeros(k * self._border * self._lanes)) for k in (2, 1)))
+
+    def laid_out(self, values: FloatArray) -> FloatArray:
+        """Return values for the displacements, shape (n,), as an array in lanes."""
+        result = np.zeros(self.size)
+        result[self.slots] = values
+        return aligned(result)
 
     def solve(self, load: FloatArray) -> FloatArray:
         """Return the solution for a load of shape (n,)."""
-        change = np.empty(len(load))
-        self._kernels.respond(self.arrays, load, self.work, change)
-        return change
+        solution = self.laid_out(load)
+        self._kernels.solve(self.arrays, self.work, solution)
+        return solution[self.slots]
 
     def near(self, first: int, load: FloatArray) -> tuple[int, FloatArray]:
         """Return solutions for loads of shape (k, m) on the rows from ``first``, where they are not zero: see `Factor`.
@@ -148,7 +154,7 @@ class AttachmentLanes:
             follow = dtbtrs(whole[:, :inner], coupling[k, :inner], uplo="L")[0] if inner else coupling[k, :0]
             factor[:, 0, k] = 1.0 / whole[0, :inner]
             factor[:, 1 : width + 1, k], factor[:, width + 1 :, k] = whole[1:, :inner].T, follow
-            own = _dense(whole, inner)
+            own = sp.dia_matrix((whole, -np.arange(width + 1)), shape=2 * (self._length,)).tocsr()[inner:].toarray()
             rest[k, :, k] += own[:, inner - self._length :] @ own[:, inner - self._length :].T
             rest[before, :, before] -= follow.T @ follow
             across = coupling[k, inner:] - own[:, :inner] @ follow
@@ -192,23 +198,10 @@ def _ends(entries: sp.coo_matrix, count: int, width: int, is_ring: bool) -> tupl
     near = np.abs(entries.row - entries.col) <= width
     reach = np.arange(n)
     np.maximum.at(reach, entries.row[near], entries.col[near])
-    first = np.arange(n + 1)
-    for row, last in enumerate(reach.tolist()):
-        first[row + 1 : last + 1] = np.minimum(first[row + 1 : last + 1], row)
-    needed = np.arange(n + 1) - first
+    needed = np.arange(n + 1) - np.searchsorted(np.maximum.accumulate(reach), np.arange(n + 1))
     ends, play = [], min(_PLAY, (n // count - width - 1) // 2)
     for k in range(1, count):
         share = k * n // count
         near_share = np.arange(share - play, share + play + 1)
         ends.append(int(near_share[np.lexsort((np.abs(near_share - share), needed[near_share]))[0]]))
     return np.array([*ends, n]), max([1, *needed[ends].tolist(), *([width] if is_ring else [])])
-
-
-def _dense(factor: FloatArray, first: int) -> FloatArray:
-    """Return the rows of a band factor from ``first`` on, shape (n - first, n)."""
-    size, width = factor.shape[1], factor.shape[0] - 1
-    result = np.zeros((size - first, size))
-    for row in range(first, size):
-        columns = np.arange(max(row - width, 0), row + 1)
-        result[row - first, columns] = factor[row - columns, columns]
-    return result

@@ -19,7 +19,7 @@ from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.step.array_book import ArrayBook
-from models.catenary.step.attachment_lanes import AttachmentLanes
+from models.catenary.step.attachment_lanes import AttachmentLanes, aligned
 from models.catenary.step.mode_units import ModeUnits, PackedMotion
 from models.catenary.step.step_engine import GivenForce, SteppedLine
 from models.catenary.step.step_records import StepRecords
@@ -71,19 +71,22 @@ class CompiledLineStep:
         if line.law is not continuous_contact:
             raise UnsuitedError("they do not know the line's contact law")
         self.kernels, self.matrices, self._wires = kernels, matrices, line.wires
-        self.units = ModeUnits(matrices, kernels)
-        self.lanes = lanes = AttachmentLanes(
-            factor.matrix, factor.width, (-2.0 * modes.K, newmark.a2 * modes.M), kernels
-        )
+        G = matrices.coupling @ modes.turn
+        mass = newmark.a2 * (modes.M - G.T @ sp.diags(matrices.inverse / matrices.mu) @ G)
+        self.lanes = lanes = AttachmentLanes(factor.matrix, factor.width, (-2.0 * modes.K, mass), kernels)
+        self.units = ModeUnits(matrices, lanes, kernels)
         near = lanes if factor.matrix.shape[0] < _LONG else factor
         compliance = Compliance(near, droppers.B, droppers.by_change(newmark))
         self._records = StepRecords(line.wires, matrices, compliance, self.units.slots)
         contact, n_attached, n_droppers = line.contact, len(modes.attached), len(droppers.stiffness)
-        numbers = np.array([newmark.a1, contact.stiffness, contact.exponent, contact.restitution, line.gap])
+        law = contact.stiffness, contact.exponent, contact.restitution
+        numbers = np.array([newmark.a1, newmark.a2, *law, line.gap])
+        B = sp.csr_matrix(droppers.B)
+        elongation = B.indptr.astype(np.uint32), B.indices.astype(np.uint32), B.data
         #: As named tuples of the kernels: `Lanes`, `LanesWork`, `Modes`, `Droppers`, `Wires`, `Surfaces`.
         self._line = (
-            *(*lanes.arrays, *lanes.work, *self.units.arrays, *_by_rows(droppers.B), droppers.elastic_at_rest),
-            *(droppers.stiffness, droppers.slack_delay, droppers.unilateral, 2.0 * droppers.rest_load),
+            *(*lanes.arrays, *lanes.work, *self.units.arrays, *elongation, droppers.elastic_at_rest),
+            *(droppers.stiffness, droppers.slack_delay, droppers.unilateral, lanes.laid_out(2.0 * droppers.rest_load)),
             *self._records.wires,
             *_surfaces(line.wires),
         )
@@ -91,8 +94,9 @@ class CompiledLineStep:
         self._sizes = max(i.size for i in intervals), max(len(i.ends) for i in intervals)
         self._slack, self._lacks = np.zeros(n_droppers, dtype=np.int64), np.zeros(n_droppers)
         self._report = np.zeros(5, dtype=np.int64)
-        sizes = 2 * (n_attached,) + 2 * (n_droppers,) + 2 * self._sizes[:1]
-        self._work = (numbers, *map(np.zeros, sizes), self._slack, self._lacks, self._report)
+        shift, ends = len(self.units.carried) * lanes.size, self.units.rows_of_ends * kernels.LANES
+        sizes = lanes.size, shift, ends, n_attached, *2 * (n_droppers,), *2 * self._sizes[:1]
+        self._work = (numbers, *(aligned(np.zeros(size)) for size in sizes), self._slack, self._lacks, self._report)
         self._no_result = empty_result(0, len(line.wires))
         self._lay_out(1)
 
@@ -124,7 +128,7 @@ class CompiledLineStep:
             self._lay_out(places)
         loaded, load = np.empty((places, 2), dtype=np.int64), np.empty((places, 2))
         before = state.element, state.impact_velocity, state.loaded, state.load, state.slack, state.compensation
-        arrays = motion.attached, packed.table, packed.pull, *before, *strips, given
+        arrays = packed.book.entries, motion.attached, *before, *strips, given
         records.begin()
         report[0] = 0
         while answer := self.kernels.step(self._entries(), *arrays, loaded, load, result.force, result.point):
@@ -169,11 +173,9 @@ class CompiledLineStep:
     def _packed(self, motion: LineMotion) -> PackedMotion:
         """Return the modal part of a motion in the kernels' order, which it is kept in from now on."""
         found = motion.packed
-        if isinstance(found, PackedMotion) and found.units is self.units:
-            return found
-        prepared = motion.prepared
-        motion.packed = packed = PackedMotion(self.units, *motion.plain(), prepared)
-        return packed
+        if not (isinstance(found, PackedMotion) and found.units is self.units):
+            motion.packed = found = PackedMotion(self.units, motion)
+        return found
 
 
 def _surfaces(wires: Sequence[ContactWire]) -> tuple[Any, ...]:
@@ -182,10 +184,3 @@ def _surfaces(wires: Sequence[ContactWire]) -> tuple[Any, ...]:
     wholes = [wire.surface.whole() if wire.surface is not None else nothing for wire in wires]
     knots = (np.concatenate([getattr(whole, name) for whole in wholes]) for name in ("position", "height", "slope"))
     return np.cumsum([0, *(len(whole.position) for whole in wholes)]), *knots
-
-
-def _by_rows(matrix: sp.spmatrix) -> tuple[Any, Any, FloatArray]:
-    """Return a matrix compressed by rows, with indices of 32 bits: the amount that is read sets the pace."""
-    rows = sp.csr_matrix(matrix)
-    rows.sort_indices()
-    return rows.indptr.astype(np.uint32), rows.indices.astype(np.uint32), rows.data

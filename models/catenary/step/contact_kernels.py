@@ -9,8 +9,8 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.mode_kernels import AMPLITUDE, HELD, INVERSE, RATE
-from models.catenary.step.vector_kernels import LANES, get, part, put, reader
+from models.catenary.step.mode_kernels import AMPLITUDE, RATE, ROWS
+from models.catenary.step.vector_kernels import LANES, get, nothing, part, put, reader
 
 #: What `find` returns where a strip crosses no wire; a number below says which interval's record is lacking.
 NOWHERE = -1
@@ -29,13 +29,14 @@ Records = namedtuple("Records", "data whole intervals droppers")
 records_of = reader(Records, "fiii")
 #: An interval's record: ``modes``, ``size`` (displacements of attachments), ``elements``, ``reach`` (displacements
 #: that loads at its attachments reach, from ``first`` on) and ``stretched`` (droppers); then where in the data its
-#: parts begin: ``slots``, where the amplitudes of its modes are in the table; ``ends``, the places of its attachments'
-#: displacements; ``droppers``, those that they stretch; ``plan`` to ``height_static`` of the `WireInterval`;
+#: parts begin: ``slots``, the numbers of its modes in the units; ``ends``, the places of its attachments'
+#: displacements; ``droppers``, those that they stretch; of its modes ``inverse``, 1 / K_hat, ``back``,
+#: -2 lambda / K_hat, and ``carried``, a2 / mu; ``plan`` to ``height_static`` of the `WireInterval`;
 #: ``yielding`` and ``at_ends`` of the `IntervalResponse`, and its ``columns`` with their ``dropper_force``, both by
 #: displacements of its attachments. Offsets take the compiler far less time than arrays made of them.
 Interval = namedtuple(
     "Interval",
-    "modes size elements reach first stretched slots ends droppers "
+    "modes size elements reach first stretched slots ends droppers inverse back carried "
     "plan plan_static height height_static yielding at_ends columns stretch",
 )
 #: A dropper's record: the same for a force in it.
@@ -55,8 +56,13 @@ _FAR, _FAR_OFF = 1.0, 5.0
 #: Widths over which a contact sets in [m], see `models.catenary.contact_and_slack.crossing`.
 _STRIP_EDGE, _WIRE_EDGE = 0.05, 1.0
 _0, _LANES = np.uint64(0), np.uint64(LANES)
-#: From the place of a mode's amplitude in the table to others of the same mode.
-_TO_RATE, _TO_HELD, _TO_INVERSE = (LANES * (row - AMPLITUDE) for row in (RATE, HELD, INVERSE))
+#: A motion between steps: displacements ``x`` and velocities ``v`` of the attachments in lanes, ``table`` and ``pull``
+#: of `advance`, and ``driven``, zeros, in which forces on the wires move modes within a step.
+Moving = namedtuple("Moving", "x v table driven pull")
+moving_of = reader(Moving, "fffff")
+#: How a line moves in a step: ``a1`` and ``a2`` of Newmark's method; ``attached`` of the `LineMotion`; ``table``,
+#: ``driven`` and ``pull`` as above; ``change`` of the attachments in lanes, and their ``slots`` in these.
+Motion = namedtuple("Motion", "a1 a2 attached table driven pull change slots")
 
 
 @part
@@ -66,7 +72,8 @@ def interval_at(whole, at):
     m, slots = n + e, at + 6
     ends = slots + n
     droppers = ends + e
-    plan = droppers + d
+    inverse = droppers + d
+    plan = inverse + 3 * n
     plan_static = plan + 2 * (k + 1) * m
     height = plan_static + 2 * (k + 1)
     height_static = height + 4 * k * m
@@ -74,8 +81,8 @@ def interval_at(whole, at):
     at_ends = yielding + n * e
     columns = at_ends + e * e
     return Interval(
-        n, e, k, r, first, d, slots, ends, droppers, plan, plan_static, height, height_static, yielding, at_ends,
-        columns, columns + r * e,
+        n, e, k, r, first, d, slots, ends, droppers, inverse, inverse + n, inverse + 2 * n, plan, plan_static, height,
+        height_static, yielding, at_ends, columns, columns + r * e,
     )  # fmt: skip
 
 
@@ -110,8 +117,7 @@ def find(wires, records, section, strip, guess, motion, local, place):
     ----------
     strip : ndarray, shape (2, 2, 3)
         Ends A and B; position and velocity.
-    motion : (float, ndarray, ndarray, ndarray)
-        a1, table, change and motion of the attachments; see `models.catenary.step.step_kernels.step`.
+    motion : Motion
     local : (ndarray, ndarray)
         Local coordinates of its interval at the end of the step and their rates, forces found inside it left out.
     place : ndarray, shape (3,)
@@ -234,25 +240,33 @@ def surface_at(surfaces, wires, section, x):
 def follow_ends(records, record, motion, local):
     """Put the local coordinates of an interval at the end of a step and their rates into ``local``; see `find`."""
     interval, data, whole = interval_at(records.whole, record), records.data, records.whole
-    a1, table, change, attached = motion
-    count, size = interval.modes, interval.size
+    count, size, table = interval.modes, interval.size, motion.table
     for j in range(size):
         end = whole[interval.ends + j]
-        local[0][count + j] = change[end]
-        local[1][count + j] = a1 * change[end] - attached[1, end]
+        local[0][count + j], local[1][count + j] = motion.change[motion.slots[end]], motion.attached[1, end]
     for i in range(count):
-        at, yielding = whole[interval.slots + i], interval.yielding + i * size
-        moved = table[at + _TO_HELD]
+        slot, yielding = whole[interval.slots + i], interval.yielding + i * size
+        at, carried = row_of(slot, AMPLITUDE), data[interval.carried + i]
+        rate = table[row_of(slot, RATE)]
+        moved = (
+            motion.driven[slot] + data[interval.inverse + i] * motion.a2 * rate + data[interval.back + i] * table[at]
+        )
         for j in range(size):
-            moved -= data[yielding + j] * local[0][count + j]
-        local[0][i] = table[at] + moved
-        local[1][i] = a1 * moved - table[at + _TO_RATE]
+            moved -= data[yielding + j] * (local[0][count + j] - carried * local[1][count + j])
+        local[0][i], local[1][i] = table[at] + moved, motion.a1 * moved - rate
     for j in range(size):
-        local[0][count + j] += attached[0, whole[interval.ends + j]]
+        local[1][count + j] = motion.a1 * local[0][count + j] - local[1][count + j]
+        local[0][count + j] += motion.attached[0, whole[interval.ends + j]]
 
 
 @part
-def point(records, record, element, xi, table, row, load):
+def row_of(slot, row):
+    """Return where a row of the table has the number of a mode."""
+    return (slot // LANES * ROWS + row) * LANES + slot % LANES
+
+
+@part
+def point(records, record, element, xi, row, load):
     """Return the static height of a point of an interval and its compliance.
 
     Parameters
@@ -277,7 +291,7 @@ def point(records, record, element, xi, table, row, load):
     for j in range(size):
         load[j] = row[count + j]
     for i in range(count):
-        compliance += row[i] * row[i] * table[records.whole[interval.slots + i] + _TO_INVERSE]
+        compliance += row[i] * row[i] * data[interval.inverse + i]
         for j in range(size):
             load[j] -= row[i] * data[interval.yielding + i * size + j]
     for j in range(size):
@@ -287,16 +301,33 @@ def point(records, record, element, xi, table, row, load):
 
 
 @part
-def press(records, record, row, force, table):
-    """Add a force on a point of an interval, its attachments held, to the changes of the interval's modes."""
+def press(records, record, row, force, driven):
+    """Add what a force on a point of an interval changes of its modes, the attachments held, to ``driven``."""
     interval = interval_at(records.whole, record)
     for i in range(interval.modes):
-        at = records.whole[interval.slots + i]
-        table[at + _TO_HELD] += force * row[i] * table[at + _TO_INVERSE]
+        driven[records.whole[interval.slots + i]] += force * row[i] * records.data[interval.inverse + i]
 
 
 @part
-def bend(data, column, first, reach, load, force, change):
+def drive(records, record, motion):
+    """Add what forces changed of an interval's modes to their motion, and to their pull in the next step."""
+    interval, data, whole = interval_at(records.whole, record), records.data, records.whole
+    for i in range(interval.modes):
+        slot, yielding = whole[interval.slots + i], interval.yielding + i * interval.size
+        inverse, moved = data[interval.inverse + i], motion.driven[slot]
+        if moved == 0.0:  # by another force on the interval
+            continue
+        motion.driven[slot] = 0.0
+        motion.table[row_of(slot, AMPLITUDE)] += moved
+        motion.table[row_of(slot, RATE)] += motion.a1 * moved
+        value = motion.a1 * (data[interval.carried + i] - motion.a2 * inverse) - data[interval.back + i]
+        value *= moved / inverse
+        for j in range(interval.size):
+            motion.pull[motion.slots[whole[interval.ends + j]]] += value * data[yielding + j]
+
+
+@part
+def bend(data, column, first, reach, load, force, change, slots, bent):
     """Add what forces on attachments change in a step.
 
     Parameters
@@ -305,23 +336,29 @@ def bend(data, column, first, reach, load, force, change):
         Responses to unit forces, ``reach`` displacements from ``first`` on, round the end, one after the other.
     load : ndarray
         The force of each, for a ``force`` of one.
+    change, slots
+        Of `Motion`.
+    bent : ndarray, shape (n_attached,)
+        To work in.
     """
     begin, width, of = np.uint64(first), np.uint64(reach), np.uint64(column)
-    here = min(width, np.uint64(change.size) - begin)
-    whole = here // _LANES * _LANES
+    here, whole = np.uint64(slots.size) - begin, width // _LANES * _LANES
     for i in range(_0, whole, _LANES):
-        moved = get(change, begin + i)
+        moved = nothing()
         for j in range(np.uint64(load.size)):
             moved += get(data, of + j * width + i) * (force * load[j])
-        put(change, begin + i, moved)
+        put(bent, i, moved)
     for i in range(whole, width):
-        at = begin + i if i < here else i - here
+        bent[i] = 0.0
         for j in range(np.uint64(load.size)):
-            change[at] += force * load[j] * data[of + j * width + i]
+            bent[i] += force * load[j] * data[of + j * width + i]
+    for i in range(width):
+        at = begin + i if i < here else i - here
+        change[slots[at]] += bent[i]
 
 
 @part
-def moved_by(records, points, i, j, size, table):
+def moved_by(records, points, i, j, size):
     """Return how far the wire is moved at one point by a unit force at another [m/N]; see `WirePoint.moved_by`."""
     if i == j:
         return points.compliance[i]
@@ -336,12 +373,12 @@ def moved_by(records, points, i, j, size, table):
                 moved += load[k] * data[there.columns + m * there.reach + at] * other_load[m]
     if points.record[i] == points.record[j]:
         for k in range(here.modes):
-            moved += row[k] * other_row[k] * table[whole[here.slots + k] + _TO_INVERSE]
+            moved += row[k] * other_row[k] * data[here.inverse + k]
     return moved
 
 
 @part
-def put_place(records, points, i, table, attached, out):
+def put_place(records, points, i, motion, out):
     """Put a point of a wire into ``out``, shape (3,) [m], as the motion stands."""
     interval, data, whole = interval_at(records.whole, points.record[i]), records.data, records.whole
     size, xi, row = interval.modes + interval.size, points.xi[i], own(points.row, points, i)
@@ -351,7 +388,7 @@ def put_place(records, points, i, table, attached, out):
     y += xi * (data[static + 3] - y)
     for m in range(size):
         at = whole[interval.slots + m]  # the ends follow the slots
-        value = table[at] if m < interval.modes else attached[0, at]
+        value = motion.table[row_of(at, AMPLITUDE)] if m < interval.modes else motion.attached[0, at]
         x += ((1.0 - xi) * data[plan + m] + xi * data[plan + 2 * size + m]) * value
         y += ((1.0 - xi) * data[plan + size + m] + xi * data[plan + 3 * size + m]) * value
         z += row[m] * value

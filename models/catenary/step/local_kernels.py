@@ -23,7 +23,7 @@ _TOLERANCE = 1e-10
 
 
 @part
-def solve_local(records, points, contacts, yielding, droppers, numbers, table, slack, work):
+def solve_local(records, points, contacts, yielding, droppers, numbers, slack, work):
     """Find slack and contact forces of a step.
 
     Parameters
@@ -34,7 +34,7 @@ def solve_local(records, points, contacts, yielding, droppers, numbers, table, s
         How far a strip yields within the step per unit force [m/N].
     droppers : Droppers
     numbers : ndarray
-        a1, then ``contact`` of `law_of`.
+        Of `Work`.
     slack : ndarray of int
         Droppers to begin with.
     work : Work
@@ -63,7 +63,7 @@ def solve_local(records, points, contacts, yielding, droppers, numbers, table, s
             for j in slack:
                 if records.droppers[j] < 0:
                     return LACKING + j
-            effects = _effects(records, points, contacts, slack, yielding, work.change.size, table)
+            effects = _effects(records, points, contacts, slack, yielding, work.bent.size)
             _put_moved(effects, forces, moved)
         unknown, is_regular = _newton_step(records, points, contacts, effects, droppers, free, numbers, moved, slack)
         if not is_regular:
@@ -118,7 +118,7 @@ def _changed(work, of_contacts):
 
 
 @part
-def _effects(records, points, contacts, slack, yielding, size, table):
+def _effects(records, points, contacts, slack, yielding, size):
     """Return what unit forces do; ``size`` is the number of displacements of attachments."""
     n, m, most, whole, data = contacts.size, slack.size, 0, records.whole, records.data
     listed, count = np.empty(n + m, dtype=np.int64), np.empty(n + m, dtype=np.int64)
@@ -139,7 +139,7 @@ def _effects(records, points, contacts, slack, yielding, size, table):
             for j in range(count[k]):
                 pulled[k, j] += data[column + j] * load[i]
         for i in range(n):
-            moved[i, k] = -moved_by(records, points, contacts[i], source, size, table)
+            moved[i, k] = -moved_by(records, points, contacts[i], source, size)
             if points.pantograph[contacts[i]] == points.pantograph[source]:  # contacts of a strip share its retreat
                 moved[i, k] -= yielding[points.pantograph[source]]
     for k in range(n, n + m):
@@ -178,7 +178,7 @@ def _newton_step(records, points, contacts, effects, droppers, free, numbers, mo
         k = contacts[i]
         force, stiffness, damping = law_of(
             points.penetration[k] + moved[i], points.velocity[k] + numbers[0] * moved[i],
-            points.impact[k], points.engagement[k], numbers[1:],
+            points.impact[k], points.engagement[k], numbers[2:],
         )  # fmt: skip
         slope = stiffness + numbers[0] * damping
         right[i] = force - slope * moved[i]

@@ -10,8 +10,10 @@ import scipy.sparse as sp
 
 from models.arrays import FloatArray, IntArray
 from models.catenary.linear_motion.interval_modes import IntervalModes
+from models.catenary.linear_motion.line_motion import LineMotion
 from models.catenary.linear_motion.step_matrices import StepMatrices
-from models.catenary.step.attachment_lanes import aligned
+from models.catenary.step.array_book import ArrayBook
+from models.catenary.step.attachment_lanes import AttachmentLanes, aligned
 
 
 class ModeUnits:
@@ -20,19 +22,24 @@ class ModeUnits:
     Parameters
     ----------
     matrices : StepMatrices
+    attachments : AttachmentLanes
     kernels : module
 
     Attributes
     ----------
     arrays : Modes
         See `models.catenary.step.mode_kernels`.
+    carried : ndarray, shape (kinds,)
+        a2 / mu for every kind of damping.
     table : ndarray
         See `models.catenary.step.mode_kernels.advance`; of a line at rest.
-    slots, rate, momentum, held : ndarray of int, shape (n_modes,)
-        Where in it the amplitudes of the modes are, their rates, momenta and changes.
+    slots : ndarray of int, shape (n_modes,)
+        Number of every mode, counted over all lanes of all units.
+    amplitude, rate : ndarray of int, shape (n_modes,)
+        Where in the table the amplitudes of the modes are, and their rates.
     """
 
-    def __init__(self, matrices: StepMatrices, kernels: ModuleType) -> None:
+    def __init__(self, matrices: StepMatrices, attachments: AttachmentLanes, kernels: ModuleType) -> None:
         modes, newmark, coupling = matrices.modes, matrices.newmark, matrices.coupling
         lanes, width = kernels.LANES, kernels.ENDS
         first, unit = _first_modes(modes, lanes)
@@ -54,34 +61,43 @@ class ModeUnits:
         # A new group where the ends or the damping are others.
         is_new = (np.diff(where, prepend=-1) != 0) | (np.diff(damping, axis=0, prepend=np.nan) != 0.0).any(axis=1)
         groups, group = np.flatnonzero(is_new), np.cumsum(is_new) - 1
-        (alpha, beta), a2 = damping[groups].T, np.full(len(groups), newmark.a2)
+        of_kinds, kinds = np.unique(damping[groups], axis=0, return_inverse=True)
+        kinds, (alpha, beta) = kinds.ravel(), of_kinds.T
         # K_hat = lambda (1 + a1 alpha) + mu
         mu, stiff = newmark.a0 + newmark.a1 * beta, -2.0 / (1.0 + newmark.a1 * alpha)
-        places, shares = _turned(modes.turn, np.concatenate([where[groups], end])[:, None] + np.arange(width))
+        kinds_of_rows = np.concatenate([kinds, kinds[group[pairs[:, 0]]]])
+        rows = np.concatenate([where[groups], end])[:, None] + np.arange(width)
+        turned, ends, places, shares = _turned(sp.csr_matrix(modes.turn), rows, kinds_of_rows, lanes)
+        self.rows_of_ends = len(rows) + 1
+        self.carried = newmark.a2 / mu
         self.arrays = kernels.Modes(
             first=np.append(groups, n_units).astype(np.uint64),
-            rates=np.stack([newmark.a1 / mu, a2, newmark.a2 / mu, stiff, -stiff * mu], axis=1).ravel(),
-            places=places[: len(groups)].ravel(),
-            shares=shares[: len(groups)].ravel(),
+            rates=np.stack([np.full(len(mu), newmark.a2), self.carried, stiff, -stiff * mu], axis=1).ravel(),
             more=np.stack([pairs[:, 0], group[pairs[:, 0]]], axis=1).astype(np.uint64).ravel(),
-            more_coupling=aligned(more),
-            more_places=places[len(groups) :].ravel(),
-            more_shares=shares[len(groups) :].ravel(),
+            coupling=aligned(more),
+            kinds=kinds.astype(np.uint64),
+            turned=turned.astype(np.uint64),
+            ends=ends.astype(np.uint32).ravel(),
+            places=attachments.slots[places].astype(np.uint32).ravel(),
+            shares=shares.ravel(),
         )
-        begin = unit * kernels.ROWS * lanes + lane
-        self.slots, self.rate, self.momentum, self.held = (
-            begin + row * lanes for row in (kernels.AMPLITUDE, kernels.RATE, kernels.MOMENTUM, kernels.HELD)
-        )
+        self.slots, begin = unit * lanes + lane, unit * kernels.ROWS * lanes + lane
+        self.amplitude, self.rate = begin + kernels.AMPLITUDE * lanes, begin + kernels.RATE * lanes
         self.table = table.ravel()
         self.table[begin + kernels.INVERSE * lanes] = matrices.inverse
-        self.step, self._matrices = newmark.step, matrices
+        self.step, self.rows = newmark.step, kernels.ROWS
+        self.attachments, self._matrices = attachments, matrices
 
-    def prepared(self, modal: FloatArray, momentum: FloatArray) -> FloatArray:
-        """Return what a motion does in the next step, were the attachments held; see `PackedMotion.prepared`."""
+    def pull(self, modal: FloatArray) -> FloatArray:
+        """Return ``pull`` of the kernels' `advance` for a motion of the modes."""
         of, a2 = self._matrices, self._matrices.newmark.a2
-        held = of.inverse * (a2 * momentum - 2.0 * of.modes.eigenvalue * modal[0])
-        pull = of.modes.turn.T @ (of.coupling.T @ (a2 / of.mu * modal[1] - held))
-        return np.concatenate(([self.step], held, pull))
+        held = of.inverse * (a2 * modal[1] - 2.0 * of.modes.eigenvalue * modal[0])
+        return self.attachments.laid_out(of.modes.turn.T @ (of.coupling.T @ (a2 / of.mu * modal[1] - held)))
+
+    def momentum(self, rates: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Return the momentum q' + G x' from rates of the modes and velocities of the attachments."""
+        modes = self._matrices.modes
+        return np.asarray(rates + modes.coupling @ (modes.turn @ velocity))
 
 
 def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:
@@ -93,49 +109,89 @@ def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:
     return np.array(first, dtype=np.int64), np.cumsum(unit)
 
 
-def _turned(turn: sp.csr_matrix, ends: IntArray) -> tuple[Any, FloatArray]:
-    """Return which two displacements of attachments each end moves with, and how, both of shape (N, 2 n_ends)."""
-    rows = sp.csr_matrix(turn)
-    counts = np.diff(rows.indptr)
-    assert counts.max(initial=0) <= 2, "an interval is turned in plan alone"
-    places, shares = np.zeros((rows.shape[0], 2), dtype=np.uint32), np.zeros((rows.shape[0], 2))
-    for k in (1, 0):  # where there is one alone, it is written to both places, and counts once
-        has = counts > k
-        at = rows.indptr[:-1][has]
-        places[has, k], shares[has, k] = rows.indices[at + k], rows.data[at + k]
-    places[counts == 1, 1] = places[counts == 1, 0]
-    return places[ends].reshape(len(ends), -1), shares[ends].reshape(len(ends), -1)
+def _turned(turn: sp.csr_matrix, rows: IntArray, kinds: IntArray, lanes: int) -> tuple[IntArray, Any, Any, FloatArray]:
+    """Return ``turned``, ``ends``, ``places`` and ``shares`` of `Modes`.
+
+    Two ends in the axes of their interval, x and y, are two displacements turned: (c, s) and (-s, c). Others, which
+    move as one displacement, make pairs with a sine of 0; one that is left over makes one with what is not needed.
+
+    Parameters
+    ----------
+    turn : sparse, shape (n_ends, n_attached)
+    rows : ndarray of int, shape (N, 6)
+        Which ends are in the rows.
+    kinds : ndarray of int, shape (N,)
+        Of the damping of what moves with them.
+    """
+    number = (np.arange(len(rows))[:, None] * lanes + np.arange(rows.shape[1])).ravel()
+    kind, end = np.repeat(kinds, rows.shape[1]), rows.ravel()
+    count, begin = np.diff(turn.indptr)[end], turn.indptr[end]
+    assert count.max(initial=0) <= 2, "an interval is turned in plan alone"
+    place, share = np.zeros((len(end), 2), dtype=np.int64), np.zeros((len(end), 2))
+    for k in range(2):
+        place[count > k, k], share[count > k, k] = turn.indices[begin[count > k] + k], turn.data[begin[count > k] + k]
+    single, second = count < 2, (np.abs(share[:, 1]) > np.abs(share[:, 0])).astype(np.int64)
+    share[second == 1] = share[second == 1][:, ::-1] * (1.0, -1.0)
+    keys = np.column_stack([kind, np.where(single[:, None], -1, place), share])
+    key = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    second[single] = _ranks(key)[single] % 2
+    ranks = _ranks(2 * key + second)
+    whole, pair = np.unique(np.column_stack([key, ranks]), axis=0, return_inverse=True)
+    pair = pair.ravel()
+    ends, places = np.full((len(whole), 2), len(rows) * lanes), np.zeros((len(whole), 2), dtype=np.int64)
+    shares, of_kind = np.zeros((len(whole), 2)), np.zeros(len(whole), dtype=np.int64)
+    ends[pair, second], shares[pair], of_kind[pair] = number, share, kind
+    places[pair[~single]] = place[~single]
+    places[pair[single], second[single]] = place[single, 0]
+    return np.searchsorted(of_kind, np.arange(kinds.max() + 2)), ends, places, shares
+
+
+def _ranks(values: IntArray) -> IntArray:
+    """Return how many of the values before each are the same."""
+    order = np.argsort(values, kind="stable")
+    first = np.diff(values[order], prepend=values.min() - 1) != 0
+    result = np.empty_like(values)
+    result[order] = np.arange(len(values)) - np.flatnonzero(first)[np.cumsum(first) - 1]
+    return result
 
 
 class PackedMotion:
-    """The modal part of a motion in units, kept so from step to step.
+    """A motion in units and lanes, kept so from step to step.
+
+    Parameters
+    ----------
+    units : ModeUnits
+    motion : LineMotion
+        What it is made of, and what its attachments' motion is copied to.
 
     Attributes
     ----------
-    units : ModeUnits
-    table, pull : ndarray
-        See `models.catenary.step.mode_kernels.advance`.
+    units
+        The parameter.
+    book : ArrayBook
+        Of `Moving` of the kernels.
     moved : bool
         Whether the motion has changed since it was last unpacked.
     """
 
-    def __init__(self, units: ModeUnits, modal: FloatArray, momentum: FloatArray, prepared: FloatArray) -> None:
-        self.units, self.moved = units, False
-        self.table = aligned(units.table)
-        self.table[units.slots], self.table[units.rate] = modal
-        self.table[units.momentum] = momentum
-        if not prepared.size or prepared[0] != units.step:
-            prepared = units.prepared(modal, momentum)
-        self.table[units.held], self.pull = np.split(prepared[1:], [len(momentum)])
+    def __init__(self, units: ModeUnits, motion: LineMotion) -> None:
+        self.units, self.moved, self._attached = units, False, motion.attached
+        prepared, (modal, _) = motion.prepared, motion.plain()
+        self._table = aligned(units.table)
+        self._table[units.amplitude], self._table[units.rate] = modal
+        is_known = prepared.size and prepared[0] == units.step
+        self._pull = aligned(prepared[1:]) if is_known else units.pull(modal)
+        x, v = (units.attachments.laid_out(part) for part in motion.attached)
+        self.book = ArrayBook((x, v, self._table, np.zeros(units.table.size // units.rows), self._pull), ())
 
     def unpack(self, modal: FloatArray, momentum: FloatArray) -> None:
         """Put it into the arrays of a `LineMotion`."""
         if self.moved:
-            np.take(self.table, self.units.slots, out=modal[0])
-            np.take(self.table, self.units.rate, out=modal[1])
-            np.take(self.table, self.units.momentum, out=momentum)
+            np.take(self._table, self.units.amplitude, out=modal[0])
+            np.take(self._table, self.units.rate, out=modal[1])
+            momentum[...] = self.units.momentum(modal[1], self._attached[1])
             self.moved = False
 
     def prepared(self) -> FloatArray:
-        """Return what has been found for the next step: step size, changes of the modes, forces on the attachments."""
-        return np.concatenate(([self.units.step], self.table[self.units.held], self.pull))
+        """Return what has been found for the next step: step size, and forces on the attachments."""
+        return np.concatenate(([self.units.step], self._pull))

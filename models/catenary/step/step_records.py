@@ -28,7 +28,7 @@ class StepRecords:
     compliance : Compliance
         Of the attachments.
     slots : ndarray of int, shape (n_modes,)
-        Where the amplitudes of the modes are in the kernels' table.
+        Numbers of the modes in the kernels' units.
 
     Attributes
     ----------
@@ -86,7 +86,12 @@ class StepRecords:
         whole = (*size, len(columns.dropper_index)), slots, interval.ends, columns.dropper_index
         places = interval.plan, interval.plan_static, interval.height, interval.height_static
         moved = response.yielding, response.at_ends, columns.values.T, columns.dropper_force.T
-        self._add(self.arrays[2], number, whole, (*places, *moved))
+        self._add(self.arrays[2], number, whole, (*self._of_modes(interval.modes), *places, *moved))
+
+    def _of_modes(self, span: slice) -> tuple[FloatArray, ...]:
+        """Return how modes give way to a force, to a displacement of their own and to a velocity of their ends."""
+        matrices, inverse = self._matrices, self._matrices.inverse[span]
+        return inverse, -2.0 * matrices.modes.eigenvalue[span] * inverse, matrices.newmark.a2 / matrices.mu[span]
 
     def add_dropper(self, index: int) -> None:
         """Make the record of a dropper; see `Dropper` of the kernels."""

@@ -98,7 +98,8 @@ for _operation in (operator.add, operator.iadd):
     _arithmetic(_operation, "fadd")
 for _operation in (operator.sub, operator.isub):
     _arithmetic(_operation, "fsub")
-_arithmetic(operator.mul, "fmul")
+for _operation in (operator.mul, operator.imul):
+    _arithmetic(_operation, "fmul")
 
 
 def _eight(builder, number):
@@ -118,16 +119,36 @@ def nothing(typing):
     return vector(), generate
 
 
+#: How sums of eight numbers are halved, those of two vectors side by side: distance of what is added, and places.
+_HALVINGS = (
+    (1, (0, 8, 2, 10, 4, 12, 6, 14)),
+    (2, (0, 1, 8, 9, 4, 5, 12, 13)),
+    (4, (0, 1, 2, 3, 8, 9, 10, 11)),
+)
+
+
+def _shuffled(builder, one, other, places):
+    """Return eight of the sixteen numbers of two vectors."""
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [ir.Constant(ir.IntType(32), place) for place in places])
+    return builder.shuffle_vector(one, other, mask)
+
+
 @intrinsic
-def total(typing, value):
-    """Return the sum of the eight numbers."""
-    name, kind = "llvm.vector.reduce.fadd.v8f64", ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), _EIGHT])
+def totals(typing, t0, t1, t2, t3, t4, t5):
+    """Return the sums of six times eight numbers, and two zeros."""
 
     def generate(context, builder, signature, arguments):
-        reduce = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
-        return builder.call(reduce, [ir.Constant(ir.DoubleType(), -0.0), arguments[0]], fastmath=SUMS)
+        sums = list(arguments)
+        for distance, places in _HALVINGS:
+            sums += [ir.Constant(_EIGHT, None)] * (len(sums) % 2)
+            pairs = zip(sums[::2], sums[1::2], strict=True)
+            sums = [
+                builder.fadd(*(_shuffled(builder, *pair, [k + far for k in places]) for far in (0, distance)), SUMS)
+                for pair in pairs
+            ]
+        return sums[0]
 
-    return types.float64(value), generate
+    return vector(t0, t1, t2, t3, t4, t5), generate
 
 
 #: What arrays of a book hold: numbers, whole numbers, such from 0, and such in 32 bits, where less to read counts.

@@ -89,6 +89,27 @@ class State(NamedTuple):
     w: FloatArray
 
 
+class Placed(NamedTuple):
+    """What follows from a state alone, whatever acts.
+
+    Attributes
+    ----------
+    kinematics : Kinematics
+    vectors : MovingVectors
+    roots : ndarray, shape (n, 6, 6)
+        See `Mechanism.roots`.
+    constraints : ConstraintValues
+    scaled : ndarray, shape (m, 6 n)
+        Phi_q with respect to scaled body coordinates.
+    """
+
+    kinematics: Kinematics
+    vectors: MovingVectors
+    roots: FloatArray
+    constraints: ConstraintValues
+    scaled: FloatArray
+
+
 class Evaluation(NamedTuple):
     """The equations of motion at one instant.
 
@@ -458,9 +479,15 @@ class Mechanism:
 
     def scaled_jacobian(self, y: FloatArray) -> tuple[ConstraintValues, FloatArray]:
         """Return constraint values and Phi_q W, shape (m, 6 n): with respect to scaled body coordinates."""
+        placed = self.placed(y)
+        return placed.constraints, placed.scaled
+
+    def placed(self, y: FloatArray) -> Placed:
+        """Return what follows from a state alone, for those who ask it for several things."""
         kinematics = self.kinematics(y)
-        values = self.constraint_values(kinematics)
-        return values, self._scaled(values.jacobian, self.roots(kinematics.frames))
+        vectors, roots = self.pool.evaluate(kinematics), self.roots(kinematics.frames)
+        values = self.constraints.evaluate(vectors)
+        return Placed(kinematics, vectors, roots, values, self._scaled(values.jacobian, roots))
 
     def _scaled(self, jacobian: FloatArray, W: FloatArray) -> FloatArray:
         scaled: FloatArray = (jacobian.transpose(1, 0, 2) @ W).transpose(1, 0, 2).reshape(len(jacobian), 6 * self.count)

@@ -112,7 +112,11 @@ def null_space(mechanism: Mechanism, y: FloatArray) -> FloatArray:
 
     Its columns are velocities with M-norm 1; bodies of prescribed motion stand still.
     """
-    _, scaled = mechanism.scaled_jacobian(y)
+    return free_motions(mechanism, mechanism.scaled_jacobian(y)[1])
+
+
+def free_motions(mechanism: Mechanism, scaled: FloatArray) -> FloatArray:
+    """Return the same for the constraints' Jacobian in scaled coordinates, shape (m, 6 n)."""
     free = scaled[:, 6 * mechanism.driven :]
     _, singular, right = np.linalg.svd(free, full_matrices=True)
     rank = int((singular > 1e-9 * singular.max(initial=0.0)).sum())

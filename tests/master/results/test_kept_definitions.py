@@ -60,3 +60,9 @@ def test_other_sources_and_comments_are_no_other_line(run):
 def test_what_was_not_kept_is_told(run):
     runs = [run("before", None), run("after", LN2)]
     assert differing_definitions(runs) == [("catenary: definition", "not kept with the run", "kept")]
+
+
+def test_a_component_that_a_run_does_not_have_is_not_one_whose_definition_it_has_not_kept(run):
+    runs = [run("before", LN2), run("after", None)]
+    del runs[1].summary["components"][1]
+    assert differing_definitions(runs) == []

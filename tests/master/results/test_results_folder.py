@@ -1,11 +1,12 @@
 """The results folder of a run: whose it is, and what a claim leaves in it."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from master.errors import RequestError
-from master.results.results_folder import GENERATOR, RunFolder, claimed_for_run
+from master.results.results_folder import GENERATOR, SUMMARY, RunFolder, claimed_for_run, contents_of
 
 
 def summary_of(run):
@@ -25,7 +26,30 @@ def test_a_new_run_finds_its_folder_empty_and_gets_its_own_identity(tmp_path):
         (folder / "notes.txt").write_text("the user's")
     with claimed_for_run(folder) as second:
         assert second.run != first.run
-        assert [p.name for p in folder.iterdir() if not p.name.startswith(".")] == ["notes.txt"]
+        assert sorted(p.name for p in folder.iterdir() if not p.name.startswith(".")) == ["notes.txt", SUMMARY]
+        assert contents_of(folder / SUMMARY) == {**summary_of(first.run), "status": "running"}
+
+
+@pytest.mark.parametrize("removed", range(4))
+def test_whoever_is_killed_while_old_results_are_removed_leaves_a_folder_of_ours(tmp_path, monkeypatch, removed):
+    with claimed_for_run(tmp_path) as own:
+        own.write_summary({**summary_of(own.run), "status": "complete"})
+    for name in ("notes.txt", "timeseries.csv", "report.html", "force.png", "checkpoint.state"):
+        (tmp_path / name).write_text("there")
+    results, unlink = iter(range(removed)), Path.unlink
+
+    def kill(path):
+        if not path.name.startswith(".") and next(results, None) is None:
+            raise KeyboardInterrupt
+        unlink(path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", kill)
+        with pytest.raises(KeyboardInterrupt), claimed_for_run(tmp_path):
+            pass
+    assert contents_of(tmp_path / SUMMARY)["status"] == "running"
+    with claimed_for_run(tmp_path):
+        assert sorted(p.name for p in tmp_path.iterdir() if not p.name.startswith(".")) == ["notes.txt", SUMMARY]
 
 
 def test_a_run_knows_whether_its_results_still_lie_there(tmp_path):

@@ -16,7 +16,12 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.numerics.cubic_curve import CubicCurve
-from models.pantograph.multibody.analysis.mechanism_statics import Equilibrium, equilibrium_where, settle_springs
+from models.pantograph.multibody.analysis.mechanism_statics import (
+    ITERATIONS,
+    Equilibrium,
+    equilibrium_where,
+    settle_springs,
+)
 from models.pantograph.multibody.elements.angle_elements import BodyAngle, Cam, PointDistance
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
 from models.pantograph.multibody.mechanism_definition import (
@@ -31,6 +36,8 @@ from models.pantograph.multibody.mechanism_definition import (
 _POINTS: Final = 41
 #: Step on the way to the ends of a working range that no stop gives: of angles [rad], of lengths [m].
 _STEP: Final = {True: np.radians(1.0), False: 0.005}
+#: Iterations within which an equilibrium a step away is found if there is one: eight at most are seen, of sixty.
+_NEXT: Final = 20
 #: Longest way from one equilibrium to the next [rad or m].
 _STAGE: Final = 0.1
 #: Rise of the strip per angle below which the arms are at a dead centre [m/rad]; per length [1].
@@ -209,11 +216,15 @@ def _held_at(mechanism: Mechanism, standing: FloatArray, places: FloatArray, for
     return [*reversed(sides[1]), *sides[0]]
 
 
-def _held(mechanism: Mechanism, place: float, start: FloatArray, force: float, lift: float) -> Equilibrium:
+def _held(
+    mechanism: Mechanism, place: float, start: FloatArray, force: float, lift: float, iterations: int = ITERATIONS
+) -> Equilibrium:
     where = _place(mechanism)
-    return equilibrium_where(
-        mechanism, lambda y: where.at(mechanism.kinematics(y)) - place, start, contact_force=force, lift=lift
-    )
+
+    def beyond(y: FloatArray) -> float:
+        return where.at(mechanism.kinematics(y)) - place
+
+    return equilibrium_where(mechanism, beyond, start, contact_force=force, lift=lift, iterations=iterations)
 
 
 def strip_height_where(mechanism: Mechanism, standing: FloatArray, place: float) -> float:
@@ -251,7 +262,7 @@ def reach(mechanism: Mechanism, standing: FloatArray, way: float, steep: float =
     left = stops.touched(standing)  # it is to come away from them
     while abs(step) >= smallest:
         try:
-            found = _held(mechanism, place + step, y, 0.0, 0.0)
+            found = _held(mechanism, place + step, y, 0.0, 0.0, _NEXT)
         except (MechanismError, np.linalg.LinAlgError):
             step *= 0.5
             continue

@@ -92,11 +92,17 @@ def linearise(mechanism: Mechanism, y: FloatArray, inputs: Inputs) -> LinearMode
 
 
 def stiffness(mechanism: Mechanism, y: FloatArray, inputs: Inputs, basis: FloatArray) -> FloatArray:
-    """Return K, shape (d, d): the change of the joints' and applied loads, with opposite sign, along the basis.
+    """Return K, shape (d, d): the change of the joints' and applied loads, with opposite sign, along the basis."""
+    return stiffness_under(mechanism, y, inputs, basis, static_multipliers(mechanism, y, inputs))
 
-    Away from an equilibrium it is the one that suits Newton's method there.
+
+def stiffness_under(
+    mechanism: Mechanism, y: FloatArray, inputs: Inputs, basis: FloatArray, multipliers: FloatArray
+) -> FloatArray:
+    """Return K under known loads of the joints, multipliers of shape (m,).
+
+    Away from an equilibrium, under those that balance the applied loads best, it suits Newton's method there.
     """
-    multipliers = static_multipliers(mechanism, y, inputs)
 
     def load(scaled: FloatArray) -> FloatArray:
         moved = mechanism.moved(y, scaled)
@@ -127,11 +133,14 @@ def damping(mechanism: Mechanism, y: FloatArray, inputs: Inputs, basis: FloatArr
 
 def static_multipliers(mechanism: Mechanism, y: FloatArray, inputs: Inputs) -> FloatArray:
     """Return the lambda that balance the applied loads best, shape (m,); exactly in an equilibrium."""
-    kinematics = mechanism.kinematics(y)
-    _, scaled = mechanism.scaled_jacobian(y)
-    loads = mechanism.loads(y, kinematics, inputs)
-    scaled_loads = (loads[:, None, :] @ mechanism.roots(kinematics.frames)).ravel()
-    multipliers: FloatArray = np.linalg.solve(scaled @ scaled.T, scaled @ scaled_loads).view(np.float64)
+    placed = mechanism.placed(y)
+    loads = mechanism.loads(y, placed.kinematics, inputs, placed.vectors)
+    return balancing_multipliers(placed.scaled, (loads[:, None, :] @ placed.roots).ravel())
+
+
+def balancing_multipliers(scaled: FloatArray, loads: FloatArray) -> FloatArray:
+    """Return them for the constraints' Jacobian (m, 6 n) and the loads (6 n,), both in scaled coordinates."""
+    multipliers: FloatArray = np.linalg.solve(scaled @ scaled.T, scaled @ loads).view(np.float64)
     return multipliers
 
 

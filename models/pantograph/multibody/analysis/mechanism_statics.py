@@ -10,11 +10,19 @@ from typing import Final
 import numpy as np
 
 from models.arrays import FloatArray
-from models.pantograph.multibody.analysis.linearisation import stiffness
-from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_assembly import assemble, check_strip, coordinate, null_space, project
+from models.pantograph.multibody.analysis.linearisation import balancing_multipliers, stiffness_under
+from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError, Placed
+from models.pantograph.multibody.mechanism_assembly import (
+    assemble,
+    check_strip,
+    coordinate,
+    free_motions,
+    null_space,
+    project,
+)
 
-_ITERATIONS: Final = 60
+#: Of Newton's method, after which there is held to be no equilibrium.
+ITERATIONS: Final = 60
 #: Largest change of height from one solution to the next on the way to a distant one [m].
 _STAGE: Final = 0.05
 #: Degrees of freedom of a pantograph that is one: raise, heave and roll of the head.
@@ -95,8 +103,9 @@ def equilibrium(
 
 
 def equilibrium_where(
-    mechanism: Mechanism, condition: Condition, start: FloatArray, *, contact_force: float = 0.0, lift: float = 0.0
-) -> Equilibrium:
+    mechanism: Mechanism, condition: Condition, start: FloatArray, *, contact_force: float = 0.0, lift: float = 0.0,
+    iterations: int = ITERATIONS,
+) -> Equilibrium:  # fmt: skip
     """Find the lifting value that balances the mechanism where a condition on its configuration holds.
 
     Parameters
@@ -107,12 +116,19 @@ def equilibrium_where(
         A state nearby.
     lift : float
         The lifting value to begin with [N or N.m].
+    iterations : int
+        After how many there is held to be none.
+
+    Raises
+    ------
+    MechanismError
+        If there is none.
     """
 
     def inputs(value: float) -> Inputs:
         return Inputs(lift=value, force=contact_force)
 
-    y, lift = _solve(mechanism, start, inputs, lift, condition)
+    y, lift = _solve(mechanism, start, inputs, lift, condition, iterations)
     return Equilibrium(y, inputs(lift), mechanism.strip_height(y))
 
 
@@ -256,21 +272,25 @@ def _solve(
     inputs_of: Callable[[float], Inputs],
     unknown: float,
     condition: Condition,
+    iterations: int = ITERATIONS,
 ) -> tuple[FloatArray, float]:
     """Solve by Newton's method for the configuration and one unknown input, in the motions that the joints allow.
 
     The loads are linear in the unknown; each step is limited so that bodies turn and move by little.
     """
     scale = float(np.abs(mechanism.mass).sum() * mechanism.definition.gravity) or 1.0
-    for _ in range(_ITERATIONS):
-        basis = null_space(mechanism, y)
-        load = _reduced(mechanism, y, inputs_of(unknown), basis)
-        by_unknown = _reduced(mechanism, y, inputs_of(unknown + 1.0), basis) - load
+    for _ in range(iterations):
+        placed = mechanism.placed(y)
+        basis = free_motions(mechanism, placed.scaled)
+        loads = _scaled_loads(mechanism, y, inputs_of(unknown), placed)
+        load = basis.T @ loads
         gap = condition(y)
         if np.abs(load).max() <= _BALANCED * scale and abs(gap) <= 1e-12:
             return y, unknown
+        by_unknown = basis.T @ _scaled_loads(mechanism, y, inputs_of(unknown + 1.0), placed) - load
         slope = _slope(mechanism, y, basis, condition)
-        K = stiffness(mechanism, y, inputs_of(unknown), basis)
+        multipliers = balancing_multipliers(placed.scaled, loads)
+        K = stiffness_under(mechanism, y, inputs_of(unknown), basis, multipliers)
         system = np.block([[K, -by_unknown[:, None]], [slope[None, :], np.zeros((1, 1))]])
         step = np.linalg.lstsq(system, np.append(load, -gap), rcond=1e-13)[0]
         shifts, turns = mechanism.unscaled(basis @ step[:-1])
@@ -284,12 +304,10 @@ def _solve(
     )
 
 
-def _reduced(mechanism: Mechanism, y: FloatArray, inputs: Inputs, basis: FloatArray) -> FloatArray:
-    """Return the loads' components along the basis, shape (d,)."""
-    kinematics = mechanism.kinematics(y)
-    loads = mechanism.loads(y, kinematics, inputs)
-    reduced: FloatArray = basis.T @ (loads[:, None, :] @ mechanism.roots(kinematics.frames)).ravel()
-    return reduced
+def _scaled_loads(mechanism: Mechanism, y: FloatArray, inputs: Inputs, placed: Placed) -> FloatArray:
+    """Return the applied loads in scaled coordinates, shape (6 n,)."""
+    loads = mechanism.loads(y, placed.kinematics, inputs, placed.vectors)
+    return (loads[:, None, :] @ placed.roots).ravel()
 
 
 def _slope(mechanism: Mechanism, y: FloatArray, basis: FloatArray, condition: Condition) -> FloatArray:

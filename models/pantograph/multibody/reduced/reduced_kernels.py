@@ -29,7 +29,7 @@ def put(target, values):
 
 
 #: What is called from Python, and what by other kernels alone: nothing is made for Python then, which takes long.
-_FOR_PYTHON = ("look_up", "lift_value", "evaluate", "begin", "step", "is_free", "place_strip", "place_bodies")
+_FOR_PYTHON = ("look_up", "lift_value", "begin", "step", "is_free", "place_strip", "place_bodies")
 _compiled = njit(cache=True, error_model="numpy")
 _part = njit(  # type: ignore[call-overload]
     error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True

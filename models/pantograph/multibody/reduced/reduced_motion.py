@@ -258,9 +258,17 @@ class ReducedMotion:
     def evaluate(
         self, y: FloatArray, acting: tuple[float, float, float, float, float]
     ) -> tuple[FloatArray, FloatArray]:
-        """Return accelerations (n,) and their response (3 n,); see `reduced_equations.evaluate`."""
-        acceleration, response = self._equations.evaluate(self._rows(y), acting, self._numbers, True)
-        return np.array(acceleration), np.array(response)
+        """Return accelerations (n,) and their response (3 n,) in a state; see `reduced_equations.evaluate`.
+
+        By beginning there under inputs that are held: the equations themselves are compiled for other kernels alone.
+        """
+        force, lateral, base, lift, uplift = acting
+        held = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, force, 0.0, 0.0, 0.0, lateral, 0.0, 0.0, 0.0, 0.0, 0.5 * base, 0.0]
+        memory = tuple(part.copy() for part in self.memory)
+        memory[0][:] = self._rows(y)
+        given = self._inputs([*held, lift, lift, 0.0, 0.0, uplift, 0.0])
+        self._equations.begin(memory, given, self._numbers, self._settings)
+        return np.array(memory[1]), np.array(memory[2])
 
     def begin(self, given: list[float]) -> None:
         """Begin at rest where all coordinates are 0; ``given`` as in ``step``."""

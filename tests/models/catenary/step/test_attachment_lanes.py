@@ -50,13 +50,11 @@ def test_products_and_solutions_are_those_of_the_matrices(n, width, is_ring, com
     load = rng.standard_normal(n) * np.sqrt(matrix.diagonal())
     expected = np.linalg.solve(matrix.toarray(), load)
     assert lanes.solve(load) == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
-    arrays, work = lanes.arrays, lanes.work
-    attached, pressed, pull = rng.standard_normal((2, n)), rng.standard_normal(n), rng.standard_normal(n)
-    for part in work:
-        part[:] = 0.0
-    compiled_kernels.load(arrays, attached, pressed, pull, work)
-    expected = (stiff @ attached[0] + heavy @ attached[1] + pressed + pull)[arrays.order]
-    assert work.right[arrays.slot] == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max())
+    x, v, right = rng.standard_normal((3, n))
+    laid_out = [lanes.laid_out(values) for values in (x, v, right)]
+    compiled_kernels.multiply(lanes.arrays, *laid_out)
+    expected = stiff @ x + heavy @ v + right
+    assert laid_out[2][lanes.slots] == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("is_ring", [False, True])

@@ -259,11 +259,7 @@ def test_supports_and_anchors_carry_the_weight(name):
     values = {f"irregularity.{kind}_sigma": 0.01 for kind in ("dropper_length", "support_height")}
     line = shortened(name, None if IS_LONG else 10)
     design = design_of(line.with_values(values | {"irregularity.seed": 2}))
-    condition = find_condition(
-        dataclasses.replace(
-            design, shape=dataclasses.replace(design.shape, definition=with_faults(design.shape.definition, broken(2, span=5)))
-        )
-    )
+    condition = changed(design, with_faults(design.shape.definition, broken(2, span=5)))
     shape = condition.shape
     force = shape.matrices.K @ condition.displacement + shape.droppers.rows.T @ condition.dropper_force
     unbalanced = (force - shape.matrices.load).reshape(-1, NODE_DOFS)[:, 2]

@@ -53,7 +53,7 @@ TIERS: dict[str, list[set[str]]] = {
         {"mechanism_definition", "base_motion"},
         {"mechanism_reading", "elements"},
         {"mechanism"},
-        {"mechanism_assembly", "mechanism_energy"},
+        {"mechanism_assembly", "mechanism_energy", "last_found"},
         {"analysis", "mechanism_integrator"},
         {"mechanism_advice", "step_memory", "range_watch", "reduced"},
         {"compiled"},

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -23,14 +22,9 @@ from models.pantograph.multibody.analysis.mechanism_statics import (
     settle_springs,
 )
 from models.pantograph.multibody.elements.angle_elements import BodyAngle, Cam, PointDistance
+from models.pantograph.multibody.last_found import LastFound
 from models.pantograph.multibody.mechanism import Mechanism, MechanismError
-from models.pantograph.multibody.mechanism_definition import (
-    AngleStop,
-    BumpStop,
-    CamTable,
-    LiftingMoment,
-    MechanismDefinition,
-)
+from models.pantograph.multibody.mechanism_definition import AngleStop, BumpStop, CamTable, LiftingMoment
 
 #: Points of a cam that is found, over the working range.
 _POINTS: Final = 41
@@ -51,28 +45,8 @@ _CLOSE: Final = 0.1
 _ROUNDS: Final = 6
 #: Force for which M_1 is found if none is set [N].
 _USUAL_FORCE: Final = 100.0
-#: What says how a pantograph runs, and from where it starts: of no account for its cam. All else counts.
-_OF_A_RUN: Final[dict[str, Any]] = {
-    "speed": 0.0,
-    "start_position": 0.0,
-    "speed_profile": None,
-    "use_train": 0,
-    "reference_height": 0.0,
-    "start_height": None,
-    "raise_start": 0.0,
-    "raise_duration": 0.0,
-    "aerodynamic_uplift": (0.0, 0.0),
-    "knuckle": "leading",
-    "direction": 1,
-    "extrapolation_order": 0,
-    "monitor_energy": 0,
-    "time_step": 0.0,
-    "tolerance": 0.0,
-}
-#: Cams that were found last in this process, by what they depend on, and how many are kept: finding one takes half a
-#: second, and the runs of a sweep, or both pantographs of a train, need the same.
-_found: dict[tuple[MechanismDefinition, bytes], Cam] = {}
-_MOST_FOUND: Final = 8
+#: Finding a cam takes half a second.
+_found: Final = LastFound[Cam]()
 
 
 def stand(mechanism: Mechanism) -> FloatArray:
@@ -144,12 +118,7 @@ def _from_table(mechanism: Mechanism, standing: FloatArray, given: CamTable) -> 
 
 def _constant_force(mechanism: Mechanism, standing: FloatArray) -> Cam:
     """Return the cam that holds the force, for a mechanism whose springs are settled and that has no cam yet."""
-    key = replace(mechanism.definition, **_OF_A_RUN), standing.tobytes()
-    cam = _found.pop(key, None) or _find_constant_force(mechanism, standing)
-    _found[key] = cam
-    while len(_found) > _MOST_FOUND:
-        _found.pop(next(iter(_found)))
-    return cam
+    return _found.of(mechanism, standing, lambda: _find_constant_force(mechanism, standing))
 
 
 def _find_constant_force(mechanism: Mechanism, standing: FloatArray) -> Cam:

@@ -11,6 +11,7 @@ from models.arrays import FloatArray, Snapshot
 from models.numerics.cubic_curve import CubicCurve
 from models.numerics.kernel_cache import kernels_if_wanted
 from models.pantograph.multibody.elements.rotations import cross
+from models.pantograph.multibody.last_found import LastFound
 from models.pantograph.multibody.mechanism import Mechanism
 from models.pantograph.multibody.mechanism_assembly import project
 from models.pantograph.multibody.mechanism_integrator import VELOCITY_SCALE
@@ -33,6 +34,8 @@ _REASONS: Final = {
     reduced_equations.BEYOND: "the arm is beyond the tables of the reduced form",
 }
 _NO_CURVE: Final = np.zeros((0, 5))
+#: Tabulating an arm takes most of a pantograph's start.
+_tables: Final = LastFound[ArmTables]()
 
 
 class ReducedModel:
@@ -62,7 +65,7 @@ class ReducedModel:
         self._finder = ArmFinder(reduction)
         self._head = HeadChain(mechanism, standing, reduction)
         self._rows: HeadRows = self._head.rows()
-        self._arm: ArmTables = tabulate(reduction, self._finder)
+        self._arm = _tables.of(mechanism, standing, lambda: tabulate(reduction, self._finder))
         self._reduction = reduction
         self.size = 2 + self._rows.displacements
         definition = mechanism.definition

@@ -12,6 +12,7 @@ from models.pantograph.multibody.analysis.cam_design import stand
 from models.pantograph.multibody.analysis.mechanism_rig import Rig
 from models.pantograph.multibody.analysis.mechanism_statics import contact_force_at, equilibrium_where
 from models.pantograph.multibody.analysis.posture import take_posture
+from models.pantograph.multibody.last_found import OF_A_RUN, LastFound
 from models.pantograph.multibody.mechanism import Inputs, Mechanism, MechanismError
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
 from models.pantograph.operation import Drive
@@ -69,8 +70,7 @@ def test_raise_becomes_neutral_and_the_head_swings_as_before():
 def test_a_cam_is_found_once_for_all_runs_of_a_pantograph(monkeypatch):
     """What a run may set leaves no bit of it changed; what the mechanism is changes it."""
     monkeypatch.setattr(cam_design, "_POINTS", 3)
-    monkeypatch.setattr(cam_design, "_MOST_FOUND", 1)
-    monkeypatch.setattr(cam_design, "_found", {})
+    monkeypatch.setattr(cam_design, "_found", LastFound(most=1))
     plain = library("generic_multibody_cam")
     run = {
         "speed": 60.0, "start_position": 30.0, "reference_height": 5.3, "start_height": 4.9, "raise_start": 1.0,
@@ -78,7 +78,7 @@ def test_a_cam_is_found_once_for_all_runs_of_a_pantograph(monkeypatch):
         "extrapolation_order": 1, "monitor_energy": 1, "time_step": 5e-4, "tolerance": 1e-7, "use_train": 1,
         "speed_profile": SpeedProfile(time=(0.0, 1.0), speed=(10.0, 20.0)),
     }  # fmt: skip
-    assert set(run) == set(cam_design._OF_A_RUN)
+    assert set(run) == set(OF_A_RUN)
 
     def fitted(definition):
         mechanism = Mechanism(definition)

@@ -12,11 +12,12 @@ from models.library.catalogue import load_pantograph
 from models.numerics.cubic_curve import CubicCurve
 from models.pantograph.multibody.analysis.posture import take_posture
 from models.pantograph.multibody.elements.angle_elements import PointDistance
+from models.pantograph.multibody.last_found import LastFound
 from models.pantograph.multibody.mechanism import Inputs, Mechanism
 from models.pantograph.multibody.mechanism_assembly import assemble, project
 from models.pantograph.multibody.mechanism_definition import BumpStop
 from models.pantograph.multibody.multibody_part import MultibodyPantographPart
-from models.pantograph.multibody.reduced import reduced_equations
+from models.pantograph.multibody.reduced import reduced_equations, reduced_motion
 from models.pantograph.multibody.reduced.reduced_motion import ReducedModel, ReducedMotion
 from models.pantograph.operation import Drive
 from tests.effort import count
@@ -254,6 +255,21 @@ def test_a_force_from_outside_reaches_the_reduced_form():
     assert auto.form().startswith("reduced form")
     assert auto.strip == pytest.approx(general.strip, abs=1e-8)
     assert auto.observation_values() == pytest.approx(general.observation_values(), abs=1e-4)
+
+
+def test_an_arm_is_tabulated_once_for_all_runs_of_a_pantograph(monkeypatch):
+    """What a run may set leaves no bit of its tables changed; springs of other lengths have others."""
+    monkeypatch.setattr(reduced_motion, "_tables", LastFound(most=2))
+    plain = load_pantograph("CX_multibody")
+    run = plain.with_values({"speed": 20.0, "reference_height": 5.3, "time_step": 5e-4, "raise_duration": 0.7})
+    first, same = (reduced(d)[0]._arm for d in (plain, run))
+    assert same is first
+    assert reduced_as_assembled(plain)[0]._arm is not first
+    assert reduced(plain.with_values({"body.m1.mass": 9.0}))[0]._arm is not first
+    other = reduced(run)[0]._arm
+    assert other is not first  # the two used last alone are kept
+    assert other.functions.cells.tobytes() == first.functions.cells.tobytes()
+    assert other.rows.tobytes() == first.rows.tobytes()
 
 
 def test_numbers_of_functions_are_those_of_the_table():

@@ -170,6 +170,8 @@ def test_statics_of_a_name_that_two_definitions_have_says_which_is_used(call, tm
     assert "two definitions are named 'mine'" in said
     for line in ("new demo --line mine --pantograph CX --speed 160", "new-line copy --like mine"):
         assert "two definitions are named 'mine'" in call(line)[2]
+    said = call("new cx_ln2 --line EN50318_2002 --pantograph CX --speed 160")[2]
+    assert "note: 'cx_ln2' is a scenario of the library too" in said
 
 
 def test_a_definition_that_does_not_build_is_answered_once(call, tmp_path):

@@ -90,6 +90,7 @@ class PlainStep:
             pull[columns.dropper_index] += columns.dropper_force.dot(force * point.load)
             placed.append((place, point, force))
         self._finish(state, placed, self._local.solve(pull, (), _NO_STRIPS, state.slack))
+        state.impact_velocity[...] = 0.0
 
     def _begin(self, state: CatenaryState) -> FloatArray:
         """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N]."""

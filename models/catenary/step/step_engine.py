@@ -63,7 +63,7 @@ class StepEngine(Protocol):
         """
 
     def push(self, state: CatenaryState, forces: Sequence[GivenForce]) -> None:
-        """Advance the line by one step under forces that are given at its end.
+        """Advance the line by one step under forces that are given at its end, all strips lifted off.
 
         Parameters
         ----------

@@ -200,6 +200,23 @@ def test_given_forces(both, short_line, ring_maker, kind, middle):
     assert slack > 0
 
 
+def test_given_forces_leave_no_strip_closed(both, short_line):
+    """A strip that was closed before them touches anew after them, which a law with restitution minds."""
+    model, engines = both(short_line)
+    states, touched = [model.initial_state() for _ in engines], 0
+    for n in range(12):
+        motion = strips(model, (70.0,), n, lift=0.003)
+        for engine, state in zip(engines, states, strict=True):
+            if n % 4 == 3:
+                touched += state.impact_velocity.max() > 0.0
+                engine.push(state, [(0, 70.0, 900.0)])
+                assert not state.impact_velocity.any()
+            else:
+                engine.step(state, motion)
+        same(*states)
+    assert touched == 6
+
+
 def test_a_force_on_a_wire_that_is_none(both, short_line):
     model, engines = both(short_line)
     for engine in engines:

@@ -549,7 +549,8 @@ def _new(options: argparse.Namespace) -> int:
     if options.folder.name in scenario_names():
         text = f"'{options.folder.name}' is a scenario of the library too; where the project is seen, its own counts"
         print(f"note: {text}", file=sys.stderr)
-    print(f"{options.speed:g} km/h; {options.folder / 'README.md'} says what each file is and what was chosen")
+    page = options.folder / "README.md"
+    print(f"wrote {options.folder} for {options.speed:g} km/h; {page} says what each file is and what was chosen")
     print(f"next: openpanto run {shlex.quote(str(options.folder))}")
     return 0
 

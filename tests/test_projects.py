@@ -38,7 +38,8 @@ def test_every_line_of_the_library_has_room_for_a_train(call, tmp_path, line):
 def test_a_project_is_valid_as_it_is_written(call, tmp_path, pantograph):
     assert call(f"new demo --line EN50318_2002 --pantograph {pantograph} --speed 250") == (
         0,
-        "250 km/h; demo/README.md says what each file is and what was chosen\nnext: openpanto run demo\n",
+        "wrote demo for 250 km/h; demo/README.md says what each file is and what was chosen\n"
+        "next: openpanto run demo\n",
         "",
     )
     code, out, _ = call("validate demo --strict")

@@ -511,6 +511,7 @@ def _new(options: argparse.Namespace) -> int:
     from master.evaluation.en50367_limits import SUPPLIES, LimitChoice, limits_at
     from master.scenario.project import new_project as projects
     from master.scenario.project.stretch import Wire, check_speed
+    from master.scenario.scenario_place import scenario_names
     from models.library import definition_facts as facts
     from models.library.catalogue import line_path, load_line, load_pantograph
 
@@ -545,7 +546,11 @@ def _new(options: argparse.Namespace) -> int:
         _copy_profile(line_path(options.line), options.folder / "lines" / f"{line.name}.toml")
     if doubt := projects.doubt(request):
         print(f"note: {doubt}", file=sys.stderr)
-    print(f"{options.speed:g} km/h; {options.folder / 'README.md'} says what each file is and what was chosen")
+    if options.folder.name in scenario_names():
+        text = f"'{options.folder.name}' is a scenario of the library too; where the project is seen, its own counts"
+        print(f"note: {text}", file=sys.stderr)
+    page = options.folder / "README.md"
+    print(f"wrote {options.folder} for {options.speed:g} km/h; {page} says what each file is and what was chosen")
     print(f"next: openpanto run {shlex.quote(str(options.folder))}")
     return 0
 

@@ -31,5 +31,5 @@ def _hidden() -> Iterator[None]:
 
 
 if "scipy" not in sys.modules:
-    with _hidden(), contextlib.suppress(ImportError):  # another SciPy keeps it elsewhere, or there is none
+    with _hidden(), contextlib.suppress(ImportError, AttributeError):  # another SciPy has it elsewhere, or not at all
         import scipy._lib.array_api_compat.numpy  # noqa: F401

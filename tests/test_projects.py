@@ -38,7 +38,8 @@ def test_every_line_of_the_library_has_room_for_a_train(call, tmp_path, line):
 def test_a_project_is_valid_as_it_is_written(call, tmp_path, pantograph):
     assert call(f"new demo --line EN50318_2002 --pantograph {pantograph} --speed 250") == (
         0,
-        "250 km/h; demo/README.md says what each file is and what was chosen\nnext: openpanto run demo\n",
+        "wrote demo for 250 km/h; demo/README.md says what each file is and what was chosen\n"
+        "next: openpanto run demo\n",
         "",
     )
     code, out, _ = call("validate demo --strict")
@@ -170,6 +171,8 @@ def test_statics_of_a_name_that_two_definitions_have_says_which_is_used(call, tm
     assert "two definitions are named 'mine'" in said
     for line in ("new demo --line mine --pantograph CX --speed 160", "new-line copy --like mine"):
         assert "two definitions are named 'mine'" in call(line)[2]
+    said = call("new cx_ln2 --line EN50318_2002 --pantograph CX --speed 160")[2]
+    assert "note: 'cx_ln2' is a scenario of the library too" in said
 
 
 def test_a_definition_that_does_not_build_is_answered_once(call, tmp_path):

@@ -145,10 +145,12 @@ def loader_library() -> bytes:
 
 
 def _compiler_hash() -> str:
-    """Return what changes with the compiler."""
-    compiler = Path(build_command(Path("loader.so"))[0]).resolve()
+    """Return what changes with the compiler, and with what it is told."""
+    command = build_command(Path("/loader.so"))
+    compiler = Path(command[0]).resolve()
     found = compiler.stat()
-    return hashlib.sha256(f"{compiler} {found.st_size} {found.st_mtime_ns}".encode()).hexdigest()[:16]
+    whole = "\0".join((*command, str(compiler), str(found.st_size), str(found.st_mtime_ns)))
+    return hashlib.sha256(whole.encode()).hexdigest()[:16]
 
 
 def built_name() -> str:

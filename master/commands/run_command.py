@@ -53,6 +53,8 @@ def run_verb(options: argparse.Namespace) -> int:
         keep_apart(folder, scenario.package)
         say_warnings(scenario.system, note)
         with results_folder.claimed(folder):  # until the report is written too
+            if options.out is None and (text := _replaced(folder, scenario.system)):
+                note(f"note: {text}")
             try:
                 done = run_shown(scenario.system, folder, options.quiet, run_options)
             except RunError:
@@ -61,6 +63,10 @@ def run_verb(options: argparse.Namespace) -> int:
                 raise
             _show_results(done, options)
     return 0
+
+
+def _replaced(folder: Path, system: System) -> str:
+    return results_folder.replaced_run(folder, {c.name: c.fmu.definition for c in system.components})
 
 
 def _show_results(done: Results, options: argparse.Namespace) -> None:

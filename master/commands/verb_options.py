@@ -278,7 +278,7 @@ def add_report(verbs: Any) -> None:
     add_figures(parser)
     parser.add_argument("--film", type=Path, metavar="FILE", help="write the moving picture as .gif or .mp4")
     parser.add_argument(
-        "--magnify", type=float, default=8.0, metavar="N", help="of deformations in the film, default 8"
+        "--magnify", type=positive_number, default=8.0, metavar="N", help="of deformations in the film, default 8"
     )
     parser.add_argument("--parquet", action="store_true", help="also write the time series as Parquet")
 

@@ -135,6 +135,26 @@ def claimed(folder: Path) -> Iterator[None]:
         yield
 
 
+def replaced_run(folder: Path, definitions: Mapping[str, str]) -> str:
+    """Return which other run in a results folder a new one replaces, empty if it holds none, or one of the same.
+
+    Parameters
+    ----------
+    folder : Path
+    definitions : mapping
+        File that each component's FMU was made from, by the component's name; empty where it does not say.
+    """
+    components: Any = contents_of(folder / SUMMARY).get("components")
+    try:
+        before = {str(c["name"]): str(c["definition"]) for c in components}
+    except (TypeError, KeyError):
+        return ""
+    others = [file for name, file in before.items() if file and file != definitions.get(name)]
+    if not others:
+        return ""
+    return f"{folder} held a run with {', '.join(others)}, which this one replaces; --out DIR keeps both"
+
+
 @contextmanager
 def taken_over(folder: Path, marker: str, generator: str, kind: str, scenario: str | None = None) -> Iterator[None]:
     """Work alone in a new folder, or in one whose JSON file ``marker`` names its ``generator``; no results are removed.

@@ -217,11 +217,20 @@ def _provide(path: Path, provision: _Provision) -> Fmu | str:
         if provision.build:
             place = fmu_provision.provide_fmu(path, provision.tell, provision.scratch, provision.library)
         if not place.is_file():
-            return "is a folder, not an FMU" if place.is_dir() else "does not exist"
+            return "is a folder, not an FMU" if place.is_dir() else f"does not exist{_without(place, provision)}"
         fmu = read_fmu(place)
         return lacking_binary(place, fmu.identifier) or fmu
     except ValueError as error:
         return str(error)
+
+
+def _without(path: Path, provision: _Provision) -> str:
+    """Return which definition an FMU that is not there would be built from, empty if its name says none."""
+    found = re.fullmatch(r"(?P<kind>Catenary|Pantograph)_(?P<name>\w+?)(_P\d+)?", path.stem)
+    if not provision.build or found is None or not fmu_provision.has_builder():
+        return ""
+    place = f"{'lines' if found['kind'] == 'Catenary' else 'pantographs'}/{found['name']}.toml"
+    return f", nor does a definition to build it from, {place} in the project: give it that name, or bring the FMU"
 
 
 def _times(structure: Structure, overrides: Overrides, problems: list[Problem]) -> tuple[float, float, float]:

@@ -132,6 +132,8 @@ class CatenaryModel:
 
         Raises
         ------
+        IndexError
+            If the line has no such wire.
         LocalSolutionError
             If the slack droppers are not found.
         """

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from models.catenary.definition.line_definition import CatenaryDefinition
-from models.catenary.definition.line_reading import load as load_line_file
+from models.catenary.definition.line_definition import LINE_TYPES, CatenaryDefinition
+from models.catenary.definition.line_reading import read as read_line
 from models.definition_files.message_text import hint
 from models.definition_files.toml_reader import DefinitionError, Problem, Table
 from models.library import search_path
@@ -64,7 +64,10 @@ def pantograph_path(name: str, folders: Iterable[Path] | None = None) -> Path:
 
 def load_line(name: str) -> CatenaryDefinition:
     """Read a line by its name or file; raises ``UnknownNameError`` or ``DefinitionError``."""
-    return load_line_file(line_path(name))
+    table = Table.load(line_path(name))
+    if (kind := table.data.get("type")) in _TYPES:  # read as a line, every other key would be wrong
+        raise DefinitionError([Problem(table.file, "type", f"'{kind}' is a pantograph's: name a line here")])
+    return read_line(table)
 
 
 def load_pantograph(name: str) -> LumpedDefinition | MechanismDefinition:
@@ -72,7 +75,8 @@ def load_pantograph(name: str) -> LumpedDefinition | MechanismDefinition:
     table = Table.load(pantograph_path(name))
     kind = table.data.get("type", "")
     if isinstance(kind, str) and kind and kind not in _TYPES:  # read as one of these, every other key would be wrong
-        text = f"'{kind}' is none of {', '.join(_TYPES)}{hint(kind, _TYPES)}"
+        other = "; it is a line's: name a pantograph here" if kind in LINE_TYPES else hint(kind, _TYPES)
+        text = f"'{kind}' is none of {', '.join(_TYPES)}{other}"
         raise DefinitionError([Problem(table.file, "type", text)])
     return read_mechanism(table) if kind == "multibody" else read_lumped(table)
 

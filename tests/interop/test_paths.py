@@ -19,6 +19,9 @@ from tests.fmus.support import short_line_recipe
 from tests.interop.test_host import linux, order, run_host, unpack
 
 pytestmark = linux
+#: Where an FMU lies is nothing to its kernels, which would take half of every process.
+PLAIN = {"OPENPANTO_KERNEL": "numpy"}
+HERE = {"OPENPANTO_PYTHON": sys.executable, **PLAIN}
 _PUNCTUATION = [c for c in string.punctuation if c != "/"]
 _SCRIPTS = [
     "Oberleitung äöüß",
@@ -81,7 +84,7 @@ def _uri(path):
 
 @pytest.fixture(scope="module")
 def expected(host, pair, tmp_path_factory):
-    done = run_host(host, _orders(tmp_path_factory.mktemp("plain"), pair, _uri), OPENPANTO_PYTHON=sys.executable)
+    done = run_host(host, _orders(tmp_path_factory.mktemp("plain"), pair, _uri), **HERE)
     assert done.returncode == 0, done.stderr
     assert max(float.fromhex(line) for line in done.stdout.split()) > 50.0
     return done.stdout
@@ -94,7 +97,7 @@ def _sample(names, whole):
 
 @pytest.mark.parametrize("name", _sample(NAMES, 2))
 def test_the_host_finds_the_same_bits_at_every_path(host, pair, expected, tmp_path, name):
-    done = run_host(host, _orders(tmp_path / name, pair, _uri), OPENPANTO_PYTHON=sys.executable)
+    done = run_host(host, _orders(tmp_path / name, pair, _uri), **HERE)
     assert done.returncode == 0, done.stderr
     assert done.stdout == expected
 
@@ -113,7 +116,7 @@ WRITTEN = {
 
 @pytest.mark.parametrize("how", WRITTEN if IS_LONG else ("capitals", "all escaped", "plain"))
 def test_the_host_finds_the_same_bits_however_the_place_is_written(host, pair, expected, tmp_path, how):
-    done = run_host(host, _orders(tmp_path / "ä 100% #1", pair, WRITTEN[how]), OPENPANTO_PYTHON=sys.executable)
+    done = run_host(host, _orders(tmp_path / "ä 100% #1", pair, WRITTEN[how]), **HERE)
     assert done.returncode == 0, done.stderr
     assert done.stdout == expected
 
@@ -133,7 +136,7 @@ for folder in sys.argv[1:]:
 def _in_fmpy(folder, pair):
     folders = [str(unpack(fmu, folder).folder) for fmu in pair]
     command = [sys.executable, "-c", _FMPY, *folders]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", **PLAIN}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
@@ -209,7 +212,7 @@ def test_a_broken_fmu_makes_no_instance_and_the_host_lives(host, pair, tmp_path,
     part = unpack(pair[1], tmp_path)
     text = _spoil(part, how)
     orders = order("refuse", part.library, part.guid, _uri(part.folder / "resources")) + "\n"
-    _refused(run_host(host, orders, OPENPANTO_PYTHON=sys.executable), text)
+    _refused(run_host(host, orders, **HERE), text)
 
 
 @pytest.mark.parametrize(
@@ -231,14 +234,14 @@ def test_a_broken_fmu_makes_no_instance_and_the_host_lives(host, pair, tmp_path,
 def test_a_wrong_location_is_refused_in_words(host, pair, tmp_path, location, text):
     part = unpack(pair[1], tmp_path)
     orders = order("refuse", part.library, part.guid, location) + "\n"
-    _refused(run_host(host, orders, OPENPANTO_PYTHON=sys.executable), text)
+    _refused(run_host(host, orders, **HERE), text)
 
 
 @pytest.mark.parametrize("guid", ["00000000-0000", "-"])
 def test_a_wrong_guid_is_refused_in_words(host, pair, tmp_path, guid):
     part = unpack(pair[1], tmp_path)
     orders = order("refuse", part.library, guid, _uri(part.folder / "resources")) + "\n"
-    _refused(run_host(host, orders, OPENPANTO_PYTHON=sys.executable), "is not that of the FMU in")
+    _refused(run_host(host, orders, **HERE), "is not that of the FMU in")
 
 
 def test_a_missing_package_is_named(host, pair, tmp_path):
@@ -247,7 +250,7 @@ def test_a_missing_package_is_named(host, pair, tmp_path):
     part = unpack(pair[1], tmp_path)
     orders = order("refuse", part.library, part.guid, _uri(part.folder / "resources")) + "\n"
     python = tmp_path / "env" / "bin" / "python"
-    _refused(run_host(host, orders, OPENPANTO_PYTHON=str(python)), "lacks the packages numpy and scipy")
+    _refused(run_host(host, orders, OPENPANTO_PYTHON=str(python), **PLAIN), "lacks the packages numpy and scipy")
 
 
 def test_an_initialisation_that_fails_is_an_error(host, pair, tmp_path):
@@ -257,7 +260,7 @@ def test_an_initialisation_that_fails_is_an_error(host, pair, tmp_path):
     for name, value in (("contact_wire.tension", 500.0), ("contact_wire.mass", 20.0)):
         orders += f"\nparameter 0 {part.references[name]} {value}"
     orders += "\n"
-    done = run_host(host, orders + "run 2 0.001\n", OPENPANTO_PYTHON=sys.executable)
+    done = run_host(host, orders + "run 2 0.001\n", **HERE)
     assert done.returncode == 1
     assert "no static equilibrium of the wanted shape" in done.stderr
     assert "leaving initialization: status 3" in done.stderr

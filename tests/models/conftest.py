@@ -1,5 +1,6 @@
 """Small lines and pantographs for the physics' tests."""
 
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from models.catenary.definition.fault_definition import FAULT_KINDS, Fault
 from models.catenary.definition.line_definition import CatenaryDefinition
 from models.catenary.definition.line_reading import read
 from models.definition_files.toml_reader import Table
-from models.library.catalogue import load_line, load_lumped
+from models.library.catalogue import line_path, load_line, load_lumped
 from models.pantograph.lumped.lumped_definition import LumpedDefinition
 
 LIBRARY = Path(models.__file__).parent / "library"
@@ -74,6 +75,25 @@ def make_line(
     return read(Table.from_dict({k: v for k, v in data.items() if v is not None}, "short.toml"))
 
 
+def shortened(name: str, spans: int | None) -> CatenaryDefinition:
+    """Return a line of the library with the first and last of its spans, ``spans`` in all; None for the whole of it.
+
+    Lines of several sections stay whole.
+    """
+    data = tomllib.loads(line_path(name).read_text(encoding="utf-8"))
+    if "spans" not in data:
+        return load_line(name)
+    table = data["spans"]
+    if spans is not None and "lengths" in table:
+        lengths = table["lengths"][0]
+        table["lengths"][0] = lengths[: (spans + 1) // 2] + lengths[len(lengths) - spans // 2 :]
+        table.pop("end", None)
+    elif spans is not None:
+        table["count"][0] = spans
+        table.pop("end", None)
+    return read(Table.from_dict(data, name))
+
+
 def make_fault(kind: str, **values: object) -> Fault:
     """Return a fault of some kind, active unless it is said not to be."""
     return FAULT_KINDS[kind](kind=kind, **values)
@@ -99,6 +119,14 @@ def make_section(
 def make_sections(*sections: dict[str, object], **changes: object) -> CatenaryDefinition:
     """Return a line of LN2's wires in several sections."""
     return make_line(spans=None, stagger=None, ends=None, section=list(sections), **changes)
+
+
+def make_overlap(spans: int = 6) -> CatenaryDefinition:
+    """Return a line of LN2's wires in two sections of ``spans`` spans, of which they share two."""
+    stagger = [0.2 if i % 2 == 0 else -0.2 for i in range(spans - 1)]
+    return make_sections(
+        make_section(0.0, spans, stagger), make_section(50.0 * (spans - 2), spans, [-s for s in stagger])
+    )
 
 
 def make_ring(spans: int = 10, stagger: object = None, **changes: object) -> CatenaryDefinition:

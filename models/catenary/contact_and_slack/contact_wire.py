@@ -258,8 +258,11 @@ class ContactWire:
         return place + self.period * np.round((x - place) / self.period)
 
     def _laps(self, x: float) -> int:
-        """Return how often a position of the track has gone round a wire that closes on itself; 0 on one that ends."""
-        return math.floor((x - self.starts[0]) / self.period) if self.period else 0
+        """Return how often a position of the track has gone round a wire that closes on itself; 0 on one that ends.
+
+        What is no number has no lap either: the step tells of it as on a wire that ends.
+        """
+        return math.floor((x - self.starts[0]) / self.period) if self.period and math.isfinite(x) else 0
 
     def _shift(self, a: list[float], b: list[float], laps: int) -> None:
         """Move the ends of a strip by whole laps."""

@@ -11,8 +11,7 @@ from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg.blas import dtbsv
-from scipy.linalg.lapack import dpbtrf, dpbtrs
+from scipy.linalg.lapack import dpbtrf, dpbtrs, dtbtrs  # of BLAS itself a standalone FMU would carry a megabyte more
 from scipy.sparse.linalg import splu
 
 from models.arrays import FloatArray
@@ -70,9 +69,9 @@ class Banded:
         """Return the solution for a load of shape (n,) or (n, m)."""
         if load.ndim > 1:
             return np.asarray(dpbtrs(self.factor, load, lower=1)[0])
-        result: FloatArray = dtbsv(self.width, self._unit, load, trans=1, diag=1)
+        result: FloatArray = dtbtrs(self._unit, load, trans="T", diag="U")[0]
         result /= self._diagonal
-        return np.asarray(dtbsv(self.width, self._unit, result, diag=1, overwrite_x=1))
+        return np.asarray(dtbtrs(self._unit, result, diag="U", overwrite_b=1)[0])
 
     def near(self, first: int, load: FloatArray) -> tuple[int, FloatArray]:
         """Return solutions for loads of shape (k, m) on the rows from ``first``, where they are not zero.

@@ -21,7 +21,7 @@ from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.step.array_book import ArrayBook
 from models.catenary.step.attachment_lanes import AttachmentLanes, aligned
 from models.catenary.step.mode_units import ModeUnits, PackedMotion
-from models.catenary.step.step_engine import GivenForce, SteppedLine
+from models.catenary.step.step_engine import GivenForce, SteppedLine, no_such_wire
 from models.catenary.step.step_records import StepRecords
 from models.contact_law import continuous_contact
 
@@ -151,7 +151,7 @@ class CompiledLineStep:
         elif answer == kernels.DROPPER_LACKS:
             self._records.add_dropper(lacks)
         elif answer == kernels.NO_WIRE:
-            raise IndexError(f"a force is given on a contact wire other than 0 to {len(self._wires) - 1}")
+            raise no_such_wire(len(self._wires))
         elif answer == kernels.NO_SOLUTION:
             raise LocalSolutionError("slack and contact forces have no solution: their compliances are singular")
         else:

@@ -14,7 +14,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from models.catenary.step.vector_kernels import LANES, get, nothing, part, put, reader, totals
+from models.catenary.step.vector_kernels import LANES, compiled, get, nothing, part, put, reader, totals
 
 #: Ends that the modes of a unit move with.
 ENDS = 6
@@ -117,6 +117,41 @@ def advance_more(modes, a1, table, ends):
         inverse, amplitude, rate = get(table, unit + _INVERSE), get(table, unit + _AMPLITUDE), get(table, unit + _RATE)
         force = force_of(modes, group, inverse, amplitude, rate)
         put(ends, (groups + i) * _LANES, at_ends(modes.coupling, i * _ENDS * _LANES, force))
+
+
+@compiled
+def momenta(modes, v, table, ends, momentum):
+    """Find the momenta q' + G x' of all modes, in the order of units.
+
+    Parameters
+    ----------
+    v : ndarray, shape (m,)
+        Velocities of the attachments in lanes.
+    table, ends
+        As in `advance`.
+    momentum : ndarray
+        Result.
+    """
+    put_ends(modes, v, ends, _0)
+    groups = np.uint64(modes.first.size) - _1
+    for group in range(groups):
+        for unit in range(modes.first[group], modes.first[group + _1]):
+            moved = nothing()
+            for j in range(_0, _ENDS):
+                moved += get(table, unit * _UNIT + j * _LANES) * ends[group * _LANES + j]
+            rate = get(table, unit * _UNIT + _RATE)
+            put(momentum, unit * _LANES, rate + moved * per_mass(modes, group))
+    for i in range(np.uint64(modes.more.size) // _2):
+        unit, group, moved = modes.more[_2 * i], modes.more[_2 * i + _1], nothing()
+        for j in range(_0, _ENDS):
+            moved += get(modes.coupling, (i * _ENDS + j) * _LANES) * ends[(groups + i) * _LANES + j]
+        put(momentum, unit * _LANES, get(momentum, unit * _LANES) + moved * per_mass(modes, group))
+
+
+@part
+def per_mass(modes, group):
+    """Return 1 / mu of a group's modes."""
+    return modes.rates[_4 * modes.kinds[group] + _1] / modes.rates[_4 * modes.kinds[group]]
 
 
 @part

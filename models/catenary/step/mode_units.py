@@ -86,7 +86,7 @@ class ModeUnits:
         self.table = table.ravel()
         self.table[begin + kernels.INVERSE * lanes] = matrices.inverse
         self.step, self.rows = newmark.step, kernels.ROWS
-        self.attachments, self._matrices = attachments, matrices
+        self.attachments, self._matrices, self._kernels = attachments, matrices, kernels
 
     def pull(self, modal: FloatArray) -> FloatArray:
         """Return ``pull`` of the kernels' `advance` for a motion of the modes."""
@@ -94,10 +94,11 @@ class ModeUnits:
         held = of.inverse * (a2 * modal[1] - 2.0 * of.modes.eigenvalue * modal[0])
         return self.attachments.laid_out(of.modes.turn.T @ (of.coupling.T @ (a2 / of.mu * modal[1] - held)))
 
-    def momentum(self, rates: FloatArray, velocity: FloatArray) -> FloatArray:
-        """Return the momentum q' + G x' from rates of the modes and velocities of the attachments."""
-        modes = self._matrices.modes
-        return np.asarray(rates + modes.coupling @ (modes.turn @ velocity))
+    def momentum(self, velocity: FloatArray, table: FloatArray) -> FloatArray:
+        """Return the momenta of all modes from velocities of the attachments in lanes and the table of the modes."""
+        ends, result = np.empty(self.rows_of_ends * self._kernels.LANES), np.empty(table.size // self.rows)
+        self._kernels.momenta(self.arrays, velocity, table, ends, result)
+        return result[self.slots]
 
 
 def _first_modes(modes: IntervalModes, lanes: int) -> tuple[IntArray, IntArray]:
@@ -175,21 +176,21 @@ class PackedMotion:
     """
 
     def __init__(self, units: ModeUnits, motion: LineMotion) -> None:
-        self.units, self.moved, self._attached = units, False, motion.attached
+        self.units, self.moved = units, False
         prepared, (modal, _) = motion.prepared, motion.plain()
         self._table = aligned(units.table)
         self._table[units.amplitude], self._table[units.rate] = modal
         is_known = prepared.size and prepared[0] == units.step
         self._pull = aligned(prepared[1:]) if is_known else units.pull(modal)
-        x, v = (units.attachments.laid_out(part) for part in motion.attached)
-        self.book = ArrayBook((x, v, self._table, np.zeros(units.table.size // units.rows), self._pull), ())
+        x, self._v = (units.attachments.laid_out(part) for part in motion.attached)
+        self.book = ArrayBook((x, self._v, self._table, np.zeros(units.table.size // units.rows), self._pull), ())
 
     def unpack(self, modal: FloatArray, momentum: FloatArray) -> None:
         """Put it into the arrays of a `LineMotion`."""
         if self.moved:
             np.take(self._table, self.units.amplitude, out=modal[0])
             np.take(self._table, self.units.rate, out=modal[1])
-            momentum[...] = self.units.momentum(modal[1], self._attached[1])
+            momentum[...] = self.units.momentum(self._v, self._table)
             self.moved = False
 
     def prepared(self) -> FloatArray:

@@ -17,7 +17,7 @@ from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.sparse_products import Product
 from models.catenary.linear_motion.step_matrices import StepMatrices
 from models.catenary.step.linear_step import LinearStep
-from models.catenary.step.step_engine import GivenForce, SteppedLine
+from models.catenary.step.step_engine import GivenForce, SteppedLine, no_such_wire
 
 _NO_STRIPS = np.zeros(0)
 #: Where a force acts, its section, element and xi; the point of the wire there; the force at the end of the step [N].
@@ -81,6 +81,8 @@ class PlainStep:
 
     def push(self, state: CatenaryState, forces: Sequence[GivenForce]) -> None:
         """Advance the line by one step under forces that are given at its end; see `StepEngine`."""
+        if any(s not in range(len(self._line.wires)) for s, _, _ in forces):
+            raise no_such_wire(len(self._line.wires))
         pull = self._begin(state)
         placed: list[_Placed] = []
         for s, x, force in forces:
@@ -90,6 +92,7 @@ class PlainStep:
             pull[columns.dropper_index] += columns.dropper_force.dot(force * point.load)
             placed.append((place, point, force))
         self._finish(state, placed, self._local.solve(pull, (), _NO_STRIPS, state.slack))
+        state.impact_velocity[...] = 0.0
 
     def _begin(self, state: CatenaryState) -> FloatArray:
         """Find the free changes of the step; return the droppers' pulls at its end, if they could push [N]."""

@@ -17,6 +17,11 @@ from models.contact_law import ContactLaw
 GivenForce = tuple[int, float, float]
 
 
+def no_such_wire(wires: int) -> IndexError:
+    """Return the error of a force that is given on none of a line's wires."""
+    return IndexError(f"a force is given on a contact wire other than 0 to {wires - 1}")
+
+
 @dataclass(frozen=True)
 class SteppedLine:
     """A line as its step engines take it, whatever the step size.
@@ -63,7 +68,7 @@ class StepEngine(Protocol):
         """
 
     def push(self, state: CatenaryState, forces: Sequence[GivenForce]) -> None:
-        """Advance the line by one step under forces that are given at its end.
+        """Advance the line by one step under forces that are given at its end, all strips lifted off.
 
         Parameters
         ----------
@@ -72,6 +77,8 @@ class StepEngine(Protocol):
 
         Raises
         ------
+        IndexError
+            If the line has no such wire; the state is then as before.
         LocalSolutionError
             If the slack droppers are not found.
         """

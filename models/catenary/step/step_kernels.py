@@ -93,7 +93,7 @@ def step(
     motion = Motion(a1, work.numbers[1], attached, moving.table, moving.driven, moving.pull, change, lanes.slots)
     if report[STAGE] < _BEGUN:
         for k in range(given.shape[0]):
-            if not 0 <= given[k, 0] < wires.period.size:
+            if not 0 <= given[k, 0] < wires.period.size or given[k, 0] != math.floor(given[k, 0]):
                 return NO_WIRE
             section = np.int64(given[k, 0])
             loaded_after[k, 0], load_after[k, 1] = section, given[k, 2]

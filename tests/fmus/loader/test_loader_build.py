@@ -92,7 +92,7 @@ def test_a_loader_that_came_with_the_package_is_taken(monkeypatch, tmp_path):
 
 
 @linux
-def test_a_loader_is_compiled_once_for_each_compiler(monkeypatch, tmp_path):
+def test_a_loader_is_compiled_once_for_each_compiler_and_its_options(monkeypatch, tmp_path):
     compiled = []
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(loader_build, "built_name", lambda: "none.so")
@@ -103,10 +103,14 @@ def test_a_loader_is_compiled_once_for_each_compiler(monkeypatch, tmp_path):
             loader_build.loader_library.cache_clear()
             assert loader_build.loader_library() == b"made"
         assert len(compiled) == 2
-        monkeypatch.setenv("OPENPANTO_CACHE", "off")
+        monkeypatch.setattr(loader_build, "_OPTIONS", ("-O1",))
         loader_build.loader_library.cache_clear()
         assert loader_build.loader_library() == b"made"
         assert len(compiled) == 3
+        monkeypatch.setenv("OPENPANTO_CACHE", "off")
+        loader_build.loader_library.cache_clear()
+        assert loader_build.loader_library() == b"made"
+        assert len(compiled) == 4
     finally:
         loader_build.loader_library.cache_clear()
 

@@ -283,7 +283,8 @@ def test_charts_are_written_in_the_formats_that_are_asked_for_or_already_there(t
     assert "--no-report leaves out" in capsys.readouterr().err
 
 
-def test_report_with_a_measurement_a_film_and_parquet(toy, in_folder, capsys):
+def test_report_with_a_measurement_a_film_and_parquet(toy, in_folder, capsys, monkeypatch):
+    monkeypatch.setattr("master.report.film_file._RATE", 4)  # few frames: what they show is tested where they are made
     main([str(toy), "--out", "a", "--quiet", "--no-report", "--no-build"])
     Path("m.csv").write_text("position [m],force [N]\n" + "".join(f"{x},{140 + x % 3}\n" for x in range(15, 48)))
     pytest.importorskip("pyarrow", reason="Parquet needs pyarrow")

@@ -1,12 +1,20 @@
 """The results folder of a run: whose it is, and what a claim leaves in it."""
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from master.errors import RequestError
-from master.results.results_folder import GENERATOR, SUMMARY, RunFolder, claimed_for_run, contents_of
+from master.results.results_folder import (
+    GENERATOR,
+    SUMMARY,
+    RunFolder,
+    claimed_for_run,
+    contents_of,
+    replaced_run,
+)
 
 
 def summary_of(run):
@@ -74,3 +82,15 @@ def test_only_the_run_of_the_checkpoint_continues_in_its_folder(tmp_path):
         claimed_for_run(folder, continued("second", folder)),
     ):
         pass
+
+
+def test_a_run_with_other_definitions_is_told_that_it_replaces_one(tmp_path):
+    own = {"catenary": "a/lines/x.toml", "pantograph": ""}
+    assert replaced_run(tmp_path, own) == ""
+    components = [{"name": name, "definition": file} for name, file in own.items()]
+    (tmp_path / SUMMARY).write_text(json.dumps({"components": components}))
+    assert replaced_run(tmp_path, own) == ""
+    said = replaced_run(tmp_path, {**own, "catenary": "b/lines/x.toml"})
+    assert said == f"{tmp_path} held a run with a/lines/x.toml, which this one replaces; --out DIR keeps both"
+    (tmp_path / SUMMARY).write_text('{"components": [1]}')
+    assert replaced_run(tmp_path, own) == ""

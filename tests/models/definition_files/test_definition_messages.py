@@ -7,7 +7,7 @@ import pytest
 from models.definition_files.message_text import hint
 from models.definition_files.si_units import to_si
 from models.definition_files.toml_reader import DefinitionError
-from models.library.catalogue import line_path, load_line
+from models.library.catalogue import line_path, load_line, load_pantograph, pantograph_path
 
 
 def test_forces_may_be_in_decanewtons():
@@ -86,3 +86,10 @@ def test_a_file_in_another_encoding_is_told_by_line(tmp_path):
     file.write_bytes(b'name = "line"\n# H\xf6he\n')
     with pytest.raises(DefinitionError, match=r"is not UTF-8 text \(line 2\): save it as UTF-8$"):
         load_line(str(file))
+
+
+def test_a_definition_of_the_other_kind_is_one_sentence():
+    with pytest.raises(DefinitionError, match=r"CX\.toml: type: 'lumped' is a pantograph's: name a line here$"):
+        load_line(str(pantograph_path("CX")))
+    with pytest.raises(DefinitionError, match="'simple' is none of lumped, multibody; it is a line's: name a panto"):
+        load_pantograph(str(line_path("LN2")))

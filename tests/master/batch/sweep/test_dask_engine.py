@@ -157,7 +157,7 @@ def test_whoever_is_killed_a_second_sweep_ends_with_the_same_table(command, tmp_
         assert "is gone; start the sweep again to go on" in error
     before = len(journal(out))
     assert 4 <= before < 9
-    with cluster_of(tmp_path / "other") as cluster:
+    with cluster_of(tmp_path / "other", workers=1) as cluster:
         process = command(*GRID, "--scheduler", cluster.address)
         _wait_for_runs(process, out, before + 1)
         for worker in cluster.workers:

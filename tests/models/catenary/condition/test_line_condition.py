@@ -16,9 +16,9 @@ from models.catenary.shape.form_finding import EquilibriumError, find_rest, weig
 from models.catenary.shape.kept_form import kept_form
 from models.catenary.shape.line_mesh import build_mesh
 from models.library.catalogue import line_names, load_line
-from tests.effort import count, rest, some
+from tests.effort import IS_LONG, count, rest, some
 from tests.models.catenary.shape.test_nonlinear_truss import limp
-from tests.models.conftest import make_fault, make_line
+from tests.models.conftest import make_fault, make_line, make_overlap, make_ring, shortened
 from tests.models.nonlinear_truss import Truss
 
 #: Span of LN2 with 49.5 m and seven droppers, 4.5 m from the supports and 6.75 m apart.
@@ -73,7 +73,7 @@ def short():
 
 @pytest.mark.parametrize("name", some(line_names(), "LN2_ring", "Re330", "Shinkansen"))
 def test_the_lengths_of_the_design_give_the_design(name):
-    design = design_of(load_line(name))
+    design = design_of(shortened(name, None if IS_LONG else 8))
     mesh = dataclasses.replace(design.shape.mesh, given_length=design.unstrained_length)
     rest = find_rest(design, mesh, design.shape.points)
     assert np.abs(rest.positions - design.positions).max() < 1e-9
@@ -107,8 +107,8 @@ def test_errors_and_faults_of_size_zero_leave_the_design(short):
 )
 def test_a_line_with_errors_hangs_as_a_nonlinear_truss_does(errors):
     """Every error 10 mm at one sigma; the truss has its bars cut, and its supports raised, by the same."""
-    line = limp("LN2", 16)
-    line = dataclasses.replace(line, irregularity=dataclasses.replace(line.irregularity, seed=3, **errors))
+    line = limp("LN2", 16, None if IS_LONG else 10)
+    line = dataclasses.replace(line, irregularity=dataclasses.replace(line.irregularity, seed=9, **errors))
     design, truss = design_of(line), Truss(line)
     condition, mesh, before = find_condition(design), design.shape.mesh, truss.rest
     n = len(truss.wires)
@@ -257,12 +257,9 @@ def test_a_broken_dropper_has_no_damper_and_no_pendulum(short):
 def test_supports_and_anchors_carry_the_weight(name):
     """Vertical equilibrium of the whole line: what is held, or sprung, takes its weight and nothing else."""
     values = {f"irregularity.{kind}_sigma": 0.01 for kind in ("dropper_length", "support_height")}
-    design = design_of(load_line(name).with_values(values | {"irregularity.seed": 2}))
-    condition = find_condition(
-        dataclasses.replace(
-            design, shape=dataclasses.replace(design.shape, definition=with_faults(design.shape.definition, broken(2)))
-        )
-    )
+    line = shortened(name, None if IS_LONG else 10)
+    design = design_of(line.with_values(values | {"irregularity.seed": 2}))
+    condition = changed(design, with_faults(design.shape.definition, broken(2, span=5)))
     shape = condition.shape
     force = shape.matrices.K @ condition.displacement + shape.droppers.rows.T @ condition.dropper_force
     unbalanced = (force - shape.matrices.load).reshape(-1, NODE_DOFS)[:, 2]
@@ -298,7 +295,7 @@ def test_supports_that_are_all_too_high_lift_the_line_as_it_is(monkeypatch):
 
 
 def test_a_support_at_the_seam_of_a_ring_is_one_like_any_other(monkeypatch):
-    line = load_line("LN2_ring")
+    line = make_ring(10)
     design = design_of(line)
     rises_at = []
     for place in (0, 2):
@@ -377,7 +374,7 @@ def test_large_errors_settle_with_many_droppers_slack(name):
 
 def test_faults_are_of_the_droppers_that_they_name():
     """Section, span and dropper count along the track; hangers are not droppers."""
-    line = load_line("LN2_overlap")
+    line = make_overlap()
     design = design_of(line)
     faults = (slipped(2, 0.05, span=4, section=1), slipped(3, 0.08, span=5, section=2))
     condition = changed(design, with_faults(line, *faults))

@@ -7,13 +7,14 @@ from models.catenary.line_model import CatenaryModel
 from models.catenary.linear_motion.attachment_solver import CUT
 from models.catenary.linear_motion.compliance import Compliance
 from models.catenary.linear_motion.step_matrices import StepMatrices
-from models.library.catalogue import load_line
 from models.numerics.newmark import Newmark
+from tests.models.conftest import make_overlap, shortened
 
 
-@pytest.fixture(scope="module", params=["short", "Re330", "LN2_overlap"])
+@pytest.fixture(scope="module", params=["short", "Re330", "overlap"])
 def model(request, short_line):
-    return CatenaryModel(short_line if request.param == "short" else load_line(request.param))
+    lines = {"short": lambda: short_line, "Re330": lambda: shortened("Re330", 8), "overlap": make_overlap}
+    return CatenaryModel(lines[request.param]())
 
 
 def _matrices(model):

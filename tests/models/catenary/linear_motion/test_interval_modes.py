@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from models.catenary.line_model import CatenaryModel
 from models.catenary.shape.beam_elements import NODE_DOFS
 from models.catenary.shape.wire_intervals import attachments, intervals, plan_angles, plan_rotation, without_rounding
-from models.library.catalogue import load_line
+from tests.models.conftest import make_overlap, shortened
 from tests.models.nodal_line import NodalLine
 
 
@@ -19,10 +19,12 @@ def model(short_line):
     return CatenaryModel(short_line)
 
 
-@pytest.fixture(scope="module", params=["short", "Re330", "LN2_overlap"])
+@pytest.fixture(scope="module", params=["short", "Re330", "overlap"])
 def any_model(request, model):
-    """Staggered; with stitch wires; with two sections and curved wires."""
-    return model if request.param == "short" else CatenaryModel(load_line(request.param))
+    """Staggered; with stitch wires; with two sections."""
+    if request.param == "short":
+        return model
+    return CatenaryModel(shortened("Re330", 8) if request.param == "Re330" else make_overlap())
 
 
 def _moved(model, seed):

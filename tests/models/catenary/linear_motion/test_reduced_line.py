@@ -89,12 +89,18 @@ def test_intervals_keep_different_numbers_of_modes(full, highest, expected):
     assert bool(line.modes.followers) == (0 in expected)
 
 
-def test_steps_are_those_of_the_line_confined_to_its_coordinates(few, kernel):
+@pytest.fixture(scope="module")
+def confined(few):
+    """A line of nodes, what its few coordinates move these by, and K, M, C of the coordinates."""
+    line = NodalLine(few)
+    T = _motions(few, line)
+    return line, T, [T.T @ (matrix @ T) for matrix in (line.K, line.M, line.C)]
+
+
+def test_steps_are_those_of_the_line_confined_to_its_coordinates(few, confined, kernel):
     """Galerkin's projection of the nodes' matrices, stepped by Newmark's method with accelerations."""
-    model = CatenaryModel(few.definition)
-    line, newmark = NodalLine(model), Newmark(1e-3)
-    T = _motions(model, line)
-    K, M, C = (T.T @ (matrix @ T) for matrix in (line.K, line.M, line.C))
+    model, newmark = CatenaryModel(few.definition), Newmark(1e-3)
+    line, T, (K, M, C) = confined
     state = model.initial_state()
     model.set_velocity(state, 1e-3 * np.random.default_rng(1).standard_normal(model.mesh.fixed.shape))
     v = np.concatenate([state.motion.modal[1], state.motion.attached[1]])
@@ -126,8 +132,8 @@ def _motions(model, line):
     return np.stack(columns, axis=1)
 
 
-def test_what_a_motion_loses_is_orthogonal_in_the_mass_to_what_is_left(few):
-    line, state = NodalLine(few), few.initial_state()
+def test_what_a_motion_loses_is_orthogonal_in_the_mass_to_what_is_left(few, confined):
+    line, state = confined[0], few.initial_state()
     nodal = np.where(few.mesh.fixed, 0.0, np.random.default_rng(2).standard_normal(few.mesh.fixed.shape))
     few.set_velocity(state, nodal)
     state.motion.modal[0], state.motion.attached[0] = state.motion.modal[1], state.motion.attached[1]

@@ -170,7 +170,7 @@ def test_profile_and_droppers_belong_together(re330):
     assert z == pytest.approx(5.3 - 0.065 * 4.0 * share * (1.0 - share), abs=1e-4)
 
 
-@pytest.mark.parametrize("name", some(line_names(), "LN2_overlap", "Re330"))
+@pytest.mark.parametrize("name", some(line_names(), "LN2_overlap"))
 def test_command_writes_tables_and_plots_of_every_line(name, tmp_path, capsys):
     assert main(["statics", name, "--out", str(tmp_path), "--speed", "250"]) == 0
     text = capsys.readouterr().out

@@ -200,28 +200,47 @@ def test_given_forces(both, short_line, ring_maker, kind, middle):
     assert slack > 0
 
 
+def test_given_forces_leave_no_strip_closed(both, short_line):
+    """A strip that was closed before them touches anew after them, which a law with restitution minds."""
+    model, engines = both(short_line)
+    states, touched = [model.initial_state() for _ in engines], 0
+    for n in range(12):
+        motion = strips(model, (70.0,), n, lift=0.003)
+        for engine, state in zip(engines, states, strict=True):
+            if n % 4 == 3:
+                touched += state.impact_velocity.max() > 0.0
+                engine.push(state, [(0, 70.0, 900.0)])
+                assert not state.impact_velocity.any()
+            else:
+                engine.step(state, motion)
+        same(*states)
+    assert touched == 6
+
+
 def test_a_force_on_a_wire_that_is_none(both, short_line):
     model, engines = both(short_line)
     for engine in engines:
-        for wire in (1, -2):
-            with pytest.raises(IndexError):
-                engine.push(model.initial_state(), [(wire, 70.0, 50.0)])
+        for wire in (1, -1, 0.5):
+            with pytest.raises(IndexError, match="contact wire other than 0 to 0"):
+                engine.push(model.initial_state(), [(0, 70.0, 50.0), (wire, 70.0, 50.0)])
 
 
 def test_what_is_no_number_makes_no_contact_and_leaves_no_trace(both, short_line, ring_maker):
-    for line in (short_line, ring_maker(10)):
-        model, (_, engine) = both(line)
-        state = model.initial_state()
-        motion = strips(model, (70.0,), 0)
-        saved, first = state.snapshot(), engine.step(state, motion)
-        motion.strip[:] = np.nan
-        assert not engine.step(state, motion).force.any()
-        state.motion.attached[:] = np.nan
-        engine.push(state, ())
-        state.restore(saved)
-        again = engine.step(state, strips(model, (70.0,), 0))
-        assert np.array_equal(first.force, again.force)
-        assert first.force.sum() > 0.0
+    for line in (short_line, ring_maker(4)):
+        model, engines = both(line)
+        for engine in engines:
+            state = model.initial_state()
+            motion = strips(model, (70.0,), 0)
+            saved, first = state.snapshot(), engine.step(state, motion)
+            for nothing in (np.inf, np.nan):
+                motion.strip[:] = nothing
+                assert not engine.step(state, motion).force.any()
+            state.motion.attached[:] = np.nan
+            engine.push(state, ())
+            state.restore(saved)
+            again = engine.step(state, strips(model, (70.0,), 0))
+            assert np.array_equal(first.force, again.force)
+            assert first.force.sum() > 0.0
 
 
 def test_records_that_are_forgotten_are_made_again(both, short_line, monkeypatch):

@@ -52,10 +52,13 @@ class LastFound(Generic[T]):
         """
         definition = replace(mechanism.definition, **OF_A_RUN)
         key = definition, standing.tobytes(), mechanism.forces.lines.free_length.tobytes()
-        found = self._kept.pop(key) if key in self._kept else find()
+        try:  # not asked before: another thread, of a host with one for each FMU, may take it meanwhile
+            found = self._kept.pop(key)
+        except KeyError:
+            found = find()
         self._kept[key] = found
-        while len(self._kept) > self.most:
-            self._kept.pop(next(iter(self._kept)))
+        for oldest in list(self._kept)[: -self.most]:
+            self._kept.pop(oldest, None)
         return found
 
     def clear(self) -> None:

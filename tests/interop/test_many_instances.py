@@ -38,7 +38,7 @@ def many(fmu, number, warm_up, folder):
 
 @only_linux
 @pytest.mark.slow
-def test_a_thousand_pantographs(tmp_path):
+def test_many_pantographs(tmp_path):
     """Each would cost 290 kB if the library were loaded again every time, 7 kB if the class were made again."""
     (tmp_path / "unpacked").mkdir()
     # Many before it counts: Python's memory grows in pieces, the longer the fewer, more so beside numba's.

@@ -79,7 +79,7 @@ def read(scenario):
         }
 
 
-@settings(PROFILE, max_examples=count(100, 600))
+@settings(PROFILE, max_examples=count(60, 600))
 @given(change=changes())
 def test_descriptions(scenario, change):
     TRIED["description, blindly"] += 1
@@ -89,7 +89,7 @@ def test_descriptions(scenario, change):
         assert read(scenario) == reported(data)
 
 
-@settings(PROFILE, max_examples=count(85, 500))
+@settings(PROFILE, max_examples=count(51, 500))
 @given(change=changes())
 def test_parameter_sets(scenario, change):
     TRIED["parameter set, blindly"] += 1
@@ -102,7 +102,7 @@ def test_parameter_sets(scenario, change):
             assert opened.system.component("pantograph").parameters == values
 
 
-@settings(PROFILE, max_examples=count(70, 400))
+@settings(PROFILE, max_examples=count(42, 400))
 @given(change=changes())
 def test_mappings(scenario, change):
     TRIED["mapping, blindly"] += 1
@@ -136,7 +136,7 @@ def packed(scenario, path):
     return path.read_bytes()
 
 
-@settings(PROFILE, max_examples=count(70, 400))
+@settings(PROFILE, max_examples=count(42, 400))
 @given(change=changes())
 def test_archives(scenario, tmp_path_factory, change):
     TRIED["archive, blindly"] += 1
@@ -148,7 +148,7 @@ def test_archives(scenario, tmp_path_factory, change):
         assert read(path) == read(scenario)  # checksums: what is accepted is what was packed
 
 
-@settings(PROFILE, max_examples=count(70, 400))
+@settings(PROFILE, max_examples=count(42, 400))
 @given(change=changes())
 def test_fmus(scenario, change):
     TRIED["FMU, blindly"] += 1
@@ -161,7 +161,7 @@ def test_fmus(scenario, change):
         verdict(scenario, "ToyPantograph.fmu")
 
 
-@settings(PROFILE, max_examples=count(70, 400))
+@settings(PROFILE, max_examples=count(42, 400))
 @given(change=changes())
 def test_descriptions_of_fmus(scenario, change):
     """Inside the archive, where no checksum protects them."""

@@ -19,7 +19,7 @@ CODE = _with_checksum(pickle.dumps(("f8", bytes(range(256)) * 8)))
 
 
 @pytest.mark.parametrize("whole", [INDEX, CODE], ids=["index", "code"])
-@settings(PROFILE, max_examples=count(100, 5000))
+@settings(PROFILE, max_examples=count(60, 5000))
 @given(change=changes())
 def test_what_is_changed_is_not_read(tmp_path_factory, whole, change):
     TRIED["cache file, blindly"] += 1
@@ -32,7 +32,7 @@ def test_what_is_changed_is_not_read(tmp_path_factory, whole, change):
         _checked(path)
 
 
-@settings(PROFILE, max_examples=count(60, 1500))
+@settings(PROFILE, max_examples=count(36, 1500))
 @given(change=changes(), source=st.sampled_from([b"VALUE = 1\n", b"def f(x):\n    return 2 * x\n" * 40]))
 def test_a_changed_copy_of_the_source_is_replaced(tmp_path_factory, change, source):
     """The copy is run: it is always the source itself."""

@@ -287,7 +287,7 @@ def numbers(data) -> list:
     return [x for v in data for x in numbers(v)] if isinstance(data, list) else [data]
 
 
-@settings(PROFILE, max_examples=count(150, 900))
+@settings(PROFILE, max_examples=count(90, 900))
 @given(kind=st.sampled_from(sorted(FILES)), change=changes())
 def test_blindly(tmp_path_factory, kind, change):
     TRIED["definition, blindly"] += 1

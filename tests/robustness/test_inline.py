@@ -81,7 +81,7 @@ def reported(data):
 BEGIN, END = INLINE.index("<ssv:ParameterSet"), INLINE.index("</ssd:ParameterValues>")
 
 
-@settings(PROFILE, max_examples=count(100, 4000))
+@settings(PROFILE, max_examples=count(60, 4000))
 @given(change=changes())
 def test_inline_sets_blindly(scenario, change):
     TRIED["inline set, blindly"] += 1
@@ -112,7 +112,7 @@ def test_every_number_and_unit_of_an_inline_set(scenario, place):
 POWERS = st.dictionaries(st.sampled_from(["kg", "m", "s", "A", "K", "mol", "cd", "rad"]), st.integers(-3, 3))
 
 
-@settings(PROFILE, max_examples=count(80, 3000))
+@settings(PROFILE, max_examples=count(48, 3000))
 @given(powers=POWERS, factor=st.floats(1e-9, 1e9), offset=st.sampled_from([None, 0.0, 273.15]))
 def test_a_unit_of_any_dimension(scenario, powers, factor, offset):
     """Accepted just where it measures a force; then the value is factor times value plus offset."""
@@ -127,7 +127,7 @@ def test_a_unit_of_any_dimension(scenario, powers, factor, offset):
         assert parameters(scenario)["static_force"] == pytest.approx(0.14 * factor + (offset or 0.0))
 
 
-@settings(PROFILE, max_examples=count(60, 1000))
+@settings(PROFILE, max_examples=count(36, 1000))
 @given(factor=st.floats(1e-9, 1e9), value=st.floats(-1e6, 1e6))
 def test_a_unit_of_force_by_any_factor(scenario, factor, value):
     TRIED["unit, force"] += 1
@@ -146,7 +146,7 @@ UNITS = ssd_text().replace(
 UNITS_FROM, UNITS_TO = UNITS.index("<ssd:Units>"), UNITS.index("<ssd:DefaultExperiment")
 
 
-@settings(PROFILE, max_examples=count(80, 3000))
+@settings(PROFILE, max_examples=count(48, 3000))
 @given(change=changes())
 def test_units_blindly(scenario, change):
     """Units that nothing refers to change nothing, if they are any."""

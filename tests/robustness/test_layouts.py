@@ -69,7 +69,7 @@ def folder(tmp_path_factory):
 
 
 @given(name=st.sampled_from(sorted(SHEETS)), change=changes())
-@settings(max_examples=count(60, 3000), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=count(36, 3000), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_changed_layout_is_imported_or_refused_in_words(folder, name, change):
     path = written(folder, **{name: change(SHEETS[name].encode())})
     for problem in problems(path):

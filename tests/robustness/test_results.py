@@ -176,7 +176,7 @@ def test_reports_of_results_of_another_shape(measured_run, name):
     fill(measured_run)
     assert reported(measured_run)
     verdicts = []
-    for place, value in random.Random(name).sample(cases, min(len(cases), count(60, 5000))):
+    for place, value in random.Random(name).sample(cases, min(len(cases), count(36, 5000))):
         TRIED[f"results, report of a changed {name}"] += 1
         fill(measured_run, **{name: put(data, place, value)})
         verdicts.append(reported(measured_run))
@@ -185,7 +185,7 @@ def test_reports_of_results_of_another_shape(measured_run, name):
 
 
 @pytest.mark.parametrize("name", ["summary.json", "geometry.json", "timeseries.csv"])
-@settings(PROFILE, max_examples=count(30, 1500))
+@settings(PROFILE, max_examples=count(18, 1500))
 @given(change=changes())
 def test_reports_blindly(measured_results, name, change):
     TRIED["results, report of a blindly changed file"] += 1

@@ -67,7 +67,7 @@ def refused(error):
     return str(error.value)
 
 
-@settings(PROFILE, max_examples=count(80, 150))
+@settings(PROFILE, max_examples=count(48, 150))
 @given(table=tables, unit=st.sampled_from(["m", "km", "s", "ms"]), force=st.sampled_from(["N", "kN"]),
        separator=st.sampled_from(",;"))  # fmt: skip
 def test_sound_measurements_are_read_as_written(tmp_path_factory, table, unit, force, separator):
@@ -138,7 +138,7 @@ def test_measurements_in_other_encodings(tmp_path, encoding):
     assert "m.csv" in refused(error)
 
 
-@settings(PROFILE, max_examples=count(120, 400))
+@settings(PROFILE, max_examples=count(72, 400))
 @given(change=changes())
 def test_measurements_blindly(tmp_path_factory, change):
     TRIED["measurement, blindly"] += 1
@@ -191,7 +191,7 @@ def test_a_bad_cell_of_a_response_is_told_with_its_line(tmp_path, bad, column):
         assert f"r.csv: line {row + 2}: " in refused(error)
 
 
-@settings(PROFILE, max_examples=count(120, 400))
+@settings(PROFILE, max_examples=count(72, 400))
 @given(change=changes())
 def test_responses_blindly(tmp_path_factory, change):
     TRIED["response, blindly"] += 1
@@ -259,7 +259,7 @@ def family(folder, **changed):
 
 
 @pytest.mark.parametrize("name", [STUDY, VARIANTS])
-@settings(PROFILE, max_examples=count(100, 200))
+@settings(PROFILE, max_examples=count(60, 200))
 @given(change=changes())
 def test_studies_blindly(tmp_path_factory, name, change):
     TRIED["study, blindly"] += 1
@@ -350,7 +350,7 @@ CELL = st.one_of(
 )  # fmt: skip
 
 
-@settings(PROFILE, max_examples=count(80, 4000))
+@settings(PROFILE, max_examples=count(48, 4000))
 @given(head=st.lists(CELL, max_size=3), rows=st.lists(st.lists(CELL, min_size=1, max_size=4), min_size=1, max_size=4))
 def test_study_tables_of_any_cells(tmp_path_factory, head, rows):
     """Reported in words with the file, or listed; whatever the cells hold, all that is printed can be read."""
@@ -368,7 +368,7 @@ def test_study_tables_of_any_cells(tmp_path_factory, head, rows):
         assert VARIANTS in answer.err or STUDY in answer.err, answer.err
 
 
-@settings(PROFILE, max_examples=count(60, 2000))
+@settings(PROFILE, max_examples=count(36, 2000))
 @given(names=st.lists(CELL.filter(lambda c: c.strip()), min_size=1, max_size=5, unique=True))
 def test_a_table_that_is_written_reads_the_same_and_computes_nothing(names):
     """Names of components and variables as titles: no spreadsheet takes one for a formula, none is lost."""
